@@ -1,0 +1,15 @@
+# Settings that every target of ours shares: warnings, sanitizers, the same floating-point results on every machine.
+function(hpsdf_target target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual
+    # no fused multiply-add unless written: results must not depend on what the compiler finds to fuse
+    -ffp-contract=off)
+  if(HPSDF_WARNINGS_AS_ERRORS)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  if(HPSDF_SANITIZE)
+    target_compile_options(${target} PUBLIC -fsanitize=${HPSDF_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${HPSDF_SANITIZE})
+  endif()
+endfunction()

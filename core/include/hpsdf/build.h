@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "hpsdf/distance_function.h"
+#include "hpsdf/field.h"
+#include "hpsdf/progress.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf {
+
+enum class CoefficientType : std::uint8_t { automatic, single, dual };
+
+/// Where the p-trial takes its samples.
+enum class TrialSamples : std::uint8_t {
+  children,  ///< the children's samples, a finer quadrature of the same cell: refits all coefficients, costs no Φ
+  own,       ///< a quadrature of its own, appending the new degree only (the paper)
+};
+
+/// Settings of the construction (paper, Algorithm 1). The defaults are ours; `paperOptions` are the paper's.
+struct BuildOptions {
+  /// τ at the paper's scale, where the longest side of the mesh's box is 2. Internally τ·(L/2)^5, L that side in the
+  /// mesh's own units, so that the same τ gives the same cells in any unit. Of a callable: L = longest edge/1.1.
+  double targetError = 1e-6;
+  std::array<std::uint32_t, 3> grid = {6, 6, 6};  ///< base cells an axis
+  double nearness = 4;                            ///< θ; 0 weighs all cells alike
+  int maxDegree = 30;                             ///< p_max, 1 to 30
+  int maxDepth = 10;                              ///< l_max, 0 to 20
+  Strategy strategy = Strategy::hp;
+  int quadrature = 3;  ///< order of the Gauss quadrature as a multiple of p, 2 to 8; the paper's is 4
+  TrialSamples trialSamples = TrialSamples::children;
+  /// Width in world units: cells wholly farther from the surface are not refined and do not count towards ε. 0: none.
+  double band = 0;
+  CoefficientType coefficients = CoefficientType::automatic;
+  int threads = 0;  ///< 0: all that the machine offers. The result does not depend on it.
+};
+
+/// The paper's settings but τ and base grid.
+BuildOptions paperOptions();
+
+enum class DomainShape : std::uint8_t { cube, box };
+
+/// The mesh's box enlarged about its centre to (1 + margin) times its size; as a cube, of the longest side.
+Box domainAround(const Box& surface, DomainShape shape = DomainShape::cube, double margin = 0.1);
+Box domainAround(const TriangleMesh& mesh, DomainShape shape = DomainShape::cube, double margin = 0.1);
+
+/// Builds the field of Φ over `domain`. What Φ says of its source goes into the metadata; a box there gives L.
+///
+/// Throws `Error` for options or a domain out of range, a base grid whose cells would not fit into memory, or a Φ that
+/// returns a non-finite value; `Cancelled` when asked to stop.
+Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options = {},
+            const Progress& progress = {});
+
+}  // namespace hpsdf

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "hpsdf/distance_function.h"
+#include "hpsdf/types.h"
+
+namespace hpsdf {
+
+constexpr int kMaxDegree = 30;
+constexpr int kMaxDepth = 20;  ///< so that a cell's local coordinate keeps 32 bits of a double's 52
+
+/// n(p) = (p+1)(p+2)(p+3)/6: coefficients of a polynomial of total degree p (paper, sec. 3.3).
+constexpr int coefficientCount(int degree) { return (degree + 1) * (degree + 2) * (degree + 3) / 6; }
+
+enum class Strategy : std::uint8_t { hp, h1, h2 };
+
+/// How a field came to be: stored with it, shown by `info`. Distances are in mesh units unless said.
+struct FieldMetadata {
+  Source source;
+  double targetError = 0;      ///< τ at the paper's scale (longest side 2)
+  double totalError = 0;       ///< ε, weighted by nearness, at the paper's scale: comparable with targetError
+  double referenceLength = 2;  ///< L: an error at the paper's scale times (L/2)^5 is one in the field's own units^5
+  double nearness = 0;         ///< θ
+  std::uint32_t maxDegree = 0;
+  std::uint32_t maxDepth = 0;
+  std::uint32_t quadrature = 0;  ///< order as a multiple of the degree
+  Strategy strategy = Strategy::hp;
+  double band = 0;                     ///< width of the narrow band, 0 for none
+  std::uint64_t exactEvaluations = 0;  ///< of Φ during the construction
+  double roundingRms = 0;              ///< RMS change of the field by keeping its coefficients as float; 0 for double
+
+  /// √(ε/|Ω|) in the field's own units: the estimated RMS error that the construction ended with.
+  double rmsEstimate(const Box& domain) const;
+};
+
+/// The finished octree as arrays. The first `grid.prod()` nodes are the base cells, x fastest, then y, then z. A node
+/// is
+///   internal: bit 63 clear, low 32 bits the index of the first of its 8 children (child number = x + 2y + 4z);
+///   leaf:     bit 63 set, bits 32..39 the degree p, low 32 bits the offset of its n(p) coefficients.
+/// Coefficients c_ijk of a cell stand in lexicographic order of (i, j, k), i+j+k ≤ p, k fastest; they multiply plain
+/// Legendre polynomials L_i(u) L_j(v) L_k(w), local coordinates in [-1, 1], so that they are in units of length.
+struct FieldData {
+  Box domain;
+  std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< base cells an axis
+  std::vector<std::uint64_t> nodes;
+  std::variant<std::vector<double>, std::vector<float>> coefficients;
+  FieldMetadata metadata;
+};
+
+/// A node's bits, in one place.
+namespace node {
+constexpr std::uint64_t kLeafBit = std::uint64_t{1} << 63;
+constexpr bool isLeaf(std::uint64_t n) { return (n & kLeafBit) != 0; }
+constexpr std::uint32_t firstChild(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
+constexpr std::uint32_t offset(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
+constexpr int degree(std::uint64_t n) { return static_cast<int>((n >> 32) & 0xff); }
+constexpr std::uint64_t leaf(int degree, std::uint32_t offset) {
+  return kLeafBit | (std::uint64_t(degree) << 32) | offset;
+}
+constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
+}  // namespace node
+
+/// A leaf of the octree.
+struct Cell {
+  std::uint32_t id;  ///< its node's index: names the cell within its field
+  Box box;           ///< half-open: [min, max)
+  int degree;
+  int depth;     ///< 0 for a base cell
+  double error;  ///< ε_e: squared error that the top degree stands for, in units^5, without nearness (paper, eq. 6)
+};
+
+struct ValueAndGradient {
+  double value;
+  Vector3 gradient;
+};
+
+/// A hierarchical hp-adaptive signed distance field: immutable; every query is const, thread-safe and allocation-free.
+///
+/// Inside the domain the value is the polynomial of the leaf that holds the point; leaves are half-open, so that every
+/// point has exactly one. The field jumps slightly from leaf to leaf. Outside the domain it is f(q) + |x - q| with q
+/// the closest point of the domain: continuous, with the matching gradient, and never below what a 1-Lipschitz field
+/// allows.
+class Field {
+ public:
+  /// Takes finished arrays; throws `Error` when they do not make a field (see `FieldData`).
+  explicit Field(FieldData data);
+
+  double value(const Vector3& x) const;
+  ValueAndGradient valueAndGradient(const Vector3& x) const;
+
+  /// Batched; the spans have equal length. The same results as one at a time.
+  void values(std::span<const Vector3> points, std::span<double> out) const;
+  void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
+
+  /// The leaf that holds x, or, for x outside, the domain's closest point.
+  Cell cellAt(const Vector3& x) const;
+
+  /// Calls `visit` for every leaf, in the order of the octree (base cells first to last, children 0 to 7).
+  void forEachCell(const std::function<void(const Cell&)>& visit) const;
+
+  const Box& domain() const { return data_.domain; }
+  const std::array<std::uint32_t, 3>& grid() const { return data_.grid; }
+  const FieldMetadata& metadata() const { return data_.metadata; }
+  bool singlePrecision() const { return data_.coefficients.index() == 1; }
+
+  /// The arrays themselves: for files, uploads and tests.
+  const FieldData& data() const { return data_; }
+
+ private:
+  FieldData data_;
+};
+
+/// Figures over a whole field.
+struct FieldStatistics {
+  std::size_t leaves = 0;
+  std::size_t nodes = 0;
+  std::size_t coefficients = 0;
+  std::size_t bytes = 0;               ///< nodes and coefficients: what a query needs in memory
+  std::map<int, double> degreeVolume;  ///< degree → fraction of the domain's volume
+  std::map<int, double> depthVolume;   ///< depth → fraction of the domain's volume
+  std::map<int, std::size_t> degreeLeaves;
+  std::map<int, std::size_t> depthLeaves;
+};
+
+FieldStatistics statistics(const Field& field);
+
+}  // namespace hpsdf

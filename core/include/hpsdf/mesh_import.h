@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf {
+
+struct ImportedMesh {
+  TriangleMesh mesh;
+  MeshReport report;
+};
+
+/// Welds equal positions, drops degenerate and duplicate faces and unused vertices, and turns the *whole* mesh when its
+/// signed volume is negative (never part by part: a cavity's faces look inward on purpose).
+/// Throws `Error` for indices out of range, non-finite coordinates, or when no face with an area is left.
+ImportedMesh cleaned(TriangleMesh mesh);
+
+/// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,
+/// n-gons triangulated, then `cleaned`.
+///
+/// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6),
+/// and indices out of range in OFF and PLY files are mended silently, so that they cannot be reported.
+///
+/// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, non-finite, or without area.
+ImportedMesh importMesh(const std::filesystem::path& file);
+
+/// The mesh of `importMesh`, or, for a name that starts with `builtin:`, the shape of `shapes::mesh`.
+TriangleMesh loadMesh(const std::string& fileOrShape);
+
+}  // namespace hpsdf

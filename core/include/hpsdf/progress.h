@@ -1,0 +1,17 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+namespace hpsdf {
+
+/// The link between a long operation and its caller. Both callables may be empty.
+struct Progress {
+  /// Called now and then, by one thread at a time, with what is being done and the estimated fraction done, 0 to 1.
+  std::function<void(std::string_view task, double fraction)> report;
+
+  /// Asked often and from any thread; once it answers true the operation throws `Cancelled`.
+  std::function<bool()> cancelled;
+};
+
+}  // namespace hpsdf

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf {
+
+/// Vertices in mesh units; triangles index them, counter-clockwise seen from outside.
+struct TriangleMesh {
+  std::vector<Vector3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::string name;  ///< for messages and the field's metadata: the file's name without its path, or the shape's spec
+};
+
+/// Smallest box around the vertices that triangles use. Empty for a mesh without triangles.
+Box boundingBox(const TriangleMesh& mesh);
+
+/// Signed volume by the divergence theorem, in cubed mesh units; positive when the faces look outward.
+double signedVolume(const TriangleMesh& mesh);
+
+/// Sum of the triangles' areas.
+double surfaceArea(const TriangleMesh& mesh);
+
+/// 64-bit hash of vertices and triangles, the same on every machine. The name does not count.
+std::uint64_t fingerprint(const TriangleMesh& mesh);
+
+/// The mesh scaled uniformly and centred so that the longest side of its box spans exactly [-1, 1], as the paper does.
+/// Throws `Error` for a mesh without extent.
+TriangleMesh normalized(const TriangleMesh& mesh);
+
+}  // namespace hpsdf

@@ -1,0 +1,14 @@
+#pragma once
+// The value types that every room shares.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace hpsdf {
+
+using Vector3 = Eigen::Vector3d;
+
+/// Axis-aligned box, `min()` and `max()` corners in world units.
+using Box = Eigen::AlignedBox3d;
+
+}  // namespace hpsdf

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace hpsdf::render {
+
+/// An sRGB colour with 8 bits a channel.
+using Color = std::array<std::uint8_t, 3>;
+
+/// sRGB picture, rows top to bottom.
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<Color> pixels;
+
+  Image() = default;
+  Image(int width, int height, Color fill) : width(width), height(height), pixels(std::size_t(width) * height, fill) {}
+  Color& at(int x, int y) { return pixels[std::size_t(y) * width + x]; }
+  const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
+};
+
+/// Throws `hpsdf::Error` naming the file. Written under a temporary name and renamed.
+void savePng(const Image& image, const std::filesystem::path& file);
+Image loadPng(const std::filesystem::path& file);
+
+}  // namespace hpsdf::render

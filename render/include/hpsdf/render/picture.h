@@ -1,0 +1,53 @@
+#pragma once
+// From a field to a finished picture: view, buffers, colours, legend, caption.
+
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "hpsdf/field.h"
+#include "hpsdf/render/image.h"
+#include "hpsdf/render/renderer.h"
+#include "hpsdf/render/view.h"
+
+namespace hpsdf::render {
+
+enum class SliceColor : std::uint8_t { degree, depth, distance };
+enum class SurfaceColor : std::uint8_t { normal, degree, depth };
+
+struct AxisPlane {
+  int axis = 2;
+  double offset = 0;  ///< world units
+};
+struct FreePlane {
+  Vector3 point;
+  Vector3 normal;
+};
+
+struct SlicePicture {
+  std::variant<AxisPlane, FreePlane> plane = AxisPlane{};
+  SliceColor color = SliceColor::degree;
+  int width = 1280;  ///< of the whole picture, legend included
+  int height = 720;
+  int samples = 1;  ///< an axis and pixel, 1 to 8
+};
+
+struct SurfacePicture {
+  OrbitCamera camera;
+  double offset = 0;
+  SurfaceColor color = SurfaceColor::normal;
+  int width = 1280;
+  int height = 720;
+  int samples = 1;
+};
+
+/// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
+/// the whole field, so that colours keep their meaning from slice to slice.
+/// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8).
+Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture);
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture);
+
+/// The slice's view in the picture (without legend): for raw values, `width` × `height` samples of it.
+SliceView sliceView(const Field& field, const SlicePicture& picture);
+
+}  // namespace hpsdf::render

@@ -1,0 +1,70 @@
+#pragma once
+// What to look at: a plane through the field or a camera before its surface. And the data that a look yields.
+
+#include <cstdint>
+#include <vector>
+
+#include "hpsdf/field.h"
+#include "hpsdf/types.h"
+
+namespace hpsdf::render {
+
+/// A rectangle in space. Pixel (x, y) of w × h samples the point origin + right·((x+½)/w − ½) + up·(½ − (y+½)/h).
+struct SliceView {
+  Vector3 origin;  ///< centre of the rectangle, world units
+  Vector3 right;   ///< the whole width
+  Vector3 up;      ///< the whole height
+};
+
+/// The plane {x_axis = offset}, framed so that the domain's section fits into width × height pixels, with square
+/// pixels. Axes x, y, z are 0, 1, 2. On screen: x → (right y, up z), y → (x, z), z → (x, y). Throws `Error` for an
+/// offset outside of the domain.
+SliceView axisSlice(const Box& domain, int axis, double offset, int width, int height);
+
+/// The plane through `point` with `normal`. Throws `Error` for a zero normal or a plane that misses the domain.
+SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& normal, int width, int height);
+
+enum class UpAxis : std::uint8_t { y, z };
+
+/// A camera that orbits the centre of the domain, perspective.
+struct OrbitCamera {
+  double azimuthDegrees = 30;      ///< about the up axis, 0 looks along −z (y up) or from −y (z up)
+  double elevationDegrees = 20;    ///< above the horizon, −90 to 90
+  double distance = 1.0;           ///< of the eye from the centre, in domain diagonals, > 0
+  double fieldOfViewDegrees = 35;  ///< vertical
+  UpAxis up = UpAxis::y;
+};
+
+/// A pinhole: pixel (x, y) of w × h looks along forward + right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h).
+struct Pinhole {
+  Vector3 eye;
+  Vector3 forward;  ///< unit
+  Vector3 right;    ///< half the width at distance 1
+  Vector3 up;       ///< half the height at distance 1
+};
+Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height);
+
+/// The zero set, or that of f − offset, as seen by a camera.
+struct SurfaceView {
+  Pinhole camera;
+  double offset = 0;
+};
+
+constexpr std::uint32_t kNoCell = 0xffffffff;
+
+/// What the pixels of a view see, rows top to bottom; the colouring reads nothing else. Where a slice leaves the domain
+/// or a ray misses, `cell` is kNoCell and the rest 0.
+struct ViewBuffers {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint32_t> cell;  ///< `Cell::id`
+  std::vector<std::uint8_t> degree;
+  std::vector<std::uint8_t> depth;
+  std::vector<float> value;             ///< f at the point; along a ray, at the hit (near the offset)
+  std::vector<Eigen::Vector3f> normal;  ///< gradient of f, made a unit vector; not filled for slices
+  std::vector<float> distance;          ///< from the eye to the hit, world units; not filled for slices
+
+  bool hit(std::size_t pixel) const { return cell[pixel] != kNoCell; }
+};
+
+}  // namespace hpsdf::render
