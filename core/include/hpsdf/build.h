@@ -10,7 +10,8 @@
 
 namespace hpsdf {
 
-enum class CoefficientType : std::uint8_t { automatic, single, dual };
+/// How coefficients are kept. `automatic`: float32 where rounding adds less than 1 % to the estimated RMS error.
+enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
 
 /// Where the p-trial takes its samples.
 enum class TrialSamples : std::uint8_t {

@@ -1,0 +1,45 @@
+#include "basis/legendre.h"
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+namespace hpsdf {
+
+QuadratureRule gaussLegendre(int n) {
+  QuadratureRule rule;
+  rule.points.resize(n);
+  rule.weights.resize(n);
+  std::vector<double> values(n + 1);
+  std::vector<double> derivatives(n + 1);
+  for (int i = 0; i < (n + 1) / 2; ++i) {
+    // Newton from Tricomi's estimate of the i-th largest root; a handful of steps reach rounding.
+    double t = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5));
+    for (int step = 0; step < 50; ++step) {
+      legendreValuesAndDerivatives(t, n, values.data(), derivatives.data());
+      const double change = values[n] / derivatives[n];
+      t -= change;
+      if (std::abs(change) < 1e-16) break;
+    }
+    if (2 * i + 1 == n) t = 0;
+    legendreValuesAndDerivatives(t, n, values.data(), derivatives.data());
+    const double weight = 2 / ((1 - t * t) * derivatives[n] * derivatives[n]);
+    rule.points[i] = -t;
+    rule.points[n - 1 - i] = t;
+    rule.weights[i] = rule.weights[n - 1 - i] = weight;
+  }
+  return rule;
+}
+
+QuadratureRule splitInHalves(const QuadratureRule& rule) {
+  QuadratureRule both;
+  for (const double side : {-1.0, 1.0}) {
+    for (std::size_t q = 0; q < rule.points.size(); ++q) {
+      both.points.push_back((rule.points[q] + side) / 2);
+      both.weights.push_back(rule.weights[q] / 2);
+    }
+  }
+  return both;
+}
+
+}  // namespace hpsdf
