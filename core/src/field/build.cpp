@@ -1,0 +1,213 @@
+#include "hpsdf/build.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "field/build_options.h"
+#include "field/build_tree.h"
+#include "field/cell_fit.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+/// Estimates the fraction done from how fast the error has fallen for the work spent lately: error and work follow a
+/// power law, whose exponent is read off the last decade.
+class ProgressEstimate {
+ public:
+  double update(double work, double error, double target) {
+    if (error <= target) return 1;
+    if (history_.empty() || error < 0.8 * history_.back().error) history_.push_back({work, error});
+    const Point* back = &history_.front();
+    for (const Point& point : history_)
+      if (point.error > 10 * error) back = &point;
+    double exponent = 0.7;  // typical of scanned meshes, until there is something to read
+    if (back->error > 2 * error && work > back->work)
+      exponent = std::log(work / back->work) / std::log(back->error / error);
+    fraction_ = std::max(fraction_, std::min(0.99, std::pow(target / error, exponent)));
+    return fraction_;
+  }
+
+ private:
+  struct Point {
+    double work, error;
+  };
+  std::vector<Point> history_;
+  double fraction_ = 0;
+};
+
+/// Algorithm 1 of the paper, its queue served in rounds: the worst cells of a round are tried in parallel and then
+/// refined one after another in the order of the queue, so that the result does not depend on the number of threads.
+class Construction {
+ public:
+  Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+               const Progress& progress)
+      : options_(options),
+        progress_(progress),
+        length_(referenceLength(distance.source(), domain)),
+        target_(options.targetError * std::pow(length_ / 2, 5)),
+        fitter_(distance, options, domain.diagonal().norm(), progress) {
+    tree_.domain = domain;
+    tree_.grid = options.grid;
+  }
+
+  FieldData run(const Source& source) {
+    fitBaseCells();
+    while (!(totalError_ <= target_) && !queue_.empty()) {
+      refineRound();
+      if (totalError_ <= target_) sumTotalError();  // rounding in the running total must not end the construction early
+    }
+    FieldMetadata metadata;
+    metadata.source = source;
+    metadata.targetError = options_.targetError;
+    metadata.totalError = totalError_ / std::pow(length_ / 2, 5);
+    metadata.referenceLength = length_;
+    metadata.nearness = options_.nearness;
+    metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
+    metadata.maxDepth = options_.maxDepth;
+    metadata.quadrature = options_.quadrature;
+    metadata.strategy = options_.strategy;
+    metadata.band = options_.band;
+    metadata.exactEvaluations = fitter_.evaluations();
+    return freeze(std::move(tree_), options_.coefficients, std::move(metadata));
+  }
+
+ private:
+  struct Entry {
+    double error;
+    std::uint32_t node;
+    bool operator<(const Entry& other) const {
+      return error < other.error || (error == other.error && node > other.node);
+    }
+  };
+
+  static constexpr std::size_t kRound = 32;    // few enough to stay close to the paper's order, one cell at a time
+  static constexpr std::size_t kResum = 1000;  // steps between exact sums of the total error (paper, sec. 3.6)
+  static constexpr std::size_t kBaseChunk = 4096;
+
+  void fitBaseCells() {
+    const std::size_t count = std::size_t(options_.grid[0]) * options_.grid[1] * options_.grid[2];
+    tree_.nodes.resize(count);
+    for (std::size_t n = 0; n < count; ++n) {
+      tree_.nodes[n].place = {static_cast<std::uint32_t>(n % options_.grid[0]),
+                              static_cast<std::uint32_t>(n / options_.grid[0] % options_.grid[1]),
+                              static_cast<std::uint32_t>(n / options_.grid[0] / options_.grid[1])};
+    }
+    const int degree = startDegree(options_);
+    for (std::size_t begin = 0; begin < count; begin += kBaseChunk) {
+      report("fitting base cells", double(begin) / double(count));
+      tbb::parallel_for(begin, std::min(begin + kBaseChunk, count),
+                        [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
+    }
+    sumTotalError();
+    for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
+  }
+
+  /// What may be done to a leaf; nothing: empty.
+  std::optional<Refinement> allowed(const BuildNode& node) const {
+    const bool mayRaise = options_.strategy == Strategy::hp && node.fit.degree < options_.maxDegree;
+    const bool maySplit = int(node.depth) < options_.maxDepth;
+    if (mayRaise && maySplit) return Refinement::either;
+    if (mayRaise) return Refinement::degree;
+    if (maySplit) return Refinement::octree;
+    return std::nullopt;
+  }
+
+  void enqueue(std::uint32_t node) {
+    const BuildNode& leaf = tree_.nodes[node];
+    if (leaf.fit.error > 0 && allowed(leaf)) queue_.push({leaf.fit.error, node});
+  }
+
+  void refineRound() {
+    report("refining", estimate_.update(double(fitter_.evaluations()), totalError_, target_));
+    std::vector<std::uint32_t> worst;
+    while (worst.size() < kRound && !queue_.empty()) {
+      worst.push_back(queue_.top().node);
+      queue_.pop();
+    }
+    std::vector<Trial> trials(worst.size());
+    tbb::parallel_for(
+        std::size_t{0}, worst.size(),
+        [&](std::size_t w) {
+          const BuildNode& node = tree_.nodes[worst[w]];
+          trials[w] = fitter_.attempt(tree_.boxOf(node), node.fit, *allowed(node));
+        },
+        tbb::simple_partitioner{});
+    for (std::size_t w = 0; w < worst.size(); ++w) {
+      if (totalError_ <= target_) {  // done, unless an exact sum says otherwise
+        enqueue(worst[w]);
+        continue;
+      }
+      refine(worst[w], std::move(trials[w]));
+      if (++steps_ % kResum == 0) sumTotalError();
+    }
+  }
+
+  void refine(std::uint32_t node, Trial&& trial) {
+    if (tree_.nodes.size() > 0xffffffffu - 8)
+      throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
+    totalError_ -= tree_.nodes[node].fit.error;
+    if (trial.raised && (!trial.children || prefersDegree(tree_.nodes[node].fit, trial))) {
+      tree_.nodes[node].fit = std::move(*trial.raised);
+      totalError_ += tree_.nodes[node].fit.error;
+      enqueue(node);
+      return;
+    }
+    tree_.split(node, std::move(*trial.children));
+    const std::uint32_t first = tree_.nodes[node].firstChild;
+    for (std::uint32_t child = first; child < first + 8; ++child) {
+      totalError_ += tree_.nodes[child].fit.error;
+      enqueue(child);
+    }
+  }
+
+  /// The hp decision (paper, eqs. 7 to 9), every error weighted by nearness.
+  static bool prefersDegree(const Fit& current, const Trial& trial) {
+    double worstChild = 0;
+    for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error);
+    const int p = current.degree;
+    const double mu = (current.error - 8 * trial.raised->error) / (coefficientCount(p + 1) - coefficientCount(p));
+    const double nu = (current.error - 8 * worstChild) / (7 * coefficientCount(p));
+    return mu > nu;
+  }
+
+  void sumTotalError() {
+    totalError_ = 0;
+    for (const BuildNode& node : tree_.nodes)
+      if (node.firstChild == 0) totalError_ += node.fit.error;
+  }
+
+  void report(std::string_view task, double fraction) const {
+    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
+    if (progress_.report) progress_.report(task, fraction);
+  }
+
+  const BuildOptions& options_;
+  const Progress& progress_;
+  double length_;
+  double target_;
+  CellFitter fitter_;
+  BuildTree tree_;
+  std::priority_queue<Entry> queue_;
+  double totalError_ = 0;
+  std::size_t steps_ = 0;
+  ProgressEstimate estimate_;
+};
+
+}  // namespace
+
+Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+            const Progress& progress) {
+  checkBuild(domain, options);
+  tbb::task_arena arena(options.threads == 0 ? tbb::task_arena::automatic : options.threads);
+  return Field(arena.execute([&] { return Construction(distance, domain, options, progress).run(distance.source()); }));
+}
+
+}  // namespace hpsdf

@@ -1,0 +1,105 @@
+#include "field/build_options.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+template <typename... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  std::ostringstream message;
+  (message << ... << parts);
+  throw Error(message.str());
+}
+
+/// Memory of the machine in bytes.
+double physicalMemory() { return double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)); }
+
+void checkGridFitsMemory(const BuildOptions& options) {
+  const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
+  const double bytesPerCell =
+      250 + 8.0 * coefficientCount(startDegree(options));  // node, queue entry, fit, final arrays
+  const double most =
+      std::min(0.75 * physicalMemory() / bytesPerCell, 0xffffffff / double(coefficientCount(startDegree(options))));
+  if (cells > most)
+    refuse("base grid ", options.grid[0], " x ", options.grid[1], " x ", options.grid[2], " has ", cells,
+           " cells and would need ", std::ceil(cells * bytesPerCell / 1e9), " GB; this machine takes at most ",
+           std::floor(std::cbrt(most)), " an axis");
+}
+
+}  // namespace
+
+int startDegree(const BuildOptions& options) {
+  switch (options.strategy) {
+    case Strategy::h1:
+      return 1;
+    case Strategy::h2:
+      return 2;
+    case Strategy::hp:
+      break;
+  }
+  return std::min(2, options.maxDegree);
+}
+
+void checkBuild(const Box& domain, const BuildOptions& options) {
+  if (!(options.targetError > 0) || !std::isfinite(options.targetError))
+    refuse("target error ", options.targetError, ": expected a number above 0");
+  if (std::ranges::find(options.grid, 0u) != options.grid.end())
+    refuse("base grid 0: expected at least 1 cell an axis");
+  if (!(options.nearness >= 0) || !std::isfinite(options.nearness))
+    refuse("nearness ", options.nearness, ": expected a number of at least 0");
+  if (options.maxDegree < 1 || options.maxDegree > kMaxDegree)
+    refuse("maximum degree ", options.maxDegree, ": expected 1 to ", kMaxDegree);
+  if (options.maxDepth < 0 || options.maxDepth > kMaxDepth)
+    refuse("maximum depth ", options.maxDepth, ": expected 0 to ", kMaxDepth);
+  if (options.quadrature < 2 || options.quadrature > 8)
+    refuse("quadrature ", options.quadrature, ": expected an order of 2 to 8 times the degree");
+  if (!(options.band >= 0) || !std::isfinite(options.band))
+    refuse("band ", options.band, ": expected a width of at least 0");
+  if (options.threads < 0) refuse("threads ", options.threads, ": expected 0 (all) or more");
+  if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
+      !std::isfinite(domain.diagonal().squaredNorm()))
+    refuse("the domain is empty, flat or not finite: expected lower < upper on every axis");
+  checkGridFitsMemory(options);
+}
+
+double referenceLength(const Source& source, const Box& domain) {
+  if (source.box.isEmpty()) return domain.sizes().maxCoeff() / 1.1;
+  const double longest = source.box.sizes().maxCoeff();
+  if (!(longest > 0) || !std::isfinite(longest)) throw Error(source.name + ": the surface has no extent");
+  return longest;
+}
+
+BuildOptions paperOptions() {
+  BuildOptions options;
+  options.nearness = 4;
+  options.maxDegree = 30;
+  options.maxDepth = 10;
+  options.strategy = Strategy::hp;
+  options.quadrature = 4;
+  options.trialSamples = TrialSamples::own;
+  options.coefficients = CoefficientType::float64;
+  return options;
+}
+
+Box domainAround(const Box& surface, DomainShape shape, double margin) {
+  if (surface.isEmpty()) throw Error("cannot place a domain around an empty surface");
+  if (!(margin > -1) || !std::isfinite(margin)) throw Error("margin: expected a number above -1");
+  const Vector3 centre = surface.center();
+  Vector3 half = surface.sizes() / 2;
+  if (shape == DomainShape::cube) half.setConstant(half.maxCoeff());
+  half *= 1 + margin;
+  return Box(centre - half, centre + half);
+}
+
+Box domainAround(const TriangleMesh& mesh, DomainShape shape, double margin) {
+  return domainAround(boundingBox(mesh), shape, margin);
+}
+
+}  // namespace hpsdf

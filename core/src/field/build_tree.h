@@ -1,0 +1,36 @@
+#pragma once
+// The octree while it grows, and its freezing into the arrays of a Field.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "field/cell_fit.h"
+#include "hpsdf/field.h"
+
+namespace hpsdf {
+
+struct BuildNode {
+  std::uint32_t firstChild = 0;  ///< 0: a leaf
+  std::uint32_t depth = 0;
+  std::array<std::uint32_t, 3> place{};  ///< in cells of its depth, counted from the domain's lower corner
+  Fit fit;                               ///< of a leaf; empty for an internal node
+};
+
+/// Base cells first, x fastest, then groups of eight children.
+struct BuildTree {
+  Box domain;
+  std::array<std::uint32_t, 3> grid{};
+  std::vector<BuildNode> nodes;
+
+  Box boxOf(const BuildNode& node) const;
+
+  /// Replaces a leaf by its eight children, which take over their fits.
+  void split(std::uint32_t leaf, std::array<Fit, 8>&& children);
+};
+
+/// Lays nodes and coefficients out depth first, so that neighbours in space are neighbours in memory, and rounds the
+/// coefficients as asked. Completes `metadata` (roundingRms). Takes the tree apart.
+FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata);
+
+}  // namespace hpsdf
