@@ -1,0 +1,75 @@
+#include "hpsdf/output_file.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+/// Two writers of the same file, in one process or in two, must not share a temporary name.
+std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
+  static std::atomic<unsigned> counter = 0;
+  std::filesystem::path name = file;
+  name += ".part-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+  return name;
+}
+
+/// What a symbolic link stands for, so that the rename replaces the file and keeps the link.
+std::filesystem::path resolved(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_symlink(file, ignored)) return file;
+  const auto target = std::filesystem::weakly_canonical(file, ignored);
+  return target.empty() ? file : target;
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)) {
+  if (file_.empty()) throw Error("the output file's name is empty; give a file name");
+  std::error_code ignored;
+  const auto status = std::filesystem::status(file_, ignored);
+  if (std::filesystem::is_directory(status)) throw Error(file.string() + ": is a folder; give a file name");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    throw Error(file.string() + ": is not a regular file; give another name");
+  if (!file_.has_filename()) throw Error(file.string() + ": names a folder; give a file name");
+  temporary_ = temporaryBeside(file_);
+  stream_ = std::fopen(temporary_.c_str(), "wbx");
+  if (stream_ == nullptr) throw Error(file.string() + ": cannot be written (" + reason(errno) + "); check the folder");
+}
+
+OutputFile::~OutputFile() {
+  if (stream_ == nullptr) return;
+  std::fclose(stream_);
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+}
+
+void OutputFile::fail() {
+  throw Error(file_.string() + ": writing failed (" + reason(errno) + "); check the space left on the disk");
+}
+
+void OutputFile::write(std::span<const std::byte> bytes) {
+  if (!bytes.empty() && std::fwrite(bytes.data(), 1, bytes.size(), stream_) != bytes.size()) fail();
+}
+
+void OutputFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+
+void OutputFile::commit() {
+  if (std::fflush(stream_) != 0 || fsync(fileno(stream_)) != 0) fail();
+  if (std::rename(temporary_.c_str(), file_.c_str()) != 0) fail();
+  std::fclose(stream_);
+  stream_ = nullptr;
+}
+
+void checkWritable(const std::filesystem::path& file) { OutputFile trial(file); }
+
+}  // namespace hpsdf
