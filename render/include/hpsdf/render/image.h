@@ -17,7 +17,7 @@ struct Image {
   std::vector<Color> pixels;
 
   Image() = default;
-  Image(int width, int height, Color fill) : width(width), height(height), pixels(std::size_t(width) * height, fill) {}
+  Image(int columns, int rows, Color fill) : width(columns), height(rows), pixels(std::size_t(columns) * rows, fill) {}
   Color& at(int x, int y) { return pixels[std::size_t(y) * width + x]; }
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };

@@ -43,11 +43,23 @@ struct SurfacePicture {
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
 /// the whole field, so that colours keep their meaning from slice to slice.
-/// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8).
+/// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8; no more than 64 Mi samples in
+/// all), before memory is taken.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture);
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture);
 
-/// The slice's view in the picture (without legend): for raw values, `width` × `height` samples of it.
+/// Size in pixels of the view within a picture of this size, without legend and caption. `draw` asks the renderer for
+/// `samples` times as much, so that buffers can be compared with those behind a picture.
+struct ViewSize {
+  int width = 0;
+  int height = 0;
+};
+ViewSize viewSize(int pictureWidth, int pictureHeight);
+
+/// The slice's view in the picture: what `draw` colours. Its pixels are square at `viewSize`.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
+
+/// The same plane framed for `width` × `height` square samples instead: for raw values.
+SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height);
 
 }  // namespace hpsdf::render

@@ -1,0 +1,301 @@
+#include "color_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kPaper = {250, 250, 248};
+constexpr Color kOutline = {18, 16, 38};
+constexpr Color kIsoLine = {24, 28, 44};
+constexpr Color kZeroLine = {10, 10, 20};
+constexpr Color kSurfaceLine = {255, 255, 255};
+constexpr Color kSurfaceCasing = {16, 14, 34};
+
+constexpr double kOutlineStrength = 0.62;
+constexpr double kIsoStrength = 0.42;
+constexpr double kZeroWidth = 2.4;  // in thin lines
+constexpr double kSurfaceWidth = 1.6;
+constexpr double kCasingWidth = 3.4;
+// Outlines of cells narrower than this many thin lines would leave little of their colour: they fade.
+constexpr double kOutlineFadesBelow = 10;
+constexpr double kOutlineGoneBelow = 3;
+// In the plane of a slice a distance may be almost flat (along a medial axis, on a tangent plane), and lines would grow
+// into blots: its slope counts as at least this.
+constexpr double kFlattestSlope = 0.25;
+
+float smoothStep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return static_cast<float>(t * t * (3 - 2 * t));
+}
+
+// Calls colorRow(y, row) for each row of samples and averages them down to pixels.
+template <typename ColorRow>
+Image average(const ViewBuffers& buffers, int samples, const ColorRow& colorRow) {
+  Image image(buffers.width / samples, buffers.height / samples, kPaper);
+  std::vector<LinearColor> row(buffers.width);
+  std::vector<LinearColor> sums(image.width);
+  const float share = 1.0F / float(samples * samples);
+  for (int y = 0; y < image.height; ++y) {
+    std::fill(sums.begin(), sums.end(), LinearColor::Zero());
+    for (int sampleRow = 0; sampleRow < samples; ++sampleRow) {
+      colorRow(y * samples + sampleRow, row);
+      for (int x = 0; x < image.width * samples; ++x) sums[x / samples] += row[x];
+    }
+    for (int x = 0; x < image.width; ++x) image.at(x, y) = encodeSrgb(share * sums[x]);
+  }
+  return image;
+}
+
+// Coverage of a sample by a line of this width whose middle is `distance` away; all in samples.
+float coverage(double distance, double width) {
+  return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
+}
+
+// Outlines of cells: on the first samples of a cell from the left and from the top, so that they are as crisp as the
+// samples allow and never two wide.
+class CellOutlines {
+ public:
+  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling)
+      : buffers_(buffers), width_(sampling.lineWidth * sampling.samples) {
+    reach_ = static_cast<int>(std::ceil(width_));
+    measureCells();
+  }
+
+  /// Coverage of sample (x, y), 0 to 1.
+  float operator()(int x, int y) const {
+    return std::max(alongAxis(x, y, x, -1), alongAxis(x, y, y, -std::ptrdiff_t(buffers_.width)));
+  }
+
+ private:
+  struct Extent {
+    int x0, x1, y0, y1;
+  };
+
+  // How strongly a cell is outlined follows from its size on the screen.
+  void measureCells() {
+    std::unordered_map<std::uint32_t, Extent> extents;
+    for (int y = 0; y < buffers_.height; ++y) {
+      const std::uint32_t* row = &buffers_.cell[std::size_t(y) * buffers_.width];
+      for (int x0 = 0, x1; x0 < buffers_.width; x0 = x1) {
+        for (x1 = x0 + 1; x1 < buffers_.width && row[x1] == row[x0];) ++x1;
+        if (row[x0] == kNoCell) continue;
+        Extent& extent = extents.try_emplace(row[x0], Extent{x0, x1, y, y + 1}).first->second;
+        extent = {std::min(extent.x0, x0), std::max(extent.x1, x1), extent.y0, y + 1};
+      }
+    }
+    strengths_.reserve(extents.size() + 1);
+    for (const auto& [cell, extent] : extents) {
+      const int size = std::max(extent.x1 - extent.x0, extent.y1 - extent.y0);
+      strengths_[cell] = smoothStep(kOutlineGoneBelow * width_, kOutlineFadesBelow * width_, size);
+    }
+    strengths_[kNoCell] = 0;
+  }
+
+  // `position` on the axis counts the samples before this one; `step` leads to the one just before it.
+  float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
+    const std::uint32_t* cell = &buffers_.cell[std::size_t(y) * buffers_.width + x];
+    const int reach = std::min(reach_, position);
+    // Cells are convex: equal ends mean that nothing lies between.
+    if (reach == 0 || cell[reach * step] == *cell) return 0;
+    int k = 1;
+    while (cell[k * step] == *cell) ++k;
+    const float strength = std::max(strengths_.at(*cell), strengths_.at(cell[k * step]));
+    return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
+  }
+
+  const ViewBuffers& buffers_;
+  double width_;  // in samples
+  int reach_;
+  std::unordered_map<std::uint32_t, float> strengths_;
+};
+
+// The values of a slice as a landscape: where its contour lines run.
+class Contours {
+ public:
+  explicit Contours(const ViewBuffers& buffers, double sampleSize) : buffers_(buffers), sampleSize_(sampleSize) {}
+
+  /// Change of the value a sample, at least that of the flattest slope.
+  double slope(int x, int y) const {
+    const std::size_t i = index(x, y);
+    const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);
+    const double dy = derivative(i, buffers_.width, y > 0, y + 1 < buffers_.height);
+    return std::max(std::hypot(dx, dy), kFlattestSlope * sampleSize_);
+  }
+
+  /// Distance of sample (x, y) from the zero line, in samples. Where the field jumps over 0 from one cell to the next,
+  /// the line runs between the two samples.
+  double toZero(int x, int y, double slopeHere) const {
+    const std::size_t i = index(x, y);
+    double distance = std::abs(buffers_.value[i]) / slopeHere;
+    if (x > 0) distance = std::min(distance, toCrossing(i, i - 1));
+    if (x + 1 < buffers_.width) distance = std::min(distance, toCrossing(i, i + 1));
+    if (y > 0) distance = std::min(distance, toCrossing(i, i - buffers_.width));
+    if (y + 1 < buffers_.height) distance = std::min(distance, toCrossing(i, i + buffers_.width));
+    return distance;
+  }
+
+ private:
+  std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
+
+  // Differences within the cell where it has a neighbour there: a jump at a face is no slope.
+  double derivative(std::size_t i, std::size_t step, bool hasBefore, bool hasAfter) const {
+    const auto& cell = buffers_.cell;
+    const auto& value = buffers_.value;
+    hasBefore = hasBefore && buffers_.hit(i - step);
+    hasAfter = hasAfter && buffers_.hit(i + step);
+    const bool before = hasBefore && cell[i - step] == cell[i];
+    const bool after = hasAfter && cell[i + step] == cell[i];
+    if (before && after) return (double(value[i + step]) - value[i - step]) / 2;
+    if (after) return double(value[i + step]) - value[i];
+    if (before) return double(value[i]) - value[i - step];
+    if (hasBefore && hasAfter) return (double(value[i + step]) - value[i - step]) / 2;
+    if (hasAfter) return double(value[i + step]) - value[i];
+    return hasBefore ? double(value[i]) - value[i - step] : 0;
+  }
+
+  double toCrossing(std::size_t i, std::size_t neighbour) const {
+    const double here = buffers_.value[i], there = buffers_.value[neighbour];
+    if (!buffers_.hit(neighbour) || (here < 0) == (there < 0)) return std::numeric_limits<double>::infinity();
+    return std::abs(here) / (std::abs(here) + std::abs(there));
+  }
+
+  const ViewBuffers& buffers_;
+  double sampleSize_;
+};
+
+// Lighting of the surface, in the camera's frame: x right, y up, z towards the eye. Like a photographer's: a warm key
+// light from above left, a cool fill from the right, a rim from behind, sky above ground.
+struct Lights {
+  Eigen::Vector3f key = Eigen::Vector3f(-0.48F, 0.62F, 0.62F).normalized();
+  Eigen::Vector3f fill = Eigen::Vector3f(0.85F, 0.10F, 0.52F).normalized();
+  Eigen::Vector3f rim = Eigen::Vector3f(0.35F, 0.55F, -0.76F).normalized();
+  LinearColor keyColor = {1.00F, 0.94F, 0.84F};
+  LinearColor fillColor = {0.20F, 0.25F, 0.33F};
+  LinearColor rimColor = {0.22F, 0.25F, 0.30F};
+  LinearColor sky = {0.29F, 0.32F, 0.37F};
+  LinearColor ground = {0.13F, 0.11F, 0.095F};
+
+  LinearColor diffuse(const Eigen::Vector3f& n) const {
+    const float wrapped = std::max(0.0F, (n.dot(key) + 0.15F) / 1.15F);
+    return keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim)) +
+           mix(ground, sky, 0.5F + 0.5F * n.y());
+  }
+
+  // Blinn-Phong of the key light, and the sky mirrored at grazing angles (Schlick's Fresnel term).
+  LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
+    const Eigen::Vector3f half = (key + toEye).normalized();
+    const float highlight = 0.16F * std::pow(std::max(0.0F, n.dot(half)), 42.0F);
+    const float facing = 1 - std::clamp(n.dot(toEye), 0.0F, 1.0F);
+    const float fresnel = 0.10F * facing * facing * facing * facing;
+    return keyColor * highlight + sky * fresnel;
+  }
+};
+
+const LinearColor kClay = decodeSrgb({214, 190, 160});
+
+class SurfaceShader {
+ public:
+  SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color)
+      : buffers_(buffers), camera_(camera), map_(map), color_(color) {
+    axes_.row(0) = camera.right.normalized().cast<float>();
+    axes_.row(1) = camera.up.normalized().cast<float>();
+    axes_.row(2) = -camera.forward.normalized().cast<float>();
+  }
+
+  LinearColor operator()(int x, int y) const {
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    const Eigen::Vector3f n = axes_ * buffers_.normal[i];
+    if (color_ == SurfaceColor::normal) return kClay.cwiseProduct(lights_.diffuse(n)) + lights_.gloss(n, toEye(x, y));
+    const LinearColor& level = map_(color_ == SurfaceColor::degree ? buffers_.degree[i] : buffers_.depth[i]);
+    // Softer than clay, and without colour of its own: the legend's colour must stay recognisable.
+    const float light = 0.52F + 0.56F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
+    return level * light + LinearColor::Constant(0.4F * lights_.gloss(n, toEye(x, y)).mean());
+  }
+
+ private:
+  Eigen::Vector3f toEye(int x, int y) const {
+    const double u = 2 * (x + 0.5) / buffers_.width - 1, v = 1 - 2 * (y + 0.5) / buffers_.height;
+    const Vector3 ray = camera_.forward + u * camera_.right + v * camera_.up;
+    return -(axes_ * ray.cast<float>()).normalized();
+  }
+
+  const ViewBuffers& buffers_;
+  const Pinhole& camera_;
+  const LevelMap& map_;
+  SurfaceColor color_;
+  Lights lights_;
+  Eigen::Matrix3f axes_;  // rows: the camera's right, up and backward
+};
+
+}  // namespace
+
+Color paperColor() { return kPaper; }
+
+LinearColor backdropColor(double fromTop) {
+  return fromOklab({0.975 - 0.06 * fromTop * fromTop, -0.003, -0.006 - 0.004 * fromTop});
+}
+
+Image colorLevelSlice(const ViewBuffers& buffers, const LevelMap& map, SliceColor color, const Sampling& sampling) {
+  const CellOutlines outlines(buffers, sampling);
+  const Contours contours(buffers, sampling.sampleSize);
+  const std::vector<std::uint8_t>& levels = color == SliceColor::degree ? buffers.degree : buffers.depth;
+  const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
+  const LinearColor line = decodeSrgb(kSurfaceLine), casing = decodeSrgb(kSurfaceCasing);
+  const double thin = sampling.lineWidth * sampling.samples;
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      LinearColor& sample = row[x];
+      sample = buffers.hit(i) ? map(levels[i]) : paper;
+      sample = mix(sample, outline, float(kOutlineStrength) * outlines(x, y));
+      if (!buffers.hit(i)) continue;
+      const double toSurface = contours.toZero(x, y, contours.slope(x, y));
+      sample = mix(sample, casing, 0.8F * coverage(toSurface, kCasingWidth * thin));
+      sample = mix(sample, line, coverage(toSurface, kSurfaceWidth * thin));
+    }
+  });
+}
+
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling) {
+  constexpr int kSteps = 2048;
+  std::vector<LinearColor> table(2 * kSteps + 1);
+  for (int i = -kSteps; i <= kSteps; ++i) table[i + kSteps] = divergingColor(double(i) / kSteps);
+
+  const Contours contours(buffers, sampling.sampleSize);
+  const LinearColor paper = decodeSrgb(kPaper), isoLine = decodeSrgb(kIsoLine), zeroLine = decodeSrgb(kZeroLine);
+  const double thin = sampling.lineWidth * sampling.samples;
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      LinearColor& sample = row[x];
+      sample = paper;
+      if (!buffers.hit(i)) continue;
+      const double value = buffers.value[i];
+      sample = table[static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps)) + kSteps];
+      const double slope = contours.slope(x, y);
+      const double nearest = std::round(value / scale.step);
+      if (nearest != 0) {
+        const double distance = std::abs(value - nearest * scale.step) / slope;
+        sample = mix(sample, isoLine, float(kIsoStrength) * coverage(distance, thin));
+      }
+      sample = mix(sample, zeroLine, coverage(contours.toZero(x, y, slope), kZeroWidth * thin));
+    }
+  });
+}
+
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color,
+                   int samples) {
+  const SurfaceShader shader(buffers, camera, map, color);
+  return average(buffers, samples, [&](int y, std::vector<LinearColor>& row) {
+    const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
+    for (int x = 0; x < buffers.width; ++x)
+      row[x] = buffers.hit(std::size_t(y) * buffers.width + x) ? shader(x, y) : ground;
+  });
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,34 @@
+#pragma once
+// From the buffers of a view to the colours of its pixels. Reads nothing but the buffers, so that OpenGL and the oracle
+// are coloured alike.
+
+#include "colormap.h"
+#include "hpsdf/render/picture.h"
+#include "hpsdf/render/view.h"
+
+namespace hpsdf::render {
+
+/// The buffers hold samples × samples points a pixel; colours are averaged over them in linear light.
+struct Sampling {
+  int samples = 1;
+  double lineWidth = 1;   ///< of thin lines, in pixels of the finished picture
+  double sampleSize = 1;  ///< between neighbouring samples of a slice, world units
+};
+
+/// Cells in the colour of their level under thin outlines, the surface as a white line. `color`: degree or depth.
+Image colorLevelSlice(const ViewBuffers& buffers, const LevelMap& map, SliceColor color, const Sampling& sampling);
+
+/// The diverging map under iso-lines, the zero line heavy.
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
+
+/// A lit surface before the backdrop: one material for `normal`, else the level's colour, softly shaded.
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color,
+                   int samples);
+
+/// What is drawn where a slice leaves the domain, and under legend and caption.
+Color paperColor();
+
+/// What a surface stands before: a soft gradient from the top, 0, to the bottom of the view, 1.
+LinearColor backdropColor(double fromTop);
+
+}  // namespace hpsdf::render

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "color.h"
+
+namespace hpsdf::render {
+
+/// The ordered map for levels: 0 dark violet, over blue, teal and green, to 1, pale yellow. Lightness rises throughout.
+LinearColor orderedColor(double t);
+
+/// Colours of those levels (degrees or depths, 0 to 255) that occur, spread evenly over the ordered map.
+class LevelMap {
+ public:
+  explicit LevelMap(std::span<const int> levels);
+
+  /// Magenta, which the map does not hold, for a level that was not announced: a fault of the buffers must show.
+  const LinearColor& operator()(int level) const { return colors_[static_cast<std::uint8_t>(level)]; }
+  const std::vector<int>& levels() const { return levels_; }
+
+ private:
+  std::vector<int> levels_;
+  std::array<LinearColor, 256> colors_;
+};
+
+/// The diverging map for distances: −1 deep blue (inside), 0 white, 1 deep red (outside).
+LinearColor divergingColor(double t);
+
+/// What turns distances into colours and lines.
+struct DistanceScale {
+  double range = 1;                 ///< colours span [−range, range]
+  double step = 0.1;                ///< between iso-lines, which stand at its multiples
+  double minimum = 0, maximum = 0;  ///< of the values shown
+};
+
+/// For values within [minimum, maximum]: a range of one or two digits, and some twelve iso-lines at 1, 2 or 5 × 10^n.
+DistanceScale distanceScale(double minimum, double maximum);
+
+}  // namespace hpsdf::render

@@ -1,0 +1,289 @@
+#include "legend.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "color_view.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kInk = {32, 34, 44};
+constexpr Color kSoftInk = {98, 102, 116};
+constexpr Color kShareBar = {206, 209, 218};
+constexpr Color kRule = {222, 223, 228};
+constexpr Color kTick = {60, 64, 78};
+
+constexpr double kSmallestText = 8;  // pixels an em: below, digits of DejaVu Sans run together
+
+// Text of a picture: 15 pixels at 1280 × 720, in proportion above, shrinking less than the picture below.
+double textSizeFor(int width, int height) {
+  const double reach = std::min<double>(height, width * 9.0 / 16);
+  return reach >= 720 ? 15 * reach / 720 : std::max(9.0, 15 - (720 - reach) * 5 / 480);
+}
+
+Color colorOf(const LinearColor& color) { return encodeSrgb(color); }
+
+// Dark or light, whichever reads better on it.
+Color inkOn(const LinearColor& ground) {
+  return toOklab(ground).lightness > 0.64 ? Color{20, 20, 30} : Color{255, 255, 255};
+}
+
+double advanceOf(const std::string& text, double size) { return measureText(text, size).advance; }
+
+void addText(Furniture& furniture, std::string text, double size, double x, double baseline, Color color) {
+  if (!text.empty()) furniture.texts.push_back({std::move(text), size, x, baseline, color});
+}
+
+void addTextRight(Furniture& furniture, const std::string& text, double size, double right, double baseline,
+                  Color color) {
+  addText(furniture, text, size, right - advanceOf(text, size), baseline, color);
+}
+
+// The column within the panel that legends stand in.
+struct Column {
+  double left, right, top, bottom;
+  double width() const { return right - left; }
+};
+
+Column columnOf(const Frame& frame) {
+  const double em = frame.textSize;
+  return {frame.panel.x0 + em, frame.panel.x1 - em, frame.panel.y0 + em, frame.panel.y1 - 0.5 * em};
+}
+
+// Writes the first title that fits and moves the column's top below it.
+void addTitle(Furniture& furniture, Column& column, std::span<const std::string> titles, double size) {
+  std::string title;
+  for (const std::string& candidate : titles)
+    if (title.empty() && advanceOf(candidate, size) <= column.width()) title = candidate;
+  if (title.empty()) title = fitText(titles.back(), size, column.width());
+  addText(furniture, title, size, column.left, column.top + capHeight(size), kInk);
+  column.top += 1.7 * size;
+}
+
+struct LevelRow {
+  int level;
+  double share;
+  double top, height;
+  double baseline(double size) const { return top + (height + capHeight(size)) / 2; }
+};
+
+void addSwatch(Furniture& furniture, const LevelRow& row, double left, double width, double gap, Color color) {
+  furniture.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
+}
+
+// Number in the swatch, share beside it and, in a roomy picture, as a bar.
+void addWideRow(Furniture& furniture, const Column& column, const LevelRow& row, double size, double largestShare,
+                bool roomy, const LinearColor& color) {
+  const double left = std::round(column.left);
+  const double swatch = std::round(2.1 * size);
+  addSwatch(furniture, row, left, swatch, std::max(1.0, std::round(0.16 * row.height)), colorOf(color));
+  LevelRow box = row;
+  box.height -= std::max(1.0, std::round(0.16 * row.height));
+  const std::string number = std::to_string(row.level);
+  const double baseline = std::round(box.baseline(size));
+  addText(furniture, number, size, left + (swatch - advanceOf(number, size)) / 2, baseline, inkOn(color));
+
+  const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
+  if (shareRight > column.right) return;
+  addTextRight(furniture, formatShare(row.share), size, shareRight, baseline, kInk);
+  const double barLeft = shareRight + 0.6 * size;
+  if (!roomy || barLeft + size > column.right) return;
+  const double middle = box.top + box.height / 2, half = std::max(1.0, 0.22 * size);
+  furniture.boxes.push_back({barLeft, middle - half, barLeft + (column.right - barLeft) * row.share / largestShare,
+                             middle + half, kShareBar});
+}
+
+// Rows too low for text: the swatches touch, and every so many of them is numbered beside.
+void addNarrowRows(Furniture& furniture, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
+  const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
+  const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
+  double lastTop = -1e9;
+  for (const LevelRow& row : rows) {
+    addSwatch(furniture, row, left, swatch, 0, colorOf(map(row.level)));
+    const double baseline = std::round(row.baseline(size));
+    if (baseline - capHeight(size) < lastTop + 1.5 * size || baseline > column.bottom) continue;
+    if (baseline - capHeight(size) < column.top) continue;
+    addText(furniture, std::to_string(row.level), size, left + swatch + 0.5 * size, baseline, kInk);
+    lastTop = baseline - capHeight(size);
+  }
+}
+
+int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
+
+// Values at multiples of a step, all with the same number of decimals; "0" without.
+std::string formatTick(double value, double step) {
+  if (value == 0) return "0";
+  if (step < 1e-4 || step >= 1e6) return formatNumber(value);
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimalsOf(step), std::abs(value));
+  return (value < 0 ? "−" : "+") + std::string(text);
+}
+
+void blendBox(Image& image, const BoxItem& box) {
+  const auto overlap = [](double low, double high, int pixel) {
+    return std::clamp(std::min(high, pixel + 1.0) - std::max(low, double(pixel)), 0.0, 1.0);
+  };
+  const LinearColor color = decodeSrgb(box.color);
+  for (int y = std::max(0, int(std::floor(box.y0))); y < std::min<double>(image.height, std::ceil(box.y1)); ++y)
+    for (int x = std::max(0, int(std::floor(box.x0))); x < std::min<double>(image.width, std::ceil(box.x1)); ++x) {
+      const double covered = overlap(box.x0, box.x1, x) * overlap(box.y0, box.y1, y);
+      image.at(x, y) = covered >= 1 ? box.color : encodeSrgb(mix(decodeSrgb(image.at(x, y)), color, float(covered)));
+    }
+}
+
+}  // namespace
+
+Frame frame(int width, int height) {
+  Frame f;
+  f.width = width;
+  f.height = height;
+  f.textSize = textSizeFor(width, height);
+  f.roomy = std::min<double>(height, width * 9.0 / 16) >= 440;
+  const bool hasPanel = width >= 240 && height >= 140;
+  const bool hasCaption = width >= 160 && height >= 140;
+  const int panel = hasPanel ? static_cast<int>(std::lround((f.roomy ? 13.5 : 8.4) * f.textSize)) : 0;
+  const int caption = hasCaption ? static_cast<int>(std::lround(2.4 * f.textSize)) : 0;
+  f.view = {0, 0, width - panel, height - caption};
+  if (hasPanel) f.panel = {width - panel, 0, width, height - caption};
+  if (hasCaption) f.caption = {0, height - caption, width, height};
+  return f;
+}
+
+void addLevelLegend(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                    const std::map<int, double>& shares, const LevelMap& map) {
+  if (frame.panel.empty() || shares.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  addTitle(furniture, column, titles, em);
+  if (frame.roomy) {
+    const double small = 0.8 * em;
+    addText(furniture, fitText("share of the volume", small, column.width()), small, column.left,
+            column.top - 0.35 * em + capHeight(small), kSoftInk);
+    column.top += 1.2 * em;
+  }
+
+  const double height = std::min(1.75 * em, (column.bottom - column.top) / double(shares.size()));
+  const double size = std::min(em, 0.74 * height);
+  double largestShare = 0;
+  std::vector<LevelRow> rows;
+  for (auto level = shares.rbegin(); level != shares.rend(); ++level) {
+    rows.push_back({level->first, level->second, column.top + height * double(rows.size()), height});
+    largestShare = std::max(largestShare, level->second);
+  }
+  if (size < kSmallestText) return addNarrowRows(furniture, column, rows, map);
+  for (const LevelRow& row : rows) addWideRow(furniture, column, row, size, largestShare, frame.roomy, map(row.level));
+}
+
+void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScale& scale) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  static const std::string titles[] = {"signed distance", "distance"};
+  addTitle(furniture, column, titles, em);
+
+  const double left = std::round(column.left), right = left + std::round(1.7 * em);
+  const double top = std::round(column.top + 0.3 * em), bottom = std::round(column.bottom - 0.6 * em);
+  const auto rowOf = [&](double value) { return top + (bottom - top) * (0.5 - 0.5 * value / scale.range); };
+  for (double y = top; y < bottom; ++y) {
+    const double value = 1 - 2 * (y + 0.5 - top) / (bottom - top);
+    furniture.boxes.push_back({left, y, right, y + 1, colorOf(divergingColor(value))});
+  }
+
+  // As many numbers as stand well apart: at every 1st, 2nd, 5th or 10th line, zero always among them.
+  const double perLine = (bottom - top) * scale.step / (2 * scale.range);
+  const double size = std::min(em, 0.9 * em + 1);
+  int every = 1;
+  for (int candidate : {2, 5, 10, 20, 50})
+    if (every * perLine < 1.7 * size) every = candidate;
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));
+  const double thin = std::max(1.0, em / 15);
+  for (int line = -lines; line <= lines; ++line) {
+    const double y = rowOf(line * scale.step), half = line == 0 ? 1.2 * thin : 0.5 * thin;
+    const bool labelled = line % every == 0;
+    furniture.boxes.push_back({left, y - half, right + (labelled ? 0.35 * em : 0), y + half, kTick});
+    if (!labelled) continue;
+    const std::string label = formatTick(line * scale.step, scale.step);
+    addText(furniture, fitText(label, size, column.right - right - 0.6 * em), size, right + 0.6 * em,
+            y + capHeight(size) / 2, kInk);
+  }
+}
+
+void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+              std::span<const std::pair<std::string, std::string>> facts) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em);
+  Column column = columnOf(frame);
+  addTitle(furniture, column, titles, em);
+  for (const auto& [name, value] : facts) {
+    if (column.top + 2.3 * em > column.bottom) return;
+    addText(furniture, fitText(name, small, column.width()), small, column.left, column.top + capHeight(small),
+            kSoftInk);
+    addText(furniture, fitText(value, em, column.width()), em, column.left, column.top + 1.25 * small + capHeight(em),
+            kInk);
+    column.top += 1.25 * small + 1.75 * em;
+  }
+}
+
+void addCaption(Furniture& furniture, const Frame& frame, const std::string& name,
+                std::span<const std::string> details) {
+  if (frame.caption.empty()) return;
+  const double em = frame.textSize;
+  const PixelRect& strip = frame.caption;
+  furniture.boxes.push_back({0, double(strip.y0), double(strip.x1), strip.y0 + std::max(1.0, em / 15), kRule});
+  const double left = em, right = strip.x1 - em;
+  const double baseline = std::round((strip.y0 + strip.y1 + capHeight(em)) / 2);
+
+  const std::string shownName = fitText(name, em, details.empty() ? right - left : 0.45 * (right - left));
+  addText(furniture, shownName, em, left, baseline, kInk);
+  const double start = left + (shownName.empty() ? 0 : advanceOf(shownName, em) + em);
+  std::string line;
+  for (std::size_t i = 0; i < details.size(); ++i) {
+    const std::string longer = i == 0 ? details[0] : line + " · " + details[i];
+    if (advanceOf(longer, em) > right - start) {
+      if (i == 0) line = fitText(longer, em, right - start);
+      break;
+    }
+    line = longer;
+  }
+  addText(furniture, line, em, start, baseline, kSoftInk);
+}
+
+void paint(Image& image, const Furniture& furniture) {
+  for (const BoxItem& box : furniture.boxes) blendBox(image, box);
+  for (const TextItem& text : furniture.texts) drawText(image, text.text, text.size, text.x, text.baseline, text.color);
+}
+
+std::string formatNumber(double value, int digits) {
+  if (value == 0) return "0";
+  const double size = std::abs(value);
+  char text[64];
+  if (size >= 1e-3 && size < 1e6) {
+    std::snprintf(text, sizeof text, "%.*g", std::max(digits, size < 1e5 ? 0 : 6), size);
+  } else {
+    std::snprintf(text, sizeof text, "%.*e", digits - 1, size);
+    std::string shown = text;  // 1.500e-07 as one writes it: 1.5e-7
+    const std::size_t e = shown.find('e');
+    std::string mantissa = shown.substr(0, e);
+    if (mantissa.find('.') != std::string::npos) mantissa.erase(mantissa.find_last_not_of('0') + 1);
+    if (mantissa.back() == '.') mantissa.pop_back();
+    std::snprintf(text, sizeof text, "%se%d", mantissa.c_str(), std::stoi(shown.substr(e + 1)));
+  }
+  return (value < 0 ? "−" : "") + std::string(text);
+}
+
+std::string formatCount(std::size_t count) {
+  std::string digits = std::to_string(count);
+  for (int i = static_cast<int>(digits.size()) - 3; i > 0; i -= 3) digits.insert(static_cast<std::size_t>(i), ",");
+  return digits;
+}
+
+std::string formatShare(double fraction) {
+  if (fraction > 0 && fraction < 0.0005) return "<0.1 %";
+  char text[32];
+  std::snprintf(text, sizeof text, fraction > 0.9995 ? "%.0f %%" : "%.1f %%", 100 * fraction);
+  return text;
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,71 @@
+#pragma once
+// What stands around a view: legend or colour bar to its right, caption below. Laid out first, as rectangles and texts,
+// so that tests can see that nothing is clipped and nothing overlaps; then painted.
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "colormap.h"
+#include "text.h"
+
+namespace hpsdf::render {
+
+/// Where the parts of a picture stand; depends on its size alone.
+struct Frame {
+  int width = 0, height = 0;
+  double textSize = 0;  ///< pixels an em
+  bool roomy = false;   ///< room for the shares as bars and for subtitles
+  PixelRect view;
+  PixelRect panel;    ///< empty where the picture is too small for a legend
+  PixelRect caption;  ///< empty where it is too small for a caption
+};
+
+Frame frame(int width, int height);
+
+struct BoxItem {
+  double x0, y0, x1, y1;  ///< pixels, edges anti-aliased
+  Color color;
+};
+
+struct TextItem {
+  std::string text;
+  double size, x, baseline;
+  Color color;
+};
+
+/// Painted in this order.
+struct Furniture {
+  std::vector<BoxItem> boxes;
+  std::vector<TextItem> texts;
+};
+
+/// One swatch a level, the highest on top, with the level's number and its share of the volume. The first of `titles`
+/// that fits is taken.
+void addLevelLegend(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                    const std::map<int, double>& shares, const LevelMap& map);
+
+/// A vertical colour bar with the iso-lines of the picture and their values.
+void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScale& scale);
+
+/// Names and values, as many as fit.
+void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+              std::span<const std::pair<std::string, std::string>> facts);
+
+/// The name, then as many of the details as fit, the most important first.
+void addCaption(Furniture& furniture, const Frame& frame, const std::string& name,
+                std::span<const std::string> details);
+
+void paint(Image& image, const Furniture& furniture);
+
+/// "−0.25", "1.5e-7": a true minus sign, the exponent as one types it.
+std::string formatNumber(double value, int digits = 4);
+/// "54,935".
+std::string formatCount(std::size_t count);
+/// "63.9 %", "<0.1 %".
+std::string formatShare(double fraction);
+
+}  // namespace hpsdf::render

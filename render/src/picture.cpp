@@ -1,0 +1,224 @@
+#include "hpsdf/render/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "color_view.h"
+#include "hpsdf/error.h"
+#include "legend.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr int kSmallestSize = 16;
+constexpr int kLargestSize = 16384;
+constexpr int kMostSamples = 8;
+// A sample of a surface takes 26 bytes in the buffers, and as much again while a renderer fills them.
+constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
+
+constexpr double kMargin = 0.02;  // of the view's smaller side, around the section of the domain
+
+void checkSize(int width, int height, int samples) {
+  const auto size = [&] { return std::to_string(width) + "x" + std::to_string(height); };
+  if (std::min(width, height) < kSmallestSize || std::max(width, height) > kLargestSize)
+    throw Error("picture size " + size() + " is out of range: give 16 to 16384 pixels a side");
+  if (samples < 1 || samples > kMostSamples)
+    throw Error("samples = " + std::to_string(samples) + " is out of range: give 1 to 8 samples an axis and pixel");
+  if (std::size_t(width) * height * samples * samples > kMostSamplesInAll)
+    throw Error("a picture of " + size() + " with " + std::to_string(samples) + "x" + std::to_string(samples) +
+                " samples a pixel takes more than 64 million samples: give a smaller size or fewer samples");
+}
+
+Frame frameOf(const SlicePicture& picture) {
+  checkSize(picture.width, picture.height, picture.samples);
+  return frame(picture.width, picture.height);
+}
+
+Frame frameOf(const SurfacePicture& picture) {
+  checkSize(picture.width, picture.height, picture.samples);
+  return frame(picture.width, picture.height);
+}
+
+double lineWidthOf(const Frame& frame) { return std::max(0.7, frame.textSize / 15); }
+
+// A legend beside the section itself: a square domain leaves much of a wide view empty.
+void moveBeside(Frame& frame, const ViewBuffers& buffers, int samples) {
+  int end = 0;  // of the section, in samples
+  for (int y = 0; y < buffers.height; ++y)
+    for (int x = buffers.width; x > end; --x)
+      if (buffers.hit(std::size_t(y) * buffers.width + x - 1)) end = x;
+  const int space = frame.panel.x0 - static_cast<int>(std::ceil(double(end) / samples + 0.5 * frame.textSize));
+  if (frame.panel.empty() || end == 0 || space <= 0) return;
+  frame.panel.x0 -= space;
+  frame.panel.x1 -= space;
+}
+
+void place(Image& picture, const Image& view) {
+  for (int y = 0; y < view.height; ++y)
+    std::copy_n(&view.pixels[std::size_t(y) * view.width], view.width, &picture.at(0, y));
+}
+
+std::string formatVector(const Vector3& v) {
+  return "(" + formatNumber(v.x()) + ", " + formatNumber(v.y()) + ", " + formatNumber(v.z()) + ")";
+}
+
+std::string describePlane(const SlicePicture& picture) {
+  if (const auto* axis = std::get_if<AxisPlane>(&picture.plane))
+    return std::string("slice ") + "xyz"[axis->axis] + " = " + formatNumber(axis->offset);
+  const auto& plane = std::get<FreePlane>(picture.plane);
+  return "slice through " + formatVector(plane.point) + " with normal " + formatVector(plane.normal);
+}
+
+std::string describeTarget(const Field& field) { return "τ = " + formatNumber(field.metadata().targetError, 3); }
+
+std::string describeSource(const Field& field) {
+  const std::string& name = field.metadata().source.name;
+  return name.empty() ? "unnamed field" : name;
+}
+
+std::vector<int> levelsOf(const std::map<int, double>& shares) {
+  std::vector<int> levels;
+  for (const auto& [level, share] : shares) levels.push_back(level);
+  return levels;
+}
+
+std::string describeLevels(const std::map<int, double>& shares) {
+  const int first = shares.begin()->first, last = shares.rbegin()->first;
+  return first == last ? std::to_string(first) : std::to_string(first) + "–" + std::to_string(last);
+}
+
+std::string describeBytes(std::size_t bytes) {
+  char text[32];
+  if (bytes < 1000000)
+    std::snprintf(text, sizeof text, "%.1f kB", double(bytes) / 1e3);
+  else
+    std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
+  return text;
+}
+
+DistanceScale scaleOf(const ViewBuffers& buffers) {
+  double minimum = 0, maximum = 0;
+  bool any = false;
+  for (std::size_t i = 0; i < buffers.value.size(); ++i) {
+    if (!buffers.hit(i)) continue;
+    minimum = any ? std::min<double>(minimum, buffers.value[i]) : buffers.value[i];
+    maximum = any ? std::max<double>(maximum, buffers.value[i]) : buffers.value[i];
+    any = true;
+  }
+  return distanceScale(minimum, maximum);
+}
+
+// Legend of degrees or depths; gives the colours that belong to it.
+LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatistics& figures, bool degree) {
+  static const std::string degreeTitles[] = {"polynomial degree", "degree"};
+  static const std::string depthTitles[] = {"octree depth", "depth"};
+  const auto& shares = degree ? figures.degreeVolume : figures.depthVolume;
+  LevelMap map(levelsOf(shares));
+  addLevelLegend(furniture, frame, degree ? degreeTitles : depthTitles, shares, map);
+  return map;
+}
+
+void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field, const FieldStatistics& figures) {
+  static const std::string titles[] = {"hp distance field", "field"};
+  const std::pair<std::string, std::string> facts[] = {
+      {"cells", formatCount(figures.leaves)},
+      {"degrees", describeLevels(figures.degreeVolume)},
+      {"depths", describeLevels(figures.depthVolume)},
+      {"coefficients", formatCount(figures.coefficients)},
+      {"memory", describeBytes(figures.bytes)},
+      {"RMS estimate", formatNumber(field.metadata().rmsEstimate(field.domain()), 3)},
+  };
+  addFacts(furniture, frame, titles, facts);
+}
+
+}  // namespace
+
+ViewSize viewSize(int pictureWidth, int pictureHeight) {
+  checkSize(pictureWidth, pictureHeight, 1);
+  const PixelRect view = frame(pictureWidth, pictureHeight).view;
+  return {view.width(), view.height()};
+}
+
+SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height) {
+  if (const auto* axis = std::get_if<AxisPlane>(&picture.plane))
+    return axisSlice(field.domain(), axis->axis, axis->offset, width, height);
+  const auto& plane = std::get<FreePlane>(picture.plane);
+  return planeSlice(field.domain(), plane.point, plane.normal, width, height);
+}
+
+SliceView sliceView(const Field& field, const SlicePicture& picture) {
+  const PixelRect view = frameOf(picture).view;
+  const int margin = static_cast<int>(std::lround(kMargin * std::min(view.width(), view.height())));
+  const int width = view.width() - 2 * margin, height = view.height() - 2 * margin;
+  SliceView slice = sliceView(field, picture, width, height);
+  slice.right *= double(view.width()) / width;
+  slice.up *= double(view.height()) / height;
+  return slice;
+}
+
+Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) {
+  Frame frame = frameOf(picture);
+  const SliceView view = sliceView(field, picture);
+  const int samples = picture.samples;
+  const ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
+  moveBeside(frame, buffers, samples);
+  const double sampleSize = view.right.norm() / buffers.width;
+  const Sampling sampling{samples, lineWidthOf(frame), sampleSize};
+  const FieldStatistics figures = statistics(field);
+
+  Furniture furniture;
+  Image image(picture.width, picture.height, paperColor());
+  std::vector<std::string> details;
+  if (picture.color == SliceColor::distance) {
+    const DistanceScale scale = scaleOf(buffers);
+    addDistanceBar(furniture, frame, scale);
+    place(image, colorDistanceSlice(buffers, scale, sampling));
+    details = {"distance", describePlane(picture), formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
+               "lines every " + formatNumber(scale.step)};
+  } else {
+    const bool degree = picture.color == SliceColor::degree;
+    const LevelMap map = addLevels(furniture, frame, figures, degree);
+    place(image, colorLevelSlice(buffers, map, picture.color, sampling));
+    details = {degree ? "degree" : "depth", describePlane(picture)};
+  }
+  details.push_back(formatCount(figures.leaves) + " cells");
+  details.push_back(describeTarget(field));
+  addCaption(furniture, frame, describeSource(field), details);
+  paint(image, furniture);
+  return image;
+}
+
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture) {
+  const Frame frame = frameOf(picture);
+  const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
+  const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset};
+  const ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
+  const FieldStatistics figures = statistics(field);
+
+  Furniture furniture;
+  Image image(picture.width, picture.height, paperColor());
+  for (int y = 0; y < height; ++y)
+    std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
+  LevelMap map({});
+  if (picture.color == SurfaceColor::normal)
+    addFieldFacts(furniture, frame, field, figures);
+  else
+    map = addLevels(furniture, frame, figures, picture.color == SurfaceColor::degree);
+  place(image, colorSurface(buffers, view.camera, map, picture.color, samples));
+
+  const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
+  static const char* const colors[] = {"", "degree on the ", "depth on the "};
+  const std::vector<std::string> details = {colors[static_cast<int>(picture.color)] + surface,
+                                            "camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
+                                                formatNumber(picture.camera.elevationDegrees) + "°",
+                                            formatCount(figures.leaves) + " cells", describeTarget(field)};
+  addCaption(furniture, frame, describeSource(field), details);
+  paint(image, furniture);
+  return image;
+}
+
+}  // namespace hpsdf::render
