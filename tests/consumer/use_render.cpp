@@ -1,0 +1,23 @@
+#include <hpsdf/render/renderer.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "torus_field.h"
+
+// Without OpenGL, so that it runs on every machine.
+int main() {
+  constexpr int kSize = 32;
+  const hpsdf::Field field = torusField();
+  const hpsdf::render::OrbitCamera camera{.elevationDegrees = 90, .up = hpsdf::render::UpAxis::z};
+  const auto buffers = hpsdf::render::makeCpuRenderer(field)->surface(
+      {.camera = hpsdf::render::pinhole(camera, field.domain(), kSize, kSize)}, kSize, kSize);
+
+  // along the axis of the torus: through its hole, but not past its ring
+  const bool hole = !buffers.hit(kSize / 2 * kSize + kSize / 2);
+  const auto hits = std::count_if(buffers.cell.begin(), buffers.cell.end(),
+                                  [](std::uint32_t cell) { return cell != hpsdf::render::kNoCell; });
+  if (hole && hits > kSize * kSize / 10) return 0;
+  std::fprintf(stderr, "hole %d, %td pixels hit\n", hole, hits);
+  return 1;
+}
