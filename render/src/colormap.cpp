@@ -31,7 +31,7 @@ double niceStep(double span) {
 
 LinearColor orderedColor(double t) {
   t = std::clamp(t, 0.0, 1.0);
-  const double lightness = 0.395 + 0.54 * t;
+  const double lightness = 0.385 + 0.565 * t;
   // Violet to yellow the short way round would cross muddy pinks; this way crosses blue, teal and green.
   const double hue = 302 - 204 * std::pow(t, 0.92);
   // Least in the middle, where the gamut of sRGB is narrow and greens would shout.

@@ -6,9 +6,10 @@
 #include <iterator>
 #include <memory>
 #include <string>
-#include <system_error>
+#include <string_view>
 
 #include "hpsdf/error.h"
+#include "hpsdf/output_file.h"
 
 // Static: an application that brings its own copy of stb must still link.
 #define STB_IMAGE_IMPLEMENTATION
@@ -20,16 +21,10 @@
 #define STB_IMAGE_WRITE_STATIC
 #define STBI_WRITE_NO_STDIO
 #include <stb/stb_image_write.h>
-#include <unistd.h>
-
 namespace hpsdf::render {
 namespace {
 
 static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed bytes");
-
-[[noreturn]] void failWriting(const std::filesystem::path& file, const std::string& reason) {
-  throw Error(file.string() + ": cannot write the picture: " + reason + "; choose another path with -o");
-}
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }
 
@@ -45,33 +40,17 @@ std::vector<char> encodePng(const Image& image) {
   return bytes;
 }
 
-void writeBytes(const std::filesystem::path& file, const std::vector<char>& bytes) {
-  errno = 0;
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  if (!stream) throw std::system_error(errno, std::generic_category());
-}
-
 }  // namespace
 
 void savePng(const Image& image, const std::filesystem::path& file) {
   if (image.width <= 0 || image.height <= 0 || image.pixels.size() != std::size_t(image.width) * image.height)
-    failWriting(file, "it has no pixels");
+    throw Error(file.string() + ": cannot write the picture: it has no pixels; draw one first");
   const std::vector<char> bytes = encodePng(image);
-  if (bytes.empty()) failWriting(file, "not enough memory to compress it");
-
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) failWriting(file, "it is a directory");
-  std::filesystem::path temporary = file;
-  temporary += ".part" + std::to_string(::getpid());
-  try {
-    writeBytes(temporary, bytes);
-    std::filesystem::rename(temporary, file);
-  } catch (const std::system_error& error) {
-    std::filesystem::remove(temporary, ignored);
-    failWriting(file, error.code().message());
-  }
+  if (bytes.empty())
+    throw Error(file.string() + ": cannot write the picture: not enough memory to compress it; make it smaller");
+  OutputFile output(file);
+  output.write(std::string_view(bytes.data(), bytes.size()));
+  output.commit();
 }
 
 Image loadPng(const std::filesystem::path& file) {

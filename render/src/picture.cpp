@@ -20,8 +20,6 @@ constexpr int kMostSamples = 8;
 // A sample of a surface takes 26 bytes in the buffers, and as much again while a renderer fills them.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
-constexpr double kMargin = 0.02;  // of the view's smaller side, around the section of the domain
-
 void checkSize(int width, int height, int samples) {
   const auto size = [&] { return std::to_string(width) + "x" + std::to_string(height); };
   if (std::min(width, height) < kSmallestSize || std::max(width, height) > kLargestSize)
@@ -152,12 +150,7 @@ SliceView sliceView(const Field& field, const SlicePicture& picture, int width, 
 
 SliceView sliceView(const Field& field, const SlicePicture& picture) {
   const PixelRect view = frameOf(picture).view;
-  const int margin = static_cast<int>(std::lround(kMargin * std::min(view.width(), view.height())));
-  const int width = view.width() - 2 * margin, height = view.height() - 2 * margin;
-  SliceView slice = sliceView(field, picture, width, height);
-  slice.right *= double(view.width()) / width;
-  slice.up *= double(view.height()) / height;
-  return slice;
+  return sliceView(field, picture, view.width(), view.height());
 }
 
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) {

@@ -1,0 +1,259 @@
+#include "color_view.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace hpsdf::render {
+namespace {
+
+const LevelMap kMap(std::vector<int>{2, 3, 5});
+
+// A slice seen by hand: one cell of degree 2, no depth, far from the surface.
+ViewBuffers blank(int width, int height, float value = 10) {
+  ViewBuffers buffers;
+  const std::size_t size = std::size_t(width) * height;
+  buffers.width = width;
+  buffers.height = height;
+  buffers.cell.assign(size, 0);
+  buffers.degree.assign(size, 2);
+  buffers.depth.assign(size, 3);
+  buffers.value.assign(size, value);
+  buffers.normal.assign(size, Eigen::Vector3f::UnitZ());
+  buffers.distance.assign(size, 1);
+  return buffers;
+}
+
+template <typename Visit>
+void forEachSample(ViewBuffers& buffers, const Visit& visit) {
+  for (int y = 0; y < buffers.height; ++y)
+    for (int x = 0; x < buffers.width; ++x) visit(x, y, std::size_t(y) * buffers.width + x);
+}
+
+// Degree 2 on the left half, 5 on the right one, nothing in the last four columns.
+ViewBuffers twoCells(int size) {
+  ViewBuffers buffers = blank(size, size);
+  forEachSample(buffers, [&](int x, int, std::size_t i) {
+    if (x >= size / 2) buffers.cell[i] = 7, buffers.degree[i] = 5;
+    if (x >= size - 4) buffers.cell[i] = kNoCell, buffers.degree[i] = 0, buffers.value[i] = 0;
+  });
+  return buffers;
+}
+
+Image degrees(const ViewBuffers& buffers, int samples = 1) {
+  return colorLevelSlice(buffers, kMap, SliceColor::degree, {samples, 1, 0.01});
+}
+
+double lightnessOf(Color color) { return toOklab(decodeSrgb(color)).lightness; }
+
+// How much darker a pixel is than the colour of its value alone.
+double inkAt(const Image& image, int x, int y, double value, const DistanceScale& scale) {
+  return toOklab(divergingColor(value / scale.range)).lightness - lightnessOf(image.at(x, y));
+}
+
+TEST(LevelSlice, CellsHaveTheColorOfTheirLevelAndADarkOutline) {
+  const Image image = degrees(twoCells(64));
+  EXPECT_EQ(image.at(16, 40), encodeSrgb(kMap(2)));
+  EXPECT_EQ(image.at(45, 40), encodeSrgb(kMap(5)));
+  EXPECT_EQ(image.at(62, 40), paperColor());
+  EXPECT_LT(lightnessOf(image.at(32, 40)), 0.75 * lightnessOf(image.at(45, 40))) << "no outline between the cells";
+  EXPECT_LT(lightnessOf(image.at(60, 40)), 0.75 * lightnessOf(paperColor())) << "no outline where the domain ends";
+  EXPECT_EQ(image.at(31, 40), image.at(16, 40)) << "an outline is one pixel wide";
+  EXPECT_EQ(image.at(33, 40), image.at(45, 40));
+}
+
+TEST(LevelSlice, DepthReadsTheOtherBuffer) {
+  const Image image = colorLevelSlice(twoCells(64), kMap, SliceColor::depth, {1, 1, 0.01});
+  EXPECT_EQ(image.at(16, 40), encodeSrgb(kMap(3)));
+}
+
+TEST(LevelSlice, SwappedLevelsAndUnknownLevelsShow) {
+  ViewBuffers wrong = twoCells(64);
+  for (auto& degree : wrong.degree) degree = degree == 2 ? 5 : degree == 5 ? 2 : degree;
+  const Image right = degrees(twoCells(64)), swapped = degrees(wrong);
+  int different = 0;
+  for (std::size_t i = 0; i < right.pixels.size(); ++i) different += right.pixels[i] != swapped.pixels[i];
+  EXPECT_GT(different, 64 * 55);
+
+  wrong.degree[10 * 64 + 10] = 4;
+  EXPECT_EQ(degrees(wrong).at(10, 10), (Color{255, 0, 255}));
+}
+
+TEST(LevelSlice, OutlinesOfTinyCellsFade) {
+  const auto meanOf = [](int cellSize) {
+    ViewBuffers buffers = blank(96, 96);
+    forEachSample(buffers, [&](int x, int y, std::size_t i) { buffers.cell[i] = y / cellSize * 96 + x / cellSize; });
+    const Image image = degrees(buffers);
+    LinearColor sum = LinearColor::Zero();
+    for (const Color& pixel : image.pixels) sum += decodeSrgb(pixel);
+    return toOklab(sum / float(image.pixels.size()));
+  };
+  for (int cellSize : {1, 2, 3, 4, 6, 12})
+    EXPECT_LT(colorDifference(meanOf(cellSize), toOklab(kMap(2))), 0.09) << cellSize;
+  EXPECT_LT(colorDifference(meanOf(2), toOklab(kMap(2))), 0.002);
+  EXPECT_GT(colorDifference(meanOf(12), toOklab(kMap(2))), 0.01) << "cells of 12 pixels have outlines";
+}
+
+TEST(LevelSlice, OutlinesAreAsWideInAnyNumberOfSamples) {
+  const auto darkness = [](int samples) {
+    const Image image = degrees(twoCells(64 * samples), samples);
+    const double full = decodeSrgb(image.at(45, 40)).sum();
+    double sum = 0;
+    for (int x = 28; x < 45; ++x) sum += std::max(0.0, 1 - decodeSrgb(image.at(x, 40)).sum() / full) * (x >= 32);
+    return sum;
+  };
+  EXPECT_GT(darkness(1), 0.5);
+  EXPECT_NEAR(darkness(2), darkness(1), 0.02);
+  EXPECT_NEAR(darkness(5), darkness(1), 0.02);
+}
+
+TEST(LevelSlice, SamplesAreAveragedInLinearLight) {
+  // columns one sample wide, so that every pixel holds as much of either level and no outline
+  ViewBuffers buffers = blank(32, 32);
+  forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.cell[i] = x, buffers.degree[i] = x % 2 ? 5 : 2; });
+  // a cell as high as the picture would be outlined: cut the columns into single samples
+  forEachSample(buffers, [&](int x, int y, std::size_t i) { buffers.cell[i] = y * 32 + x; });
+  const Image image = degrees(buffers, 2);
+  ASSERT_EQ(image.width, 16);
+  const Color expected = encodeSrgb(0.5F * (kMap(2) + kMap(5)));
+  for (const Color& pixel : image.pixels) EXPECT_EQ(pixel, expected);
+}
+
+TEST(LevelSlice, ShowsTheSurfaceAsALine) {
+  ViewBuffers buffers = blank(64, 64);
+  forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = 0.01F * float(x - 32); });
+  const Image image = degrees(buffers);
+  EXPECT_GT(lightnessOf(image.at(32, 20)), 0.95);
+  EXPECT_LT(lightnessOf(image.at(30, 20)), lightnessOf(image.at(10, 20)));
+  EXPECT_EQ(image.at(10, 20), encodeSrgb(kMap(2)));
+  EXPECT_EQ(image.at(50, 20), encodeSrgb(kMap(2)));
+}
+
+// Values rise by `slope` a column and pass 0 between columns 31 and 32.
+ViewBuffers ramp(double slope) {
+  ViewBuffers buffers = blank(64, 64);
+  forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = static_cast<float>(slope * (x - 31.5)); });
+  return buffers;
+}
+
+constexpr DistanceScale kScale = {1, 0.1, -0.32, 0.32};
+
+TEST(DistanceSlice, TheZeroLineIsDarkAndAlikeOnBothSides) {
+  const ViewBuffers buffers = ramp(0.01);
+  const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
+  EXPECT_LT(lightnessOf(image.at(31, 30)), 0.25);
+  EXPECT_EQ(image.at(31, 30), image.at(32, 30));
+  for (int k = 1; k < 6; ++k) {
+    const double value = 0.01 * (k + 0.5);
+    EXPECT_NEAR(inkAt(image, 31 - k, 30, -value, kScale), inkAt(image, 32 + k, 30, value, kScale), 0.02) << k;
+  }
+  EXPECT_NEAR(inkAt(image, 36, 30, 0.045, kScale), 0, 0.01) << "the line is too wide";
+}
+
+TEST(DistanceSlice, IsoLinesStandAtMultiplesOfTheStep) {
+  const Image image = colorDistanceSlice(ramp(0.01), kScale, {1, 1, 0.01});
+  for (int x = 0; x < 64; ++x) {
+    const double value = 0.01 * (x - 31.5);
+    const double fromLine = std::abs(value - 0.1 * std::round(value / 0.1)) / 0.01;
+    if (std::abs(value) < 0.05) continue;
+    if (fromLine < 0.6) {
+      EXPECT_GT(inkAt(image, x, 10, value, kScale), 0.05) << x;
+    } else if (fromLine > 1.1) {
+      EXPECT_NEAR(inkAt(image, x, 10, value, kScale), 0, 0.01) << x;
+    }
+  }
+}
+
+TEST(DistanceSlice, LinesKeepTheirWidthWhateverTheSlope) {
+  for (double slope : {0.003, 0.01, 0.02}) {
+    const Image image = colorDistanceSlice(ramp(slope), kScale, {1, 1, 0.01});
+    double ink = 0;
+    for (int x = 26; x < 38; ++x) ink += inkAt(image, x, 30, slope * (x - 31.5), kScale);
+    EXPECT_NEAR(ink, 2.1, 0.4) << slope;
+  }
+}
+
+TEST(DistanceSlice, JumpsAtCellFacesMakeNoBlots) {
+  // two cells whose values jump by half a step where they meet, and pass a line each
+  ViewBuffers buffers = ramp(0.01);
+  forEachSample(buffers, [&](int x, int, std::size_t i) {
+    if (x >= 45) buffers.cell[i] = 1, buffers.value[i] += 0.05F;
+  });
+  const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
+  const auto ink = [&](int x) { return inkAt(image, x, 30, buffers.value[std::size_t(30) * 64 + x], kScale); };
+  int dark = 0;
+  for (int x = 40; x < 52; ++x) dark += ink(x) > 0.02;
+  EXPECT_EQ(dark, 4) << "two lines, each between two columns";
+  EXPECT_NEAR(ink(44), 0, 0.01) << "the jump is no line";
+  EXPECT_NEAR(ink(45), 0, 0.01);
+}
+
+TEST(DistanceSlice, TheZeroLineHasNoGapWhereTheFieldJumpsOverIt) {
+  ViewBuffers buffers = blank(64, 64);
+  forEachSample(buffers, [&](int x, int, std::size_t i) {
+    buffers.cell[i] = x < 32 ? 0 : 1;
+    buffers.value[i] = static_cast<float>(x < 32 ? 0.01 * (x - 36) : 0.01 * (x - 27));
+  });
+  const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
+  EXPECT_LT(std::min(lightnessOf(image.at(31, 30)), lightnessOf(image.at(32, 30))), 0.3);
+}
+
+TEST(DistanceSlice, AlmostFlatValuesMakeNoBlots) {
+  ViewBuffers buffers = blank(64, 64);
+  forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = 0.1F + 1e-4F * float(x - 32); });
+  const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
+  int dark = 0;
+  for (int x = 0; x < 64; ++x) dark += inkAt(image, x, 30, 0.1, kScale) > 0.02;
+  EXPECT_LE(dark, 51);
+  EXPECT_GE(dark, 1);
+}
+
+TEST(Surface, ShowsTheBackdropWhereARayMisses) {
+  ViewBuffers buffers = blank(16, 16);
+  std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
+  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Image image = colorSurface(buffers, camera, kMap, SurfaceColor::normal, 1);
+  EXPECT_EQ(image.at(3, 2), encodeSrgb(backdropColor(2.5 / 16)));
+  EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
+}
+
+TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
+  // the same scene before two cameras: its normals turned along
+  const Eigen::Matrix3f turn = Eigen::AngleAxisf(1.3F, Eigen::Vector3f(1, 2, -1).normalized()).toRotationMatrix();
+  const auto shaded = [&](const Eigen::Vector3f& normal, const Eigen::Matrix3f& rotation) {
+    ViewBuffers buffers = blank(1, 1);
+    buffers.normal[0] = rotation * normal;
+    const auto turned = [&](double x, double y, double z) {
+      return Vector3(rotation.cast<double>() * Vector3(x, y, z));
+    };
+    const Pinhole camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
+    return colorSurface(buffers, camera, kMap, SurfaceColor::normal, 1).at(0, 0);
+  };
+  const Eigen::Vector3f left = Eigen::Vector3f(-1, 1, 1).normalized(), right = Eigen::Vector3f(1, -1, 1).normalized();
+  const Eigen::Matrix3f still = Eigen::Matrix3f::Identity();
+  EXPECT_GT(lightnessOf(shaded(left, still)), lightnessOf(shaded(right, still)) + 0.15);
+  for (const auto& normal : {left, right})
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(shaded(normal, still)[i], shaded(normal, turn)[i], 1);
+}
+
+TEST(Surface, LevelColorsStayRecognisableUnderShading) {
+  const std::vector<int> levels = {2, 3, 4, 5, 6, 7};
+  const LevelMap map(levels);
+  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  for (int level : levels)
+    for (double tilt : {0.0, 0.4, 0.8}) {
+      ViewBuffers buffers = blank(1, 1);
+      buffers.degree[0] = static_cast<std::uint8_t>(level);
+      buffers.normal[0] = Eigen::Vector3f(float(-std::sin(tilt)), 0, float(std::cos(tilt)));
+      const Oklab shown = toOklab(decodeSrgb(colorSurface(buffers, camera, map, SurfaceColor::degree, 1).at(0, 0)));
+      int nearest = 0;
+      for (int candidate : levels)
+        if (nearest == 0 ||
+            colorDifference(shown, toOklab(map(candidate))) < colorDifference(shown, toOklab(map(nearest))))
+          nearest = candidate;
+      EXPECT_EQ(nearest, level) << "tilted by " << tilt;
+    }
+}
+
+}  // namespace
+}  // namespace hpsdf::render

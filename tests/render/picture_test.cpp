@@ -1,0 +1,399 @@
+#include "hpsdf/render/picture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "color_view.h"
+#include "hpsdf/error.h"
+#include "legend.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr double kPlane = 0.125;  // the surface of the test field: x = kPlane, inside below
+
+// f = x − kPlane over [−1, 1]³: 2 × 2 × 2 base cells, the last one divided once. `degrees`: of the undivided cells in x
+// below 0, in x above 0, and of the small ones.
+Field planeField(std::array<int, 3> degrees = {2, 3, 5}, std::string name = "plane") {
+  FieldData data;
+  data.domain = Box(Vector3::Constant(-1), Vector3::Constant(1));
+  data.grid = {2, 2, 2};
+  std::vector<double> coefficients;
+  const auto leaf = [&](int degree, double center, double halfSize) {
+    const auto offset = static_cast<std::uint32_t>(coefficients.size());
+    coefficients.resize(offset + coefficientCount(degree), 0.0);
+    // lexicographic, last index fastest: (1, 0, 0) follows all (0, j, k)
+    coefficients[offset] = center - kPlane;
+    coefficients[offset + (degree + 1) * (degree + 2) / 2] = halfSize;
+    return node::leaf(degree, offset);
+  };
+  for (int i = 0; i < 7; ++i) data.nodes.push_back(leaf(degrees[i % 2], i % 2 ? 0.5 : -0.5, 0.5));
+  data.nodes.push_back(node::internal(8));
+  for (int i = 0; i < 8; ++i) data.nodes.push_back(leaf(degrees[2], i % 2 ? 0.75 : 0.25, 0.25));
+  data.coefficients = std::move(coefficients);
+  data.metadata.source.name = std::move(name);
+  data.metadata.targetError = 1e-6;
+  return Field(std::move(data));
+}
+
+// Asks the field itself, a point a pixel; sees a surface everywhere below the picture's middle.
+class FakeRenderer : public Renderer {
+ public:
+  explicit FakeRenderer(const Field& field) : field_(field) {}
+
+  ViewBuffers slice(const SliceView& view, int width, int height) override {
+    ViewBuffers buffers = empty(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const Vector3 point =
+            view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
+        const Box& domain = field_.domain();
+        if ((point.array() < domain.min().array()).any() || (point.array() >= domain.max().array()).any()) continue;
+        fill(buffers, std::size_t(y) * width + x, point);
+      }
+    return buffers;
+  }
+
+  ViewBuffers surface(const SurfaceView&, int width, int height) override {
+    ViewBuffers buffers = empty(width, height);
+    buffers.normal.assign(buffers.cell.size(), Eigen::Vector3f::UnitX());
+    for (std::size_t i = buffers.cell.size() / 2; i < buffers.cell.size(); ++i)
+      fill(buffers, i, Vector3(kPlane, 0, -0.5));
+    return buffers;
+  }
+
+  std::string description() const override { return "fake"; }
+
+  int calls = 0;
+  int lastWidth = 0, lastHeight = 0;
+
+ private:
+  ViewBuffers empty(int width, int height) {
+    ++calls;
+    lastWidth = width;
+    lastHeight = height;
+    const std::size_t size = std::size_t(width) * height;
+    ViewBuffers buffers;
+    buffers.width = width;
+    buffers.height = height;
+    buffers.cell.assign(size, kNoCell);
+    buffers.degree.assign(size, 0);
+    buffers.depth.assign(size, 0);
+    buffers.value.assign(size, 0);
+    return buffers;
+  }
+
+  void fill(ViewBuffers& buffers, std::size_t i, const Vector3& point) const {
+    const Cell cell = field_.cellAt(point);
+    buffers.cell[i] = cell.id;
+    buffers.degree[i] = static_cast<std::uint8_t>(cell.degree);
+    buffers.depth[i] = static_cast<std::uint8_t>(cell.depth);
+    buffers.value[i] = static_cast<float>(field_.value(point));
+  }
+
+  const Field& field_;
+};
+
+SlicePicture slice(SliceColor color, int width = 640, int height = 360, int samples = 1) {
+  return {AxisPlane{2, 0.5}, color, width, height, samples};
+}
+
+// The pixel that shows a point of the slice.
+Color colorAt(const Image& image, const Field& field, const SlicePicture& picture, const Vector3& point) {
+  const SliceView view = sliceView(field, picture);
+  const ViewSize size = viewSize(picture.width, picture.height);
+  const Vector3 from = point - view.origin;
+  const double x = (from.dot(view.right) / view.right.squaredNorm() + 0.5) * size.width;
+  const double y = (0.5 - from.dot(view.up) / view.up.squaredNorm()) * size.height;
+  return image.at(static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y)));
+}
+
+double lightnessOf(Color color) { return toOklab(decodeSrgb(color)).lightness; }
+
+bool holds(const Image& image, Color color, int fromColumn) {
+  for (int y = 0; y < image.height; ++y)
+    for (int x = fromColumn; x < image.width; ++x)
+      if (image.at(x, y) == color) return true;
+  return false;
+}
+
+std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(Picture, DegreeSliceHasTheColorsOfItsCells) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  const LevelMap map(std::vector<int>{2, 3, 5});
+  for (int samples : {1, 3}) {
+    const SlicePicture picture = slice(SliceColor::degree, 640, 360, samples);
+    const Image image = draw(renderer, field, picture);
+    EXPECT_EQ(image.width, 640);
+    EXPECT_EQ(image.height, 360);
+    EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), encodeSrgb(map(2)));
+    EXPECT_EQ(colorAt(image, field, picture, {0.6, -0.5, 0.5}), encodeSrgb(map(3)));
+    EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(map(5)));
+    EXPECT_GT(lightnessOf(colorAt(image, field, picture, {kPlane, -0.6, 0.5})), 0.9) << "no line where the surface is";
+    EXPECT_EQ(image.at(3, 3), paperColor()) << "outside of the domain";
+  }
+}
+
+TEST(Picture, DepthSliceShowsDepths) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  const SlicePicture picture = slice(SliceColor::depth);
+  const Image image = draw(renderer, field, picture);
+  EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), encodeSrgb(orderedColor(0)));
+  EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(orderedColor(1)));
+}
+
+TEST(Picture, DistanceSliceIsBlueInsideRedOutsideAndDarkAtZero) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  const SlicePicture picture = slice(SliceColor::distance);
+  const Image image = draw(renderer, field, picture);
+  EXPECT_LT(toOklab(decodeSrgb(colorAt(image, field, picture, {-0.77, 0.3, 0.5}))).b, -0.05);
+  EXPECT_GT(toOklab(decodeSrgb(colorAt(image, field, picture, {0.77, 0.3, 0.5}))).a, 0.05);
+  EXPECT_LT(lightnessOf(colorAt(image, field, picture, {kPlane, 0.3, 0.5})), 0.3);
+  EXPECT_EQ(image.at(3, 3), paperColor());
+}
+
+TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  SurfacePicture picture;
+  picture.width = 640;
+  picture.height = 360;
+  std::set<std::vector<Color>> pictures;
+  for (SurfaceColor color : {SurfaceColor::normal, SurfaceColor::degree, SurfaceColor::depth}) {
+    picture.color = color;
+    const Image image = draw(renderer, field, picture);
+    const ViewSize size = viewSize(640, 360);
+    EXPECT_EQ(image.at(100, 20), encodeSrgb(backdropColor(20.5 / size.height)));
+    EXPECT_LT(lightnessOf(image.at(100, 250)), lightnessOf(image.at(100, 20)) - 0.03);
+    pictures.insert(image.pixels);
+  }
+  EXPECT_EQ(pictures.size(), 3U);
+}
+
+TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {
+  const Field field = planeField({2, 3, 5});
+  FakeRenderer renderer(field);
+  SlicePicture picture = slice(SliceColor::degree);
+  picture.plane = AxisPlane{2, -0.5};  // below the divided cell: no degree 5 in the section itself
+  const Image image = draw(renderer, field, picture);
+  const LevelMap map(std::vector<int>{2, 3, 5});
+  const int panel = viewSize(640, 360).width / 2 + 160;  // right of the section, which is as wide as high
+  for (int level : map.levels()) EXPECT_TRUE(holds(image, encodeSrgb(map(level)), panel)) << level;
+  EXPECT_FALSE(holds(image, encodeSrgb(orderedColor(0.25)), panel));
+}
+
+TEST(Picture, LegendNamesEachLevelAndItsShare) {
+  const std::map<int, double> shares = {{2, 0.14}, {3, 0.6396}, {5, 0.22}, {12, 0.0004}};
+  Furniture furniture;
+  static const std::string titles[] = {"polynomial degree", "degree"};
+  addLevelLegend(furniture, frame(1280, 720), titles, shares, LevelMap(std::vector<int>{2, 3, 5, 12}));
+  std::vector<std::string> texts;
+  for (const TextItem& item : furniture.texts) texts.push_back(item.text);
+  EXPECT_EQ(texts, (std::vector<std::string>{"polynomial degree", "share of the volume", "12", "<0.1 %", "5", "22.0 %",
+                                             "3", "64.0 %", "2", "14.0 %"}));
+}
+
+TEST(Picture, AWrongFieldGivesAnotherPicture) {
+  const Field right = planeField({2, 3, 5}), wrong = planeField({3, 2, 5});
+  FakeRenderer ofRight(right), ofWrong(wrong);
+  const Image expected = draw(ofRight, right, slice(SliceColor::degree));
+  const Image actual = draw(ofWrong, wrong, slice(SliceColor::degree));
+  int different = 0;
+  for (std::size_t i = 0; i < expected.pixels.size(); ++i) different += expected.pixels[i] != actual.pixels[i];
+  EXPECT_GT(different, 40000);
+  EXPECT_EQ(draw(ofRight, right, slice(SliceColor::degree)).pixels, expected.pixels);
+}
+
+TEST(Picture, MoreSamplesKeepTheAverageColor) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  for (SliceColor color : {SliceColor::degree, SliceColor::distance}) {
+    const auto meanOf = [&](int samples) {
+      const Image image = draw(renderer, field, slice(color, 320, 240, samples));
+      LinearColor sum = LinearColor::Zero();
+      for (const Color& pixel : image.pixels) sum += decodeSrgb(pixel);
+      return toOklab(sum / float(image.pixels.size()));
+    };
+    EXPECT_LT(colorDifference(meanOf(1), meanOf(4)), 0.004);
+  }
+}
+
+TEST(Picture, TheRendererIsAskedForTheViewAlone) {
+  const Field field = planeField(), other = planeField({7, 8, 9}, "a very long name of a field");
+  for (const auto& [width, height] : {std::pair{64, 64}, {320, 240}, {640, 360}, {1280, 720}}) {
+    const ViewSize size = viewSize(width, height);
+    for (const Field* f : {&field, &other})
+      for (SliceColor color : {SliceColor::degree, SliceColor::distance}) {
+        FakeRenderer renderer(*f);
+        draw(renderer, *f, slice(color, width, height, 2));
+        EXPECT_EQ(renderer.lastWidth, 2 * size.width);
+        EXPECT_EQ(renderer.lastHeight, 2 * size.height);
+      }
+    const SliceView view = sliceView(field, slice(SliceColor::degree, width, height));
+    EXPECT_NEAR(view.right.norm() / size.width, view.up.norm() / size.height, 1e-12) << "pixels are not square";
+  }
+}
+
+TEST(Picture, SizesOutOfRangeAreRefusedBeforeAnythingIsDone) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  struct Case {
+    int width, height, samples;
+    const char* says;
+  };
+  for (const Case& bad : {Case{15, 100, 1, "15x100"},
+                          {100, 16385, 1, "100x16385"},
+                          {-5, 100, 1, "-5x100"},
+                          {100, 100, 0, "samples = 0"},
+                          {100, 100, 9, "samples = 9"},
+                          {16384, 16384, 1, "16384x16384"},
+                          {4096, 4096, 8, "8x8"}}) {
+    SurfacePicture surface;
+    surface.width = bad.width;
+    surface.height = bad.height;
+    surface.samples = bad.samples;
+    for (const std::string& message :
+         {messageOf([&] { draw(renderer, field, slice(SliceColor::degree, bad.width, bad.height, bad.samples)); }),
+          messageOf([&] { draw(renderer, field, surface); })})
+      EXPECT_NE(message.find(bad.says), std::string::npos) << message;
+  }
+  EXPECT_EQ(renderer.calls, 0);
+}
+
+TEST(Picture, EverySizeIsDrawn) {
+  const Field field = planeField({2, 3, 5}, "a name · with ünicode that is far too long for any caption strip.obj");
+  FakeRenderer renderer(field);
+  for (const auto& [width, height] : {std::pair{16, 16},
+                                      {64, 64},
+                                      {64, 700},
+                                      {700, 64},
+                                      {161, 141},
+                                      {240, 140},
+                                      {320, 240},
+                                      {300, 1000},
+                                      {1023, 517},
+                                      {4096, 2160}}) {
+    for (SliceColor color : {SliceColor::degree, SliceColor::depth, SliceColor::distance})
+      EXPECT_EQ(draw(renderer, field, slice(color, width, height)).pixels.size(), std::size_t(width) * height);
+    SurfacePicture picture;
+    picture.width = width;
+    picture.height = height;
+    EXPECT_EQ(draw(renderer, field, picture).height, height);
+  }
+}
+
+// Texts within the picture, within the part that they belong to, and apart from each other.
+void expectTidy(const Furniture& furniture, const Frame& frame, const std::string& what) {
+  const PixelRect whole = {0, 0, frame.width, frame.height};
+  std::vector<PixelRect> boxes;
+  for (const TextItem& item : furniture.texts) {
+    const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
+    EXPECT_TRUE(whole.contains(ink)) << what << ": \"" << item.text << "\" is cut";
+    EXPECT_TRUE(frame.panel.contains(ink) || frame.caption.contains(ink)) << what << ": \"" << item.text << "\" strays";
+    EXPECT_GE(item.size, 7.9) << what << ": \"" << item.text << "\" cannot be read";
+    boxes.push_back(ink);
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_FALSE(boxes[i].overlaps(boxes[k]))
+          << what << ": \"" << furniture.texts[i].text << "\" lies on \"" << furniture.texts[k].text << "\"";
+  for (const BoxItem& box : furniture.boxes) {
+    EXPECT_GE(box.x0, 0) << what;
+    EXPECT_GE(box.y0, 0) << what;
+    EXPECT_LE(box.x1, frame.width) << what;
+    EXPECT_LE(box.y1, frame.height) << what;
+  }
+}
+
+TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
+  static const std::string titles[] = {"polynomial degree", "degree"};
+  const std::string longName(300, 'W');
+  const std::vector<std::string> details = {"distance",
+                                            "slice through (0.1235, −0.5, 1e-7) with normal (0.577, 0.577, 0.577)",
+                                            "−0.4287 to 1.108", "1,234,567 cells", "τ = 1e-6"};
+  const std::vector<std::pair<std::string, std::string>> facts = {
+      {"cells", "1,234,567"}, {"degrees", "2–30"}, {"coefficients", "1,123,456,789"}, {"RMS estimate", "3.05e-4"}};
+  for (const auto& [width, height] : {std::pair{64, 64},
+                                      {160, 140},
+                                      {240, 140},
+                                      {240, 2000},
+                                      {320, 240},
+                                      {400, 150},
+                                      {640, 360},
+                                      {800, 600},
+                                      {783, 441},
+                                      {1280, 720},
+                                      {1920, 1080},
+                                      {2000, 200},
+                                      {4096, 2160},
+                                      {16384, 4096}}) {
+    const Frame f = frame(width, height);
+    const std::string size = std::to_string(width) + "x" + std::to_string(height);
+    EXPECT_EQ(f.view.width() + f.panel.width(), width);
+    EXPECT_EQ(f.view.height() + f.caption.height(), height);
+    EXPECT_GE(f.view.width(), width / 2);
+    for (int count : {1, 2, 5, 10, 21, 31}) {
+      std::map<int, double> shares;
+      for (int level = 0; level < count; ++level) shares[level] = 1.0 / count;
+      std::vector<int> levels(count);
+      std::iota(levels.begin(), levels.end(), 0);
+      Furniture furniture;
+      addLevelLegend(furniture, f, titles, shares, LevelMap(levels));
+      const auto swatches = furniture.boxes.size();
+      EXPECT_GE(swatches, f.panel.empty() ? 0U : std::size_t(count)) << size;
+      addCaption(furniture, f, count % 2 ? longName : "bunny.obj", details);
+      expectTidy(furniture, f, size + ", " + std::to_string(count) + " levels");
+    }
+    for (double range : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9}) {
+      Furniture furniture;
+      addDistanceBar(furniture, f, distanceScale(-0.3 * range, range));
+      expectTidy(furniture, f, size + ", range " + std::to_string(range));
+    }
+    Furniture furniture;
+    addFacts(furniture, f, titles, facts);
+    addCaption(furniture, f, "", {});
+    expectTidy(furniture, f, size + ", facts");
+  }
+}
+
+TEST(Layout, LegendAndCaptionAreThereAt320x240) {
+  const Frame f = frame(320, 240);
+  EXPECT_FALSE(f.panel.empty());
+  EXPECT_FALSE(f.caption.empty());
+  EXPECT_TRUE(frame(64, 64).panel.empty());
+  EXPECT_EQ(frame(64, 64).view, (PixelRect{0, 0, 64, 64}));
+}
+
+TEST(Layout, NumbersAreWrittenAsReadersExpect) {
+  EXPECT_EQ(formatNumber(0), "0");
+  EXPECT_EQ(formatNumber(-0.25), "−0.25");
+  EXPECT_EQ(formatNumber(1.10849), "1.108");
+  EXPECT_EQ(formatNumber(1e-6, 3), "1e-6");
+  EXPECT_EQ(formatNumber(-1.5e-7), "−1.5e-7");
+  EXPECT_EQ(formatNumber(355), "355");
+  EXPECT_EQ(formatNumber(123456), "123456");
+  EXPECT_EQ(formatNumber(2e9), "2e9");
+  EXPECT_EQ(formatCount(7), "7");
+  EXPECT_EQ(formatCount(54935), "54,935");
+  EXPECT_EQ(formatCount(1234567), "1,234,567");
+  EXPECT_EQ(formatShare(0.6392), "63.9 %");
+  EXPECT_EQ(formatShare(0.0001), "<0.1 %");
+  EXPECT_EQ(formatShare(1), "100 %");
+}
+
+}  // namespace
+}  // namespace hpsdf::render
