@@ -1,9 +1,12 @@
 #include "color_view.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <numbers>
 #include <unordered_map>
 
 namespace hpsdf::render {
@@ -15,6 +18,7 @@ constexpr Color kIsoLine = {24, 28, 44};
 constexpr Color kZeroLine = {10, 10, 20};
 constexpr Color kSurfaceLine = {255, 255, 255};
 constexpr Color kSurfaceCasing = {16, 14, 34};
+constexpr Color kClay = {210, 153, 119};
 
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
@@ -33,21 +37,23 @@ float smoothStep(double low, double high, double x) {
   return static_cast<float>(t * t * (3 - 2 * t));
 }
 
-// Calls colorRow(y, row) for each row of samples and averages them down to pixels.
+// Calls colorRow(y, row) for each row of samples, in several threads, and averages them down to pixels.
 template <typename ColorRow>
 Image average(const ViewBuffers& buffers, int samples, const ColorRow& colorRow) {
   Image image(buffers.width / samples, buffers.height / samples, kPaper);
-  std::vector<LinearColor> row(buffers.width);
-  std::vector<LinearColor> sums(image.width);
   const float share = 1.0F / float(samples * samples);
-  for (int y = 0; y < image.height; ++y) {
-    std::fill(sums.begin(), sums.end(), LinearColor::Zero());
-    for (int sampleRow = 0; sampleRow < samples; ++sampleRow) {
-      colorRow(y * samples + sampleRow, row);
-      for (int x = 0; x < image.width * samples; ++x) sums[x / samples] += row[x];
+  tbb::parallel_for(tbb::blocked_range<int>(0, image.height), [&](const tbb::blocked_range<int>& rows) {
+    std::vector<LinearColor> row(buffers.width);
+    std::vector<LinearColor> sums(image.width);
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      std::fill(sums.begin(), sums.end(), LinearColor::Zero());
+      for (int sampleRow = 0; sampleRow < samples; ++sampleRow) {
+        colorRow(y * samples + sampleRow, row);
+        for (int x = 0; x < image.width * samples; ++x) sums[x / samples] += row[x];
+      }
+      for (int x = 0; x < image.width; ++x) image.at(x, y) = encodeSrgb(share * sums[x]);
     }
-    for (int x = 0; x < image.width; ++x) image.at(x, y) = encodeSrgb(share * sums[x]);
-  }
+  });
   return image;
 }
 
@@ -168,68 +174,150 @@ class Contours {
   double sampleSize_;
 };
 
-// Lighting of the surface, in the camera's frame: x right, y up, z towards the eye. Like a photographer's: a warm key
-// light from above left, a cool fill from the right, a rim from behind, sky above ground.
+// Where the samples of a view hit the surface, in the camera's frame: x right, y up, z towards the eye, which is the
+// origin.
+class CameraFrame {
+ public:
+  CameraFrame(const ViewBuffers& buffers, const Pinhole& camera) : buffers_(buffers) {
+    axes_.row(0) = camera.right.normalized().cast<float>();
+    axes_.row(1) = camera.up.normalized().cast<float>();
+    axes_.row(2) = -camera.forward.normalized().cast<float>();
+    halfWidth_ = static_cast<float>(camera.right.norm());
+    halfHeight_ = static_cast<float>(camera.up.norm());
+  }
+
+  Eigen::Vector3f ray(int x, int y) const {
+    const float u = 2 * (float(x) + 0.5F) / float(buffers_.width) - 1;
+    const float v = 1 - 2 * (float(y) + 0.5F) / float(buffers_.height);
+    return Eigen::Vector3f(u * halfWidth_, v * halfHeight_, -1).normalized();
+  }
+
+  Eigen::Vector3f position(int x, int y) const { return buffers_.distance[index(x, y)] * ray(x, y); }
+
+  // Where jumps of the field turn a visible point's normal away from the eye, the nearest that does not: else single
+  // dark samples speckle the silhouettes.
+  Eigen::Vector3f normal(int x, int y, const Eigen::Vector3f& toEye) const {
+    const Eigen::Vector3f n = axes_ * buffers_.normal[index(x, y)];
+    const float facing = n.dot(toEye);
+    return facing >= 0 ? n : (n - facing * toEye).normalized();
+  }
+
+  // Height of the view at this distance before the eye.
+  float heightAt(float depth) const { return 2 * halfHeight_ * depth; }
+
+ private:
+  std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
+
+  const ViewBuffers& buffers_;
+  Eigen::Matrix3f axes_;                  // rows: the camera's axes
+  float halfWidth_ = 0, halfHeight_ = 0;  // at distance 1
+};
+
+// How open the surface is to the light all around, from the neighbourhood on the screen: what rises above a point's
+// tangent plane nearby takes light from it. Folds and contacts darken, which shows shape better than lamps do.
+class Openness {
+ public:
+  Openness(const ViewBuffers& buffers, const CameraFrame& frame) : buffers_(buffers), frame_(frame) {
+    // Rings of taps, each turned against the one within, the same for all pixels: no noise.
+    for (int ring = 1; ring <= kRings; ++ring)
+      for (int i = 0; i < kTapsInRing; ++i) {
+        const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;
+        const double radius = kReach * buffers.height * ring * ring / (kRings * kRings);
+        taps_.push_back({static_cast<int>(std::lround(radius * std::cos(angle))),
+                         static_cast<int>(std::lround(radius * std::sin(angle)))});
+      }
+  }
+
+  /// 1 in the open, towards 0 in a deep fold.
+  float operator()(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
+    const float reach = float(kReach) * frame_.heightAt(-position.z());
+    float taken = 0;
+    for (const auto& [dx, dy] : taps_) {
+      const int tapX = x + dx, tapY = y + dy;
+      if (tapX < 0 || tapX >= buffers_.width || tapY < 0 || tapY >= buffers_.height) continue;
+      if (!buffers_.hit(std::size_t(tapY) * buffers_.width + tapX)) continue;
+      const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
+      const float distance = towards.norm();
+      if (distance <= 0) continue;
+      // What is far away before the point hides it from the eye but not from the light.
+      const float near = std::max(0.0F, 1 - distance / (3 * reach));
+      taken += near * std::max(0.0F, towards.dot(normal) / distance - float(kTolerance));
+    }
+    return std::max(0.0F, 1 - float(kStrength) * taken / float(taps_.size()));
+  }
+
+ private:
+  static constexpr int kRings = 3, kTapsInRing = 6;
+  static constexpr double kReach = 0.035;     // of the view's height
+  static constexpr double kTolerance = 0.06;  // sine of the rise that counts as flat
+  static constexpr double kStrength = 2.6;
+
+  struct Tap {
+    int dx, dy;
+  };
+
+  const ViewBuffers& buffers_;
+  const CameraFrame& frame_;
+  std::vector<Tap> taps_;
+};
+
+// Lamps that stay with the camera, in its frame. Like a photographer's: a warm key light from above left, a cool fill
+// from the right, a rim from behind, sky above ground.
 struct Lights {
-  Eigen::Vector3f key = Eigen::Vector3f(-0.48F, 0.62F, 0.62F).normalized();
+  Eigen::Vector3f key = Eigen::Vector3f(-0.55F, 0.62F, 0.56F).normalized();
   Eigen::Vector3f fill = Eigen::Vector3f(0.85F, 0.10F, 0.52F).normalized();
   Eigen::Vector3f rim = Eigen::Vector3f(0.35F, 0.55F, -0.76F).normalized();
-  LinearColor keyColor = {1.00F, 0.94F, 0.84F};
-  LinearColor fillColor = {0.20F, 0.25F, 0.33F};
-  LinearColor rimColor = {0.22F, 0.25F, 0.30F};
-  LinearColor sky = {0.29F, 0.32F, 0.37F};
-  LinearColor ground = {0.13F, 0.11F, 0.095F};
+  LinearColor keyColor = {0.98F, 0.91F, 0.80F};
+  LinearColor fillColor = {0.12F, 0.16F, 0.23F};
+  LinearColor rimColor = {0.26F, 0.30F, 0.36F};
+  LinearColor sky = {0.26F, 0.29F, 0.34F};
+  LinearColor ground = {0.10F, 0.08F, 0.07F};
 
-  LinearColor diffuse(const Eigen::Vector3f& n) const {
-    const float wrapped = std::max(0.0F, (n.dot(key) + 0.15F) / 1.15F);
-    return keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim)) +
-           mix(ground, sky, 0.5F + 0.5F * n.y());
+  LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
+    const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
+    const LinearColor lamps =
+        keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
+    // A fold keeps the sky off wholly, a lamp in part.
+    return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
   }
 
   // Blinn-Phong of the key light, and the sky mirrored at grazing angles (Schlick's Fresnel term).
   LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
     const Eigen::Vector3f half = (key + toEye).normalized();
-    const float highlight = 0.16F * std::pow(std::max(0.0F, n.dot(half)), 42.0F);
+    const float highlight = 0.13F * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
     const float facing = 1 - std::clamp(n.dot(toEye), 0.0F, 1.0F);
-    const float fresnel = 0.10F * facing * facing * facing * facing;
+    const float fresnel = 0.12F * facing * facing * facing * facing;
     return keyColor * highlight + sky * fresnel;
   }
 };
 
-const LinearColor kClay = decodeSrgb({214, 190, 160});
-
 class SurfaceShader {
  public:
   SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color)
-      : buffers_(buffers), camera_(camera), map_(map), color_(color) {
-    axes_.row(0) = camera.right.normalized().cast<float>();
-    axes_.row(1) = camera.up.normalized().cast<float>();
-    axes_.row(2) = -camera.forward.normalized().cast<float>();
-  }
+      : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), map_(map), color_(color) {}
+  SurfaceShader(const SurfaceShader&) = delete;  // openness_ refers to frame_
 
   LinearColor operator()(int x, int y) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
-    const Eigen::Vector3f n = axes_ * buffers_.normal[i];
-    if (color_ == SurfaceColor::normal) return kClay.cwiseProduct(lights_.diffuse(n)) + lights_.gloss(n, toEye(x, y));
+    const Eigen::Vector3f toEye = -frame_.ray(x, y);
+    const Eigen::Vector3f n = frame_.normal(x, y, toEye);
+    const float open = openness_(x, y, frame_.position(x, y), n);
+    if (color_ == SurfaceColor::normal)
+      return clay_.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
     const LinearColor& level = map_(color_ == SurfaceColor::degree ? buffers_.degree[i] : buffers_.depth[i]);
     // Softer than clay, and without colour of its own: the legend's colour must stay recognisable.
-    const float light = 0.52F + 0.56F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
-    return level * light + LinearColor::Constant(0.4F * lights_.gloss(n, toEye(x, y)).mean());
+    const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
+    return level * light * (0.35F + 0.65F * open) + LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
   }
 
  private:
-  Eigen::Vector3f toEye(int x, int y) const {
-    const double u = 2 * (x + 0.5) / buffers_.width - 1, v = 1 - 2 * (y + 0.5) / buffers_.height;
-    const Vector3 ray = camera_.forward + u * camera_.right + v * camera_.up;
-    return -(axes_ * ray.cast<float>()).normalized();
-  }
-
   const ViewBuffers& buffers_;
-  const Pinhole& camera_;
+  CameraFrame frame_;
+  Openness openness_;
   const LevelMap& map_;
   SurfaceColor color_;
   Lights lights_;
-  Eigen::Matrix3f axes_;  // rows: the camera's right, up and backward
+  LinearColor clay_ = decodeSrgb(kClay);
 };
 
 }  // namespace

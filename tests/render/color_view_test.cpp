@@ -236,6 +236,37 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(shaded(normal, still)[i], shaded(normal, turn)[i], 1);
 }
 
+// A wall before the camera whose middle steps back by `depth` in a groove, ten columns wide.
+Image groove(double depth, SurfaceColor color) {
+  ViewBuffers buffers = blank(200, 200);
+  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  forEachSample(buffers, [&](int x, int y, std::size_t i) {
+    const Vector3 ray((2 * (x + 0.5) / 200 - 1) * 0.3, (1 - 2 * (y + 0.5) / 200) * 0.3, -1);
+    const bool inGroove = x >= 95 && x < 105;
+    buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * ray.norm());
+  });
+  return colorSurface(buffers, camera, kMap, color, 1);
+}
+
+TEST(Surface, FoldsAreDarkerThanTheOpen) {
+  for (SurfaceColor color : {SurfaceColor::normal, SurfaceColor::depth}) {
+    const Image flat = groove(0, color), folded = groove(0.1, color);
+    for (int x : {95, 100, 104}) EXPECT_LT(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)) - 0.01) << x;
+    for (int x : {20, 60, 140, 180})
+      EXPECT_NEAR(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)), 0.01) << x;
+  }
+}
+
+TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
+  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const auto shaded = [&](const Eigen::Vector3f& normal) {
+    ViewBuffers buffers = blank(1, 1);
+    buffers.normal[0] = normal.normalized();
+    return lightnessOf(colorSurface(buffers, camera, kMap, SurfaceColor::normal, 1).at(0, 0));
+  };
+  EXPECT_NEAR(shaded({0, -1, -0.6F}), shaded({0, -1, 0}), 0.01);
+}
+
 TEST(Surface, LevelColorsStayRecognisableUnderShading) {
   const std::vector<int> levels = {2, 3, 4, 5, 6, 7};
   const LevelMap map(levels);

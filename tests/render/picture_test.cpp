@@ -60,6 +60,7 @@ class FakeRenderer : public Renderer {
   ViewBuffers surface(const SurfaceView&, int width, int height) override {
     ViewBuffers buffers = empty(width, height);
     buffers.normal.assign(buffers.cell.size(), Eigen::Vector3f::UnitX());
+    buffers.distance.assign(buffers.cell.size(), 1);
     for (std::size_t i = buffers.cell.size() / 2; i < buffers.cell.size(); ++i)
       fill(buffers, i, Vector3(kPlane, 0, -0.5));
     return buffers;
