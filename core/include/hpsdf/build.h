@@ -34,7 +34,7 @@ struct BuildOptions {
   /// Width in world units: cells wholly farther from the surface are not refined and do not count towards ε. 0: none.
   double band = 0;
   CoefficientType coefficients = CoefficientType::automatic;
-  int threads = 0;  ///< 0: all that the machine offers. The result does not depend on it.
+  int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };
 
 /// The paper's settings but τ and base grid.

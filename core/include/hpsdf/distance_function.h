@@ -17,11 +17,11 @@ namespace hpsdf {
 
 /// Where a signed distance comes from: kept with a field built from it.
 struct Source {
-  std::string name;               ///< the mesh file's name without its path, or a shape's spec
+  std::string name = {};          ///< the mesh file's name without its path, or a shape's spec
   std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 where there is none
   std::uint64_t vertices = 0;
   std::uint64_t faces = 0;
-  Box box;  ///< smallest box of the surface in world units; empty where it is not known
+  Box box = {};  ///< smallest box of the surface in world units; empty where it is not known
 };
 
 /// Any signed distance Φ, evaluated in batches; negative inside. Converts from anything callable, single

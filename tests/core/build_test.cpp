@@ -1,0 +1,298 @@
+#include "hpsdf/build.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+namespace {
+
+double sphere(const Vector3& x) { return x.norm() - 1; }
+double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
+Box cube(double half = 1.1) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
+
+struct Measured {
+  double rms = 0;
+  double largest = 0;
+  double weightedSquare = 0;  ///< ∫ κ(Φ) (f − Φ)², at θ = 4
+};
+
+template <typename Phi>
+Measured measure(const Field& field, Phi phi, int count = 50000) {
+  std::mt19937_64 random(5);
+  Measured m;
+  const Box& domain = field.domain();
+  const double diagonal = domain.diagonal().norm();
+  for (int n = 0; n < count; ++n) {
+    Vector3 x;
+    for (int axis = 0; axis < 3; ++axis)
+      x[axis] = std::uniform_real_distribution<double>(domain.min()[axis], domain.max()[axis])(random);
+    const double error = field.value(x) - phi(x);
+    m.rms += error * error / count;
+    m.largest = std::max(m.largest, std::abs(error));
+    m.weightedSquare += std::pow(1 - std::abs(phi(x)) / diagonal, 4) * error * error / count;
+  }
+  m.weightedSquare *= domain.sizes().prod();
+  m.rms = std::sqrt(m.rms);
+  return m;
+}
+
+TEST(Build, SphereAndTorusAreAccurate) {
+  for (const auto phi : {sphere, torus}) {
+    const Field field = build(phi, cube(), {.targetError = 1e-8});
+    const Measured m = measure(field, phi);
+    EXPECT_LT(m.rms, 1e-4);
+    EXPECT_LT(m.largest, 5e-3);
+    EXPECT_LE(field.metadata().totalError, 1e-8);
+    EXPECT_GT(field.metadata().totalError, 0.9e-8);
+    EXPECT_LT(m.weightedSquare, 1.3e-8);
+    EXPECT_NEAR(field.metadata().rmsEstimate(field.domain()), std::sqrt(field.metadata().totalError / std::pow(2.2, 3)),
+                1e-12);
+  }
+}
+
+/// The paper's variants (figs. 3 and 4): own trial samples at order 4p, and octree alone. The shell of degree 1 is the
+/// whole slope, so that h1 counts far more error than is there: a coarser target keeps it small.
+TEST(Build, OctreeAloneNeedsMoreCoefficients) {
+  const auto coefficients = [](Strategy strategy, double targetError) {
+    BuildOptions options = paperOptions();
+    options.strategy = strategy;
+    options.targetError = targetError;
+    const Field field = build(torus, cube(), options);
+    EXPECT_LE(field.metadata().totalError, targetError);
+    const FieldStatistics s = statistics(field);
+    if (strategy != Strategy::hp) {
+      EXPECT_EQ(s.degreeLeaves.size(), 1u);
+      EXPECT_EQ(s.degreeLeaves.begin()->first, strategy == Strategy::h1 ? 1 : 2);
+    }
+    EXPECT_LT(measure(field, torus).rms, std::sqrt(targetError));
+    return double(s.coefficients);
+  };
+  EXPECT_GT(coefficients(Strategy::h2, 1e-5), 3 * coefficients(Strategy::hp, 1e-5));
+  EXPECT_GT(coefficients(Strategy::h1, 1e-2), 3 * coefficients(Strategy::hp, 1e-2));
+}
+
+TEST(Build, TotalErrorIsTheWeightedSumOverTheCells) {
+  const BuildOptions options{.targetError = 1e-6, .nearness = 3, .coefficients = CoefficientType::float64};
+  const Field field = build(torus, cube(), options);
+  double sum = 0;
+  field.forEachCell([&](const Cell& cell) {
+    const auto& c = std::get<0>(field.data().coefficients);
+    const double mean = c[node::offset(field.data().nodes[cell.id])];
+    sum += std::pow(1 - std::abs(mean) / cube().diagonal().norm(), 3) * cell.error;
+  });
+  EXPECT_NEAR(sum, field.metadata().totalError, 1e-12);
+}
+
+std::string fileBytes(const Field& field, const std::filesystem::path& file) {
+  save(field, file);
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(Build, SameBytesForAnyNumberOfThreads) {
+  support::TemporaryDirectory folder;
+  std::string first;
+  const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);  // more than there are cores
+  for (const int threads : {1, 2, 3, 8}) {
+    const Field field = build(torus, cube(), {.targetError = 1e-7, .threads = threads});
+    const std::string bytes = fileBytes(field, folder.path() / "field.hpsdf");
+    if (first.empty()) first = bytes;
+    EXPECT_TRUE(bytes == first) << threads << " threads";
+  }
+}
+
+/// The same τ gives the same cells in any unit; powers of two change no rounding, so that the match is exact.
+TEST(Build, TargetErrorIsMeantAtThePapersScale) {
+  const Field one = build(DistanceFunction(sphere, Source{.box = cube(1)}), cube(), {.targetError = 1e-6});
+  const auto large = [](const Vector3& x) { return x.norm() - 1024; };
+  const Field other =
+      build(DistanceFunction(large, Source{.box = cube(1024)}), cube(1024 * 1.1), {.targetError = 1e-6});
+  EXPECT_EQ(one.data().nodes, other.data().nodes);
+  EXPECT_DOUBLE_EQ(one.metadata().totalError, other.metadata().totalError);
+  EXPECT_NEAR(other.metadata().rmsEstimate(other.domain()), 1024 * one.metadata().rmsEstimate(one.domain()), 1e-9);
+  // a callable that tells no box is scaled by its domain
+  const Field bare = build(large, cube(1024 * 1.1), {.targetError = 1e-6});
+  EXPECT_DOUBLE_EQ(bare.metadata().referenceLength, 2048);
+}
+
+TEST(Build, FloatCoefficientsChangeTheFieldByWhatIsStated) {
+  const Field exact = build(torus, cube(), {.targetError = 1e-7, .coefficients = CoefficientType::float64});
+  const Field rounded = build(torus, cube(), {.targetError = 1e-7, .coefficients = CoefficientType::float32});
+  EXPECT_EQ(exact.data().nodes, rounded.data().nodes);
+  EXPECT_FALSE(exact.singlePrecision());
+  EXPECT_TRUE(rounded.singlePrecision());
+  EXPECT_EQ(exact.metadata().roundingRms, 0);
+  const Measured m = measure(rounded, [&](const Vector3& x) { return exact.value(x); });
+  EXPECT_GT(m.rms, 0);
+  EXPECT_NEAR(m.rms / rounded.metadata().roundingRms, 1, 0.1);
+}
+
+TEST(Build, AutomaticPrecisionFollowsTheTarget) {
+  EXPECT_TRUE(build(sphere, cube(), {.targetError = 1e-6}).singlePrecision());
+  // RMS 1e-9 asked for: float would round by more than 1 % of that
+  const auto smooth = [](const Vector3& x) { return 0.1 * x.x() * x.y() * x.z() + std::sin(x.x()) + 10; };
+  EXPECT_FALSE(build(smooth, cube(), {.targetError = 1e-17, .nearness = 0}).singlePrecision());
+}
+
+TEST(Build, LimitsHold) {
+  const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
+  const FieldStatistics s = statistics(shallow);
+  EXPECT_LE(s.depthLeaves.rbegin()->first, 1);
+  EXPECT_EQ(s.degreeLeaves.rbegin()->first, 6);    // at the depth limit only the degree can rise
+  EXPECT_GT(shallow.metadata().totalError, 1e-9);  // and it ended because nothing was left to refine
+  const Field flat = build(torus, cube(), {.targetError = 1e-6, .maxDegree = 2});
+  EXPECT_EQ(statistics(flat).degreeLeaves.size(), 1u);
+  const Field base = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 2, .maxDepth = 0});
+  EXPECT_EQ(statistics(base).leaves, 216u);
+}
+
+/// Φ even about the centre of a single base cell: every odd shell is empty, and the embedded estimate alone would take
+/// the first one for convergence.
+TEST(Build, SymmetryDoesNotLookLikeConvergence) {
+  const Field field = build(sphere, cube(), {.targetError = 1e-8, .grid = {1, 1, 1}});
+  EXPECT_GT(statistics(field).leaves, 50u);
+  EXPECT_LT(measure(field, sphere).rms, 1e-4);
+}
+
+TEST(Build, BandLeavesFarCellsAlone) {
+  const BuildOptions everywhere{.targetError = 1e-8, .nearness = 0};
+  BuildOptions near = everywhere;
+  near.band = 0.1;
+  const Field whole = build(torus, cube(), everywhere);
+  const Field banded = build(torus, cube(), near);
+  EXPECT_LT(statistics(banded).leaves, statistics(whole).leaves);
+  banded.forEachCell([&](const Cell& cell) {
+    const double closest = std::abs(torus(cell.box.center())) - cell.box.diagonal().norm() / 2;
+    if (closest > 0.2) {
+      EXPECT_LE(cell.degree, 3);
+    }
+    if (closest > 0.2) {
+      EXPECT_LE(cell.depth, 1);
+    }
+  });
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1.1, 1.1);
+  double square = 0;
+  int count = 0;
+  while (count < 20000) {
+    const Vector3 x(uniform(random), uniform(random), uniform(random));
+    if (std::abs(torus(x)) > 0.1) continue;
+    square += std::pow(banded.value(x) - torus(x), 2);
+    ++count;
+  }
+  EXPECT_LT(std::sqrt(square / count), 1e-4);
+}
+
+/// A higher θ moves the error away from the surface: at equal τ fewer coefficients, lost far away.
+TEST(Build, NearnessFavoursTheSurface) {
+  const auto farOverNear = [](double nearness) {
+    const Field field = build(torus, cube(), {.targetError = 1e-6, .nearness = nearness});
+    std::mt19937_64 random(6);
+    std::uniform_real_distribution<double> uniform(-1.1, 1.1);
+    double near = 0, far = 0;
+    int nearCount = 0, farCount = 0;
+    for (int n = 0; n < 100000; ++n) {
+      const Vector3 x(uniform(random), uniform(random), uniform(random));
+      const bool isNear = std::abs(torus(x)) < 0.1;
+      (isNear ? near : far) += std::pow(field.value(x) - torus(x), 2);
+      ++(isNear ? nearCount : farCount);
+    }
+    return std::sqrt(far / farCount) / std::sqrt(near / nearCount);
+  };
+  EXPECT_GT(farOverNear(32), 2 * farOverNear(0));
+}
+
+TEST(Build, BoxesAndGridsNeedNotBeCubic) {
+  const Box domain(Vector3(-1.2, -1.3, -0.5), Vector3(1.1, 1.2, 0.6));
+  const Field field = build(torus, domain, {.targetError = 1e-7, .grid = {5, 4, 2}});
+  EXPECT_LT(measure(field, torus).rms, 3e-4);
+  EXPECT_EQ(field.grid(), (std::array<std::uint32_t, 3>{5, 4, 2}));
+}
+
+TEST(Build, TakesBatchedCallables) {
+  std::atomic<std::size_t> calls = 0;
+  const auto batched = [&](std::span<const Vector3> points, std::span<double> out) {
+    calls += points.size();
+    for (std::size_t i = 0; i < points.size(); ++i) out[i] = torus(points[i]);
+  };
+  const Field field = build(batched, cube(), {.targetError = 1e-6});
+  EXPECT_EQ(field.data().nodes, build(torus, cube(), {.targetError = 1e-6}).data().nodes);
+  EXPECT_EQ(field.metadata().exactEvaluations, calls);
+}
+
+TEST(Build, ProgressRisesAndCancelStops) {
+  double last = 0;
+  std::size_t reports = 0;
+  bool rises = true;
+  Progress progress;
+  progress.report = [&](std::string_view task, double fraction) {
+    if (task != "refining") return;
+    rises = rises && fraction >= last;
+    last = fraction;
+    ++reports;
+  };
+  build(torus, cube(), {.targetError = 1e-7}, progress);
+  EXPECT_TRUE(rises);
+  EXPECT_GT(reports, 10u);
+  EXPECT_GT(last, 0.5);
+
+  std::atomic<int> calls = 0;
+  progress.cancelled = [&] { return ++calls > 100; };
+  EXPECT_THROW(build(torus, cube(), {.targetError = 1e-9}, progress), Cancelled);
+}
+
+TEST(Build, RefusesBadOptions) {
+  const auto refuses = [](const BuildOptions& options, const std::string& word, const Box& domain = cube()) {
+    try {
+      build(torus, domain, options);
+      ADD_FAILURE() << "accepted: " << word;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+    }
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refuses({.targetError = 0}, "target error");
+  refuses({.targetError = -1}, "target error");
+  refuses({.targetError = nan}, "target error");
+  refuses({.grid = {6, 0, 6}}, "base grid");
+  refuses({.grid = {100000, 100000, 100000}}, "base grid");
+  refuses({.nearness = -1}, "nearness");
+  refuses({.maxDegree = 31}, "degree");
+  refuses({.maxDegree = 0}, "degree");
+  refuses({.maxDepth = 21}, "depth");
+  refuses({.quadrature = 1}, "quadrature");
+  refuses({.band = -1}, "band");
+  refuses({.threads = -1}, "threads");
+  refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, 1, 0)));
+  refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, nan, 1)));
+}
+
+TEST(Build, RefusesDistancesThatAreNotFinite) {
+  const auto broken = [](const Vector3& x) { return x.x() > 0.5 ? std::log(-1.0) : x.norm(); };
+  EXPECT_THROW(build(broken, cube()), Error);
+}
+
+TEST(DomainAround, EnlargesAsThePaperDoes) {
+  const Box surface(Vector3(0, 0, 0), Vector3(4, 2, 1));
+  const Box cubic = domainAround(surface);
+  EXPECT_TRUE(cubic.sizes().isApprox(Vector3::Constant(4.4)));
+  EXPECT_TRUE(cubic.center().isApprox(Vector3(2, 1, 0.5)));
+  const Box box = domainAround(surface, DomainShape::box, 0.5);
+  EXPECT_TRUE(box.sizes().isApprox(Vector3(6, 3, 1.5)));
+  EXPECT_THROW(domainAround(Box()), Error);
+}
+
+}  // namespace
+}  // namespace hpsdf

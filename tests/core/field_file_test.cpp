@@ -1,0 +1,167 @@
+#include "hpsdf/field_file.h"
+
+#include <gtest/gtest.h>
+#include <xxhash.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <string>
+
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "hpsdf/output_file.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+namespace {
+
+double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
+
+Field small(CoefficientType type = CoefficientType::float64) {
+  const Source source{"tōrus.obj", 0x123456789abcdef0u, 5, 6, Box(Vector3::Constant(-1), Vector3::Constant(1))};
+  return build(DistanceFunction(torus, source), Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)),
+               {.targetError = 1e-4, .nearness = 3, .maxDegree = 9, .maxDepth = 5, .band = 0.4, .coefficients = type});
+}
+
+std::string readAll(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void writeAll(const std::filesystem::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// The message of the error that loading ends with; empty when it does not.
+std::string refusal(const std::filesystem::path& file) {
+  try {
+    load(file);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(FieldFile, RoundTripKeepsEveryByteAndValue) {
+  support::TemporaryDirectory folder;
+  for (const auto type : {CoefficientType::float32, CoefficientType::float64}) {
+    const Field field = small(type);
+    save(field, folder.path() / "a.hpsdf");
+    const Field again = load(folder.path() / "a.hpsdf");
+    save(again, folder.path() / "b.hpsdf");
+    EXPECT_TRUE(readAll(folder.path() / "a.hpsdf") == readAll(folder.path() / "b.hpsdf"));
+    EXPECT_EQ(again.data().nodes, field.data().nodes);
+    EXPECT_EQ(again.data().coefficients, field.data().coefficients);
+    EXPECT_EQ(again.metadata().source.name, "tōrus.obj");
+    EXPECT_EQ(again.metadata().source.fingerprint, 0x123456789abcdef0u);
+    EXPECT_EQ(again.metadata().totalError, field.metadata().totalError);
+    EXPECT_EQ(again.metadata().roundingRms, field.metadata().roundingRms);
+    EXPECT_EQ(again.metadata().maxDepth, 5u);
+    EXPECT_EQ(again.metadata().band, 0.4);
+    EXPECT_TRUE(again.domain().isApprox(field.domain(), 0));
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+    for (int n = 0; n < 1000; ++n) {
+      const Vector3 x(uniform(random), uniform(random), uniform(random));
+      EXPECT_EQ(again.value(x), field.value(x));
+      EXPECT_EQ(again.valueAndGradient(x).gradient, field.valueAndGradient(x).gradient);
+    }
+  }
+}
+
+TEST(FieldFile, EveryTruncationIsRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "cut.hpsdf";
+  save(small(), file);
+  const std::string whole = readAll(file);
+  for (std::size_t length = 0; length < whole.size(); length += length < 400 ? 1 : 997) {
+    writeAll(file, whole.substr(0, length));
+    const std::string message = refusal(file);
+    ASSERT_FALSE(message.empty()) << length << " of " << whole.size() << " bytes";
+    ASSERT_NE(message.find("cut.hpsdf"), std::string::npos) << message;
+  }
+  writeAll(file, whole + "x");
+  EXPECT_NE(refusal(file).find("too long"), std::string::npos);
+}
+
+TEST(FieldFile, EveryFlippedBitIsRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "flipped.hpsdf";
+  save(small(), file);
+  const std::string whole = readAll(file);
+  std::mt19937_64 random(2);
+  for (int n = 0; n < 1500; ++n) {
+    std::string bytes = whole;
+    const std::size_t position = n < 400 ? std::size_t(n) % whole.size() : random() % whole.size();
+    bytes[position] = char(bytes[position] ^ (1 << (random() % 8)));
+    writeAll(file, bytes);
+    ASSERT_FALSE(refusal(file).empty()) << "byte " << position;
+  }
+}
+
+TEST(FieldFile, OtherFilesAreNamedForWhatTheyAre) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "other.hpsdf";
+  EXPECT_NE(refusal(file).find("no such file"), std::string::npos);
+  EXPECT_NE(refusal(folder.path()).find("folder"), std::string::npos);
+  writeAll(file, "");
+  EXPECT_NE(refusal(file).find("not a .hpsdf file"), std::string::npos);
+  writeAll(file, "solid cube\nfacet normal 0 0 1\n");
+  EXPECT_NE(refusal(file).find("not a .hpsdf file"), std::string::npos);
+  save(small(), file);
+  std::string bytes = readAll(file);
+  bytes[8] = 2;
+  writeAll(file, bytes);
+  EXPECT_NE(refusal(file).find("version 2"), std::string::npos);
+}
+
+/// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
+TEST(FieldFile, ForgedFilesAreRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "forged.hpsdf";
+  save(small(), file);
+  const std::string whole = readAll(file);
+  const auto forge = [&](std::size_t position, auto value) {
+    std::string bytes = whole;
+    std::memcpy(&bytes[position], &value, sizeof(value));
+    const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
+    std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
+    writeAll(file, bytes);
+    return refusal(file);
+  };
+  EXPECT_EQ(forge(0, whole[0]), "");  // the forger's checksum is right
+  EXPECT_NE(forge(16, std::uint64_t{1} << 61), "");
+  EXPECT_NE(forge(24, std::uint64_t{1} << 61), "");
+  EXPECT_NE(forge(12, std::uint32_t{5}), "");
+  EXPECT_NE(forge(32, std::uint32_t{0xffffffff}), "");
+  const std::size_t header = 12 + 4 + 16 + 12 + 48;
+  EXPECT_NE(forge(header, std::uint32_t{0xffffffff}), "");  // length of the name
+}
+
+TEST(OutputFile, AppearsWholeOrNotAtAll) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "out.txt";
+  writeAll(file, "old");
+  {
+    OutputFile output(file);
+    output.write("half");
+  }
+  EXPECT_EQ(readAll(file), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+  OutputFile output(file);
+  output.write("new");
+  output.commit();
+  EXPECT_EQ(readAll(file), "new");
+  EXPECT_THROW(OutputFile{folder.path()}, Error);
+  EXPECT_THROW(OutputFile{folder.path() / "no" / "such" / "folder.txt"}, Error);
+  EXPECT_THROW(OutputFile{""}, Error);
+  EXPECT_THROW(checkWritable("/dev/full"), Error);
+  EXPECT_NO_THROW(checkWritable(folder.path() / "later.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "later.txt"));
+}
+
+}  // namespace
+}  // namespace hpsdf

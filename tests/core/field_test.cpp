@@ -1,0 +1,202 @@
+#include "hpsdf/field.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+#include <thread>
+
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
+
+Box unitDomain() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
+
+const Field& torusField() {
+  static const Field field = build(torus, unitDomain(), {.targetError = 1e-6});
+  return field;
+}
+
+Vector3 randomPoint(std::mt19937_64& random, double half) {
+  std::uniform_real_distribution<double> uniform(-half, half);
+  const double x = uniform(random), y = uniform(random);
+  return {x, y, uniform(random)};
+}
+
+/// Two base cells along x, the second split once; every leaf holds the constant of its place.
+FieldData steps() {
+  FieldData data;
+  data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
+  data.grid = {2, 1, 1};
+  data.nodes = {node::leaf(0, 0), node::internal(2)};
+  std::vector<double> constants = {100};
+  for (std::uint32_t child = 0; child < 8; ++child) {
+    data.nodes.push_back(node::leaf(0, child + 1));
+    constants.push_back(child);
+  }
+  data.coefficients = constants;
+  return data;
+}
+
+TEST(Field, CellsAreHalfOpen) {
+  const Field field(steps());
+  EXPECT_EQ(field.value({0.9999, 0.5, 0.5}), 100);
+  EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // the face belongs to the upper cell
+  EXPECT_EQ(field.value({1.5, 0.2, 0.2}), 1);  // child x
+  EXPECT_EQ(field.value({1.2, 0.5, 0.2}), 2);  // child y
+  EXPECT_EQ(field.value({1.2, 0.2, 0.5}), 4);  // child z
+  EXPECT_EQ(field.value({2, 1, 1}), 7);        // the domain itself is closed
+  EXPECT_EQ(field.value({1.49, 0.49, 0.49}), 0);
+}
+
+TEST(Field, CellLookup) {
+  const Field field(steps());
+  const Cell cell = field.cellAt({1.7, 0.1, 0.8});
+  EXPECT_EQ(cell.id, 2u + 5u);
+  EXPECT_EQ(cell.depth, 1);
+  EXPECT_EQ(cell.degree, 0);
+  EXPECT_TRUE(cell.box.min().isApprox(Vector3(1.5, 0, 0.5)));
+  EXPECT_TRUE(cell.box.max().isApprox(Vector3(2, 0.5, 1)));
+}
+
+TEST(Field, EveryLeafIsVisitedOnceAndFillsTheDomain) {
+  const Field& field = torusField();
+  std::set<std::uint32_t> seen;
+  double volume = 0;
+  field.forEachCell([&](const Cell& cell) {
+    EXPECT_TRUE(seen.insert(cell.id).second);
+    volume += cell.box.sizes().prod();
+    const Cell found = field.cellAt(cell.box.center());
+    EXPECT_EQ(found.id, cell.id);
+    EXPECT_EQ(found.depth, cell.depth);
+    EXPECT_EQ(found.degree, cell.degree);
+    EXPECT_EQ(found.error, cell.error);
+    EXPECT_TRUE(found.box.isApprox(cell.box, 1e-14));
+  });
+  EXPECT_NEAR(volume, std::pow(2.2, 3), 1e-9);
+  EXPECT_EQ(seen.size(), statistics(field).leaves);
+}
+
+TEST(Field, StatisticsAddUp) {
+  const FieldStatistics s = statistics(torusField());
+  double degrees = 0, depths = 0;
+  std::size_t coefficients = 0;
+  for (const auto& [level, share] : s.degreeVolume) degrees += share;
+  for (const auto& [level, share] : s.depthVolume) depths += share;
+  for (const auto& [degree, leaves] : s.degreeLeaves) coefficients += leaves * coefficientCount(degree);
+  EXPECT_NEAR(degrees, 1, 1e-12);
+  EXPECT_NEAR(depths, 1, 1e-12);
+  EXPECT_EQ(coefficients, s.coefficients);
+  EXPECT_EQ(s.nodes, 216 + (s.leaves - 216) / 7 * 8);
+  EXPECT_EQ(s.bytes, s.nodes * 8 + s.coefficients * 4);
+}
+
+TEST(Field, GradientMatchesCentralDifferencesWithinCells) {
+  const Field field = build(torus, unitDomain(), {.targetError = 1e-8, .coefficients = CoefficientType::float64});
+  std::mt19937_64 random(1);
+  const double step = 1e-5;
+  int compared = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const Vector3 x = randomPoint(random, 1.09);
+    const Cell cell = field.cellAt(x);
+    if ((x - cell.box.min()).minCoeff() < 2 * step || (cell.box.max() - x).minCoeff() < 2 * step) continue;
+    const auto result = field.valueAndGradient(x);
+    EXPECT_EQ(result.value, field.value(x));
+    Vector3 difference;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3 d = Vector3::Unit(axis) * step;
+      difference[axis] = (field.value(x + d) - field.value(x - d)) / (2 * step);
+    }
+    ASSERT_LT((difference - result.gradient).norm(), 1e-6 * result.gradient.norm() + 1e-9) << x.transpose();
+    ++compared;
+  }
+  EXPECT_GT(compared, 15000);
+}
+
+TEST(Field, ContinuesOutsideWithMatchingGradient) {
+  const Field& field = torusField();
+  std::mt19937_64 random(2);
+  int outside = 0;
+  for (int n = 0; n < 5000; ++n) {
+    const Vector3 x = randomPoint(random, 3);
+    if (field.domain().exteriorDistance(x) < 1e-3) continue;
+    ++outside;
+    const Vector3 q = x.cwiseMax(field.domain().min()).cwiseMin(field.domain().max());
+    const auto result = field.valueAndGradient(x);
+    EXPECT_EQ(result.value, field.value(x));
+    EXPECT_NEAR(result.value, field.value(q) + (x - q).norm(), 1e-12);
+    const Cell cell = field.cellAt(x);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double step = 1e-6;
+      const Vector3 d = Vector3::Unit(axis) * step;
+      const bool free = q[axis] == x[axis];
+      if (free && (x[axis] - cell.box.min()[axis] < 2 * step || cell.box.max()[axis] - x[axis] < 2 * step)) continue;
+      EXPECT_NEAR(result.gradient[axis], (field.value(x + d) - field.value(x - d)) / (2 * step), 1e-6);
+    }
+  }
+  EXPECT_GT(outside, 3000);
+  // continuous across the border
+  for (int n = 0; n < 200; ++n) {
+    Vector3 x = randomPoint(random, 1.0);
+    x[n % 3] = 1.1;
+    const Vector3 beyond = x + Vector3::Unit(n % 3) * 1e-9;
+    EXPECT_NEAR(field.value(x), field.value(beyond), 1e-8);
+  }
+}
+
+TEST(Field, NotANumberAndInfinityAreAnswered) {
+  const Field& field = torusField();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(std::isnan(field.value({nan, 0, 0})));
+  EXPECT_TRUE(std::isnan(field.valueAndGradient({0, nan, 0}).value));
+  EXPECT_EQ(field.value({infinity, 0, 0}), infinity);
+  EXPECT_EQ(field.value({0, -infinity, 0}), infinity);
+}
+
+TEST(Field, BatchesAndThreadsGiveTheSameBits) {
+  const Field& field = torusField();
+  std::mt19937_64 random(4);
+  std::vector<Vector3> points(5000);
+  for (Vector3& x : points) x = randomPoint(random, 1.5);
+  std::vector<double> values(points.size());
+  std::vector<ValueAndGradient> both(points.size());
+  field.values(points, values);
+  std::thread other([&] { field.valuesAndGradients(points, both); });
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_EQ(values[i], field.value(points[i]));
+  other.join();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(both[i].value, values[i]);
+    EXPECT_EQ(both[i].gradient, field.valueAndGradient(points[i]).gradient);
+  }
+}
+
+TEST(Field, RefusesArraysThatAreNoField) {
+  const auto refuses = [](auto&& spoil) {
+    FieldData data = steps();
+    spoil(data);
+    EXPECT_THROW(Field{std::move(data)}, Error);
+  };
+  EXPECT_NO_THROW(Field{steps()});
+  refuses([](FieldData& d) { d.domain.setEmpty(); });
+  refuses([](FieldData& d) { d.domain.max().x() = std::numeric_limits<double>::infinity(); });
+  refuses([](FieldData& d) { d.grid = {0, 1, 1}; });
+  refuses([](FieldData& d) { d.grid = {0xffffffff, 0xffffffff, 0xffffffff}; });
+  refuses([](FieldData& d) { d.nodes.pop_back(); });
+  refuses([](FieldData& d) { d.nodes[0] = node::internal(2); });  // children of two nodes
+  refuses([](FieldData& d) { d.nodes[1] = node::internal(1); });  // its own child
+  refuses([](FieldData& d) { d.nodes[1] = node::internal(3); });  // not the start of a group
+  refuses([](FieldData& d) { d.nodes[1] = node::leaf(0, 0); });   // orphans
+  refuses([](FieldData& d) { d.nodes[2] = node::leaf(0, 9); });   // coefficient beyond the end
+  refuses([](FieldData& d) { d.nodes[2] = node::leaf(31, 0); });
+  refuses([](FieldData& d) { std::get<0>(d.coefficients)[3] = std::nan(""); });
+}
+
+}  // namespace
+}  // namespace hpsdf

@@ -1,0 +1,60 @@
+#include "basis/legendre.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace hpsdf {
+namespace {
+
+TEST(Legendre, ValuesMatchTheStandardLibrary) {
+  double values[31];
+  for (const double t : {-1.0, -0.73, -0.2, 0.0, 0.31, 0.999, 1.0}) {
+    legendreValues(t, 30, values);
+    for (unsigned i = 0; i <= 30; ++i) EXPECT_NEAR(values[i], std::legendre(i, t), 1e-13) << i << " at " << t;
+  }
+}
+
+TEST(Legendre, DerivativesMatchCentralDifferencesAndTheEnds) {
+  double values[31], derivatives[31], above[31], below[31];
+  const double step = 1e-6;
+  for (const double t : {-0.9, -0.35, 0.0, 0.2, 0.8}) {
+    legendreValuesAndDerivatives(t, 30, values, derivatives);
+    legendreValues(t + step, 30, above);
+    legendreValues(t - step, 30, below);
+    for (int i = 0; i <= 30; ++i) EXPECT_NEAR(derivatives[i], (above[i] - below[i]) / (2 * step), 1e-6) << i;
+  }
+  legendreValuesAndDerivatives(1, 30, values, derivatives);
+  for (int i = 0; i <= 30; ++i) EXPECT_DOUBLE_EQ(derivatives[i], i * (i + 1) / 2.0);  // L_i'(1)
+}
+
+TEST(GaussLegendre, IntegratesUpToItsDegreeAndNoFurther) {
+  for (int n = 1; n <= 121; ++n) {
+    const QuadratureRule rule = gaussLegendre(n);
+    ASSERT_EQ(rule.points.size(), std::size_t(n));
+    const auto integral = [&](int power) {
+      double sum = 0;
+      for (int q = 0; q < n; ++q) sum += rule.weights[q] * std::pow(rule.points[q], power);
+      return sum;
+    };
+    EXPECT_NEAR(integral(0), 2, 1e-13) << n;
+    const int highest = 2 * n - 2;  // the highest even power within degree 2n-1
+    EXPECT_NEAR(integral(highest), 2.0 / (highest + 1), 1e-13) << n;
+    if (n <= 8) {
+      EXPECT_GT(std::abs(integral(2 * n) - 2.0 / (2 * n + 1)), 1e-9) << n;
+    }
+    for (int q = 0; q < n; ++q) EXPECT_EQ(rule.points[q], -rule.points[n - 1 - q]);
+  }
+}
+
+TEST(GaussLegendre, HalvesHoldTheRuleTwice) {
+  const QuadratureRule whole = gaussLegendre(4);
+  const QuadratureRule halves = splitInHalves(whole);
+  ASSERT_EQ(halves.points.size(), 8u);
+  double sum = 0;
+  for (int q = 0; q < 8; ++q) sum += halves.weights[q] * std::abs(halves.points[q]);  // kink at the middle: exact
+  EXPECT_NEAR(sum, 1, 1e-14);
+}
+
+}  // namespace
+}  // namespace hpsdf
