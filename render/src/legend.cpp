@@ -110,15 +110,28 @@ void addNarrowRows(Furniture& furniture, const Column& column, const std::vector
   }
 }
 
+// Of a positive number, as one types it: 1.5e-7, not 1.500e-07.
+std::string formatScientific(double value, int digits) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*e", digits - 1, value);
+  const std::string shown = text;
+  const std::size_t e = shown.find('e');
+  std::string mantissa = shown.substr(0, e);
+  if (mantissa.find('.') != std::string::npos) mantissa.erase(mantissa.find_last_not_of('0') + 1);
+  if (mantissa.back() == '.') mantissa.pop_back();
+  return mantissa + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
+}
+
 int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
 
-// Values at multiples of a step, all with the same number of decimals; "0" without.
+// Values at multiples of a step, all with the same number of decimals, or with an exponent where that is shorter.
 std::string formatTick(double value, double step) {
   if (value == 0) return "0";
-  if (step < 1e-4 || step >= 1e6) return formatNumber(value);
+  const std::string sign = value < 0 ? "−" : "+";
+  if (step < 0.9e-3 || step > 0.9e4) return sign + formatScientific(std::abs(value), 3);
   char text[64];
   std::snprintf(text, sizeof text, "%.*f", decimalsOf(step), std::abs(value));
-  return (value < 0 ? "−" : "+") + std::string(text);
+  return sign + text;
 }
 
 void blendBox(Image& image, const BoxItem& box) {
@@ -204,9 +217,10 @@ void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScal
     const bool labelled = line % every == 0;
     furniture.boxes.push_back({left, y - half, right + (labelled ? 0.35 * em : 0), y + half, kTick});
     if (!labelled) continue;
+    // No number rather than part of one.
     const std::string label = formatTick(line * scale.step, scale.step);
-    addText(furniture, fitText(label, size, column.right - right - 0.6 * em), size, right + 0.6 * em,
-            y + capHeight(size) / 2, kInk);
+    const double x = right + 0.6 * em;
+    if (x + advanceOf(label, size) <= column.right) addText(furniture, label, size, x, y + capHeight(size) / 2, kInk);
   }
 }
 
@@ -258,19 +272,11 @@ void paint(Image& image, const Furniture& furniture) {
 std::string formatNumber(double value, int digits) {
   if (value == 0) return "0";
   const double size = std::abs(value);
+  const std::string sign = value < 0 ? "−" : "";
+  if (size < 1e-3 || size >= 1e6) return sign + formatScientific(size, digits);
   char text[64];
-  if (size >= 1e-3 && size < 1e6) {
-    std::snprintf(text, sizeof text, "%.*g", std::max(digits, size < 1e5 ? 0 : 6), size);
-  } else {
-    std::snprintf(text, sizeof text, "%.*e", digits - 1, size);
-    std::string shown = text;  // 1.500e-07 as one writes it: 1.5e-7
-    const std::size_t e = shown.find('e');
-    std::string mantissa = shown.substr(0, e);
-    if (mantissa.find('.') != std::string::npos) mantissa.erase(mantissa.find_last_not_of('0') + 1);
-    if (mantissa.back() == '.') mantissa.pop_back();
-    std::snprintf(text, sizeof text, "%se%d", mantissa.c_str(), std::stoi(shown.substr(e + 1)));
-  }
-  return (value < 0 ? "−" : "") + std::string(text);
+  std::snprintf(text, sizeof text, "%.*g", std::max(digits, size < 1e5 ? 0 : 6), size);
+  return sign + text;
 }
 
 std::string formatCount(std::size_t count) {
