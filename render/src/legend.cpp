@@ -253,14 +253,11 @@ void addCaption(Furniture& furniture, const Frame& frame, const std::string& nam
   addText(furniture, shownName, em, left, baseline, kInk);
   const double start = left + (shownName.empty() ? 0 : advanceOf(shownName, em) + em);
   std::string line;
-  for (std::size_t i = 0; i < details.size(); ++i) {
-    const std::string longer = i == 0 ? details[0] : line + " · " + details[i];
-    if (advanceOf(longer, em) > right - start) {
-      if (i == 0) line = fitText(longer, em, right - start);
-      break;
-    }
-    line = longer;
+  for (const std::string& detail : details) {
+    const std::string longer = line.empty() ? detail : line + " · " + detail;
+    if (advanceOf(longer, em) <= right - start) line = longer;
   }
+  if (line.empty() && !details.empty()) line = fitText(details.front(), em, right - start);
   addText(furniture, line, em, start, baseline, kSoftInk);
 }
 

@@ -55,7 +55,7 @@ void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScal
 void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
               std::span<const std::pair<std::string, std::string>> facts);
 
-/// The name, then as many of the details as fit, the most important first.
+/// The name, then those details that fit, the most important ones first.
 void addCaption(Furniture& furniture, const Frame& frame, const std::string& name,
                 std::span<const std::string> details);
 

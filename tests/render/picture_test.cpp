@@ -382,6 +382,15 @@ TEST(Layout, LegendAndCaptionAreThereAt320x240) {
   EXPECT_EQ(frame(64, 64).view, (PixelRect{0, 0, 64, 64}));
 }
 
+TEST(Layout, CaptionsKeepWhatFits) {
+  const std::vector<std::string> details = {"distance", std::string(200, 'x'), "7 cells"};
+  Furniture furniture;
+  addCaption(furniture, frame(320, 240), "bunny.obj", details);
+  ASSERT_EQ(furniture.texts.size(), 2U);
+  EXPECT_EQ(furniture.texts[0].text, "bunny.obj");
+  EXPECT_EQ(furniture.texts[1].text, "distance · 7 cells");
+}
+
 TEST(Layout, NumbersAreWrittenAsReadersExpect) {
   EXPECT_EQ(formatNumber(0), "0");
   EXPECT_EQ(formatNumber(-0.25), "−0.25");
