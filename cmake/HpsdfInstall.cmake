@@ -1,4 +1,4 @@
-# What `cmake --install` puts where, and the package that find_package(hpsdf) reads. One export set for each library, so
+# What `cmake --install` puts where of the libraries (the program's rule stands in app/), and the package that find_package(hpsdf) reads. One export set for each library, so
 # that a user of core alone needs nothing that render links.
 include(CMakePackageConfigHelpers)
 
@@ -13,9 +13,6 @@ endfunction()
 hpsdf_install_library(core)
 if(TARGET hpsdf_render)
   hpsdf_install_library(render)
-endif()
-if(TARGET hpsdf)
-  install(TARGETS hpsdf)
 endif()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/hpsdfConfig.cmake.in ${PROJECT_BINARY_DIR}/hpsdfConfig.cmake
