@@ -1,5 +1,6 @@
-# What `cmake --install` puts where of the libraries (the program's rule stands in app/), and the package that find_package(hpsdf) reads. One export set for each library, so
-# that a user of core alone needs nothing that render links.
+# What `cmake --install` puts where of the libraries (the program's rule stands in app/), and the package that
+# find_package(hpsdf) reads. One export set for each library, so that a user of core alone needs nothing that render
+# links.
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/hpsdf)
