@@ -13,9 +13,10 @@ struct ImportedMesh {
   MeshReport report;
 };
 
-/// Welds equal positions, drops degenerate and duplicate faces and unused vertices, and turns the *whole* mesh when its
-/// signed volume is negative (never part by part: a cavity's faces look inward on purpose).
-/// Throws `Error` for indices out of range, non-finite coordinates, or when no face with an area is left.
+/// Welds equal positions, drops degenerate and duplicate faces and unused vertices (a face on one line that keeps its
+/// neighbours connected is mended by an edge flip instead: dropping it would open the mesh), and turns the *whole* mesh
+/// when its signed volume is negative (never part by part: a cavity's faces look inward on purpose). Throws `Error` for
+/// indices out of range, non-finite coordinates, or when no face with an area is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
 /// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,

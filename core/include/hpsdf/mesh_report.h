@@ -19,6 +19,7 @@ struct MeshReport {
   std::size_t weldedVertices = 0;        ///< removed because another has the same position
   std::size_t unreferencedVertices = 0;  ///< removed because no triangle uses them
   std::size_t degenerateFaces = 0;       ///< dropped: two equal corners or no area
+  std::size_t flippedFaces = 0;          ///< had no area but hold a neighbour's edge: mended by flipping that edge
   std::size_t duplicateFaces = 0;        ///< dropped: the same three corners as another
   bool turned = false;                   ///< the whole mesh was turned because its signed volume was negative
 
@@ -30,7 +31,7 @@ struct MeshReport {
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Topology and measures of a mesh as it stands (the dropped and welded counts stay 0).
+/// Topology and measures of a mesh as it stands (the counts of what cleaning does stay 0).
 MeshReport inspect(const TriangleMesh& mesh);
 
 }  // namespace hpsdf

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <numeric>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace hpsdf {
+
+/// The least number of letters to insert, drop, replace or swap with the next that turns `a` into `b`, no letter being
+/// touched twice; upper and lower case are alike.
+inline std::size_t editDistance(std::string_view a, std::string_view b) {
+  const auto same = [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+  };
+  // row[j]: distance of the first i letters of a from the first j of b; before and twoBefore: for i - 1 and i - 2
+  std::vector<std::size_t> twoBefore, before, row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    twoBefore = std::exchange(before, row);
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({before[j] + 1, row[j - 1] + 1, before[j - 1] + (same(a[i - 1], b[j - 1]) ? 0 : 1)});
+      if (i > 1 && j > 1 && same(a[i - 1], b[j - 2]) && same(a[i - 2], b[j - 1]))
+        row[j] = std::min(row[j], twoBefore[j - 2] + 1);
+    }
+  }
+  return row.back();
+}
+
+/// The known name that was probably meant, for "did you mean" in messages; the first of equally near ones. Empty when
+/// nothing is near: a name is near when at most a third of the letters (at least one) differ, or when what was asked
+/// for is its beginning, three letters or more.
+inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
+  std::string best;
+  std::size_t bestDistance = std::string::npos;
+  for (const std::string& name : known) {
+    const std::size_t letters = std::max(wanted.size(), name.size());
+    std::size_t distance = editDistance(wanted, name);
+    const bool isBeginning = wanted.size() >= 3 && name.starts_with(wanted);
+    if (isBeginning) distance = std::min(distance, std::size_t{1});
+    if (distance < bestDistance && distance <= std::max<std::size_t>(1, letters / 3) && distance < letters) {
+      best = name;
+      bestDistance = distance;
+    }
+  }
+  return best;
+}
+
+}  // namespace hpsdf

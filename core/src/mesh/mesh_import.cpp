@@ -1,0 +1,172 @@
+#include "hpsdf/mesh_import.h"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/shapes.h"
+
+namespace hpsdf {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<std::string_view, 7> kExtensions = {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"};
+
+/// The file's extension in lower case, without the dot.
+std::string extensionOf(const fs::path& file) {
+  std::string extension = file.extension().string();
+  if (!extension.empty()) extension.erase(0, 1);
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+/// What can be said of a file before assimp opens it, whose own messages are of little help here.
+void requireReadable(const fs::path& file) {
+  const std::string name = file.string();
+  if (name.empty()) throw Error("the mesh file's name is empty; give a file name");
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) throw Error(name + ": no such file; check the path");
+  if (!fs::exists(status)) throw Error(name + ": cannot be read (" + error.message() + "); check the path");
+  if (fs::is_directory(status)) throw Error(name + ": a directory, not a file; name a mesh file in it");
+  if (!fs::is_regular_file(status)) throw Error(name + ": not a regular file; name a mesh file");
+
+  const std::string extension = extensionOf(file);
+  if (std::find(kExtensions.begin(), kExtensions.end(), extension) == kExtensions.end()) {
+    std::string known;
+    for (const std::string_view e : kExtensions) known += (known.empty() ? "." : ", .") + std::string(e);
+    throw Error(name + ": " + (extension.empty() ? "no extension" : "unknown format ." + extension) +
+                "; a mesh file ends in one of " + known);
+  }
+
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (!error && size == 0) throw Error(name + ": the file is empty; export the mesh again");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || stream.peek() == std::ifstream::traits_type::eof())
+    throw Error(name + ": cannot be read; check its permissions");
+}
+
+/// A message of assimp's as part of one line.
+std::string oneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c); }, ' ');
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text.empty() ? "unknown reason" : text;
+}
+
+Error unreadable(const std::string& name, const std::string& reason) {
+  return Error(name + ": cannot be read as a mesh (" + oneLine(reason) + "); check or export the file again");
+}
+
+/// assimp's steps trust the indices that its readers hand on, so that this comes before any step.
+void requireValidIndices(const aiScene& scene, const std::string& name) {
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    const aiMesh& part = *scene.mMeshes[m];
+    for (unsigned f = 0; f < part.mNumFaces; ++f)
+      for (unsigned i = 0; i < part.mFaces[f].mNumIndices; ++i)
+        if (part.mFaces[f].mIndices[i] >= part.mNumVertices)
+          throw Error(name + ": face " + std::to_string(f + 1) + " of part " + std::to_string(m + 1) +
+                      " refers to vertex " + std::to_string(std::uint64_t{part.mFaces[f].mIndices[i]} + 1) +
+                      ", but there are only " + std::to_string(part.mNumVertices) + "; repair or export it again");
+  }
+}
+
+/// Reads the scene into `importer`, which owns it, with n-gons triangulated.
+const aiScene& readScene(Assimp::Importer& importer, const fs::path& file) {
+  const std::string name = file.string();
+  const aiScene* scene = nullptr;
+  try {
+    scene = importer.ReadFile(name, 0);
+    if (scene && scene->mRootNode) {
+      requireValidIndices(*scene, name);
+      scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+    }
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    throw unreadable(name, e.what());
+  }
+  if (!scene || !scene->mRootNode) throw unreadable(name, importer.GetErrorString());
+  return *scene;
+}
+
+Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
+  Eigen::Affine3d result;
+  result.matrix() << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, 0, 0, 0, 1;
+  return result;
+}
+
+void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& worldFromPart) {
+  if (mesh.vertices.size() + part.mNumVertices > std::numeric_limits<std::uint32_t>::max())
+    throw Error(mesh.name + ": more than 4294967295 vertices; simplify the mesh first");
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  for (unsigned v = 0; v < part.mNumVertices; ++v) {
+    const aiVector3D& p = part.mVertices[v];
+    mesh.vertices.push_back(worldFromPart * Vector3(p.x, p.y, p.z));
+  }
+  const bool mirrored = worldFromPart.linear().determinant() < 0;  // would turn the faces inside out
+  for (unsigned f = 0; f < part.mNumFaces; ++f) {
+    const aiFace& face = part.mFaces[f];
+    if (face.mNumIndices != 3) continue;  // points and lines bound nothing
+    std::array<std::uint32_t, 3> triangle = {first + face.mIndices[0], first + face.mIndices[1],
+                                             first + face.mIndices[2]};
+    if (mirrored) std::swap(triangle[1], triangle[2]);
+    mesh.triangles.push_back(triangle);
+  }
+}
+
+/// All meshes of the scene, as often as nodes show them, in world coordinates.
+TriangleMesh joined(const aiScene& scene, const fs::path& file) {
+  TriangleMesh mesh;
+  mesh.name = file.string();
+  Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
+  // assimp puts a rotation from z up to y up above every 3DS scene; undone, coordinates are those of the file.
+  if (extensionOf(file) == "3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+
+  std::vector<std::pair<const aiNode*, Eigen::Affine3d>> pending = {{scene.mRootNode, worldFromRoot}};
+  while (!pending.empty()) {
+    const auto [node, worldFromParent] = pending.back();
+    pending.pop_back();
+    const Eigen::Affine3d worldFromNode = worldFromParent * toEigen(node->mTransformation);
+    for (unsigned m = 0; m < node->mNumMeshes; ++m) append(mesh, *scene.mMeshes[node->mMeshes[m]], worldFromNode);
+    for (unsigned c = node->mNumChildren; c-- > 0;) pending.emplace_back(node->mChildren[c], worldFromNode);
+  }
+  return mesh;
+}
+
+}  // namespace
+
+ImportedMesh importMesh(const fs::path& file) {
+  requireReadable(file);
+  TriangleMesh mesh;
+  {
+    Assimp::Importer importer;  // gone, with its copy of the mesh, before the cleaning takes memory
+    mesh = joined(readScene(importer, file), file);
+  }
+  ImportedMesh result = cleaned(std::move(mesh));  // its messages name the file as it was given
+  result.mesh.name = file.filename().string();
+  return result;
+}
+
+TriangleMesh loadMesh(const std::string& fileOrShape) {
+  if (fileOrShape.starts_with("builtin:")) return shapes::mesh(fileOrShape);
+  if (fileOrShape.starts_with("analytic:"))
+    throw Error(fileOrShape + ": a mesh is expected here; use builtin:" + fileOrShape.substr(9) + " or a mesh file");
+  return importMesh(fileOrShape).mesh;
+}
+
+}  // namespace hpsdf
