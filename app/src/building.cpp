@@ -1,0 +1,251 @@
+#include "building.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <limits>
+
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_import.h"
+#include "hpsdf/shapes.h"
+#include "interrupt.h"
+#include "progress_line.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::string_view kBuiltin = "builtin:";
+constexpr std::string_view kAnalytic = "analytic:";
+
+/// A uniform scale and a shift: y = scale·(x − centre).
+struct Normalization {
+  Vector3 centre;
+  double scale;
+};
+
+Normalization normalizationOf(const Box& box) {
+  const double longest = box.isEmpty() ? 0 : box.sizes().maxCoeff();
+  if (!(longest > 0)) throw Error("the shape has no extent to normalize");
+  return {box.center(), 2 / longest};
+}
+
+DistanceFunction normalizedFunction(const DistanceFunction& distance) {
+  const Normalization to = normalizationOf(distance.source().box);
+  Source source = distance.source();
+  source.box = Box(to.scale * (source.box.min() - to.centre), to.scale * (source.box.max() - to.centre));
+  const auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
+    std::vector<Vector3> original(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.centre;
+    distance(original, out);
+    for (double& value : out) value *= to.scale;
+  };
+  return DistanceFunction(evaluate, source);
+}
+
+bool wantsNormalized(const Arguments& arguments) {
+  return arguments.given("normalize") ? arguments.flag("normalize") : arguments.flag("paper");
+}
+
+Box domainOf(const Arguments& arguments, const Box& surface) {
+  const std::string shape = arguments.text("domain");
+  const double margin = arguments.number("margin");
+  if (shape == "box") return domainAround(surface, DomainShape::box, margin);
+  if (shape != "cube") {
+    const auto c = arguments.numbers("domain");
+    const Box domain(Vector3(c[0], c[1], c[2]), Vector3(c[3], c[4], c[5]));
+    if (!(domain.sizes().minCoeff() > 0))
+      throw Error(fmt::format("domain {}: expected lower corner x0,y0,z0 below upper corner x1,y1,z1", shape));
+    return domain;
+  }
+  // exactly the paper's cube, not one that follows the rounding of the mesh's normalization
+  if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
+  return domainAround(surface, DomainShape::cube, margin);
+}
+
+ImportedMesh importSurface(const std::string& surface) {
+  if (!surface.starts_with(kBuiltin)) return importMesh(surface);
+  TriangleMesh mesh = shapes::mesh(surface);
+  const MeshReport report = inspect(mesh);
+  return {std::move(mesh), report};
+}
+
+Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments) {
+  const InterruptGuard guard;
+  ProgressLine line(console.err, console.redrawsProgress);
+  const Progress progress{
+      .report = [&line](std::string_view task, double fraction) { line.report(task, fraction); },
+      .cancelled = &InterruptGuard::interrupted,
+  };
+  Field field = build(distance, domainOf(arguments, distance.source().box), buildOptions(arguments), progress);
+  if (InterruptGuard::interrupted()) throw Cancelled();  // asked for in the very last moment
+  return field;
+}
+
+/// Errors of the construction speak of options; the user thinks of the mesh.
+[[noreturn]] void rethrowNaming(const std::string& surface, const Error& error) {
+  const std::string message = error.what();
+  if (message.find(surface) != std::string::npos) throw error;
+  throw Error(surface + ": " + message);
+}
+
+}  // namespace
+
+std::vector<Parameter> buildParameters() {
+  constexpr double kMostWhole = std::numeric_limits<int>::max();
+  return {
+      {.name = "target-error",
+       .type = ParameterType::number,
+       .help =
+           "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, L that "
+           "side in mesh units, so that the same τ gives the same cells in any unit. Smaller is more exact.",
+       .defaultText = "1e-6",
+       .unit = "units^5 at that scale",
+       .minimum = 0,
+       .minimumExcluded = true},
+      {.name = "grid",
+       .type = ParameterType::numbers,
+       .help = "Base cells an axis: one number for all, or NX,NY,NZ.",
+       .defaultText = "6",
+       .valueName = "N|NX,NY,NZ",
+       .minimum = 1,
+       .maximum = kMostWhole,
+       .whole = true,
+       .counts = {1, 3}},
+      {.name = "nearness",
+       .type = ParameterType::number,
+       .help = "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike.",
+       .defaultText = "4",
+       .minimum = 0},
+      {.name = "max-degree",
+       .type = ParameterType::wholeNumber,
+       .help = "Highest degree of a cell's polynomial.",
+       .defaultText = "30",
+       .minimum = 1,
+       .maximum = kMaxDegree},
+      {.name = "max-depth",
+       .type = ParameterType::wholeNumber,
+       .help = "How often a base cell may be halved.",
+       .defaultText = "10",
+       .minimum = 0,
+       .maximum = kMaxDepth},
+      {.name = "domain",
+       .type = ParameterType::numbers,
+       .help =
+           "Where the field is defined by polynomials: the cube or the box around the mesh, enlarged by the margin, "
+           "or two corners in world units (after normalizing).",
+       .defaultText = "cube",
+       .valueName = "cube|box|x0,y0,z0,x1,y1,z1",
+       .choices = {"cube", "box"},
+       .counts = {6}},
+      {.name = "margin",
+       .type = ParameterType::number,
+       .help = "Of a cube or box: the part that it is larger than the mesh, e.g. 0.1 for half-sizes times 1.1.",
+       .defaultText = "0.1",
+       .minimum = 0},
+      {.name = "normalize",
+       .type = ParameterType::flag,
+       .help =
+           "Scale and centre the mesh so that its longest side spans [-1, 1], as the paper does. Without it the field "
+           "stays in the mesh's own units.",
+       .defaultText = "false"},
+      {.name = "strategy",
+       .type = ParameterType::choice,
+       .help = "hp refines degree and depth; h1 and h2 are plain octrees of degree 1 or 2, for comparison.",
+       .defaultText = "hp",
+       .choices = {"hp", "h1", "h2"}},
+      {.name = "coefficients",
+       .type = ParameterType::choice,
+       .help = "How coefficients are kept. auto takes float where that changes the error by less than 1 %.",
+       .defaultText = "auto",
+       .choices = {"auto", "float", "double"}},
+      {.name = "quadrature",
+       .type = ParameterType::wholeNumber,
+       .help = "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the "
+               "distances for the same error.",
+       .defaultText = "3",
+       .minimum = 2,
+       .maximum = 8},
+      {.name = "band",
+       .type = ParameterType::number,
+       .help =
+           "Width of a narrow band: cells farther from the surface than this are not refined and do not count. 0: no "
+           "band.",
+       .defaultText = "0",
+       .unit = "world units",
+       .minimum = 0},
+      {.name = "threads",
+       .type = ParameterType::wholeNumber,
+       .help = "Threads to use; 0 for all. The field is the same whatever their number.",
+       .defaultText = "0",
+       .minimum = 0,
+       .maximum = 1024},
+      {.name = "paper",
+       .type = ParameterType::flag,
+       .help =
+           "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, max-degree "
+           "30, max-depth 10, quadrature 4 with samples of its own for each trial, double. Options written beside it "
+           "win.",
+       .defaultText = "false"},
+  };
+}
+
+BuildOptions buildOptions(const Arguments& arguments) {
+  const bool paper = arguments.flag("paper");
+  BuildOptions options = paper ? paperOptions() : BuildOptions{};
+  const auto decides = [&](std::string_view name) { return !paper || arguments.given(name); };
+  options.targetError = arguments.number("target-error");
+  const auto grid = arguments.numbers("grid");
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    options.grid[axis] = static_cast<std::uint32_t>(grid.size() == 1 ? grid[0] : grid[axis]);
+  if (decides("nearness")) options.nearness = arguments.number("nearness");
+  if (decides("max-degree")) options.maxDegree = arguments.whole("max-degree");
+  if (decides("max-depth")) options.maxDepth = arguments.whole("max-depth");
+  if (decides("quadrature")) options.quadrature = arguments.whole("quadrature");
+  if (decides("strategy")) {
+    const std::string name = arguments.text("strategy");
+    options.strategy = name == "h1" ? Strategy::h1 : name == "h2" ? Strategy::h2 : Strategy::hp;
+  }
+  if (decides("coefficients")) {
+    const std::string name = arguments.text("coefficients");
+    options.coefficients = name == "float"    ? CoefficientType::float32
+                           : name == "double" ? CoefficientType::float64
+                                              : CoefficientType::automatic;
+  }
+  options.band = arguments.number("band");
+  options.threads = arguments.whole("threads");
+  return options;
+}
+
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
+  try {
+    if (surface.starts_with(kAnalytic)) {
+      DistanceFunction distance = shapes::analytic(surface);
+      if (wantsNormalized(arguments)) distance = normalizedFunction(distance);
+      const auto start = std::chrono::steady_clock::now();
+      Field field = construct(console, distance, arguments);
+      return {std::move(field), std::nullopt,
+              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+    }
+    ImportedMesh imported = importSurface(surface);
+    if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
+      console.err << "hpsdf: warning: " << warning << std::endl;
+    if (wantsNormalized(arguments)) imported.mesh = normalized(imported.mesh);
+    const auto start = std::chrono::steady_clock::now();
+    const ExactDistance distance(imported.mesh);
+    Field field = construct(console, distance, arguments);
+    return {std::move(field), imported.report,
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+MeshReport inspectSurface(const std::string& surface) {
+  if (surface.starts_with(kAnalytic))
+    throw Error(
+        fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
+  return importSurface(surface).report;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,32 @@
+#pragma once
+// From a mesh file or a shape's name to a field, as `build` and `report` do it.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/mesh_report.h"
+#include "session.h"
+
+namespace hpsdf::app {
+
+/// The parameters of a construction, shared by `build` and `report`.
+std::vector<Parameter> buildParameters();
+
+/// The options that such arguments ask for. --paper gives way to what is written beside it.
+BuildOptions buildOptions(const Arguments& arguments);
+
+struct BuiltField {
+  Field field;
+  std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
+  double seconds = 0;              ///< of the construction, with the hierarchy over the triangles
+};
+
+/// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`.
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments);
+
+/// The report of a mesh file or a built-in shape; throws `Error` for an analytic one.
+MeshReport inspectSurface(const std::string& surface);
+
+}  // namespace hpsdf::app

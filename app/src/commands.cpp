@@ -1,0 +1,18 @@
+#include "commands.h"
+
+#include "version.h"
+
+namespace hpsdf::app {
+
+Registry makeRegistry() {
+  Registry registry;
+  addFieldCommands(registry);
+  addPictureCommands(registry);
+  addReportCommand(registry);
+  addToolCommands(registry);
+  return registry;
+}
+
+std::string versionText() { return "hpsdf " HPSDF_VERSION; }
+
+}  // namespace hpsdf::app

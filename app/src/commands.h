@@ -1,0 +1,23 @@
+#pragma once
+
+#include "registry.h"
+
+namespace hpsdf::app {
+
+/// All commands of the program.
+Registry makeRegistry();
+
+void addFieldCommands(Registry& registry);    ///< build, load, save, info, query
+void addPictureCommands(Registry& registry);  ///< slice, render
+void addReportCommand(Registry& registry);
+void addToolCommands(Registry& registry);  ///< run, set, mesh, shapes, doctor, help
+
+/// The parameter `field` of commands that look at a field, and what they do with it: load it, or keep the current one.
+Parameter fieldParameter();
+void useField(Session& session, const Arguments& arguments);
+void loadField(Session& session, const std::string& file);
+
+/// --cpu and --gl.
+std::vector<Parameter> backendParameters();
+
+}  // namespace hpsdf::app

@@ -1,0 +1,200 @@
+#include <fmt/format.h>
+
+#include <fstream>
+
+#include "building.h"
+#include "commands.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/output_file.h"
+#include "point_query.h"
+#include "session.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+void saveCurrent(Session& session, const std::string& file) {
+  save(session.current().field, file);
+  session.setFileBytes(std::filesystem::file_size(file));
+}
+
+void runBuild(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const std::string surface = arguments.text("mesh");
+  const bool saves = arguments.has("output");
+  if (saves) checkWritable(arguments.text("output"));
+  BuiltField built = buildField(console, surface, arguments);
+  session.setField({std::move(built.field), saves ? arguments.text("output") : surface});
+  if (saves) saveCurrent(session, arguments.text("output"));
+  if (session.wantsJson(arguments)) {
+    Json json = fieldJson(session.current());
+    json["build_seconds"] = built.seconds;
+    json["output"] = saves ? Json(arguments.text("output")) : Json();
+    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
+    return printJson(console.out, json);
+  }
+  if (built.mesh) console.out << meshText(surface, *built.mesh);
+  const Field& field = session.current().field;
+  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {:.3g} (mesh units)\n",
+                             saves ? arguments.text("output") + ": " : "", fieldLine(field), built.seconds,
+                             field.metadata().rmsEstimate(field.domain()));
+}
+
+void runLoad(Session& session, const Arguments& arguments) {
+  loadField(session, arguments.text("field"));
+  if (session.wantsJson(arguments)) return printJson(session.console().out, fieldJson(session.current()));
+  session.console().out << fmt::format("{}: {}\n", arguments.text("field"), fieldLine(session.current().field));
+}
+
+void runSave(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  saveCurrent(session, file);
+  const auto bytes = session.current().fileBytes;
+  if (session.wantsJson(arguments)) return printJson(session.console().out, {{"output", file}, {"file_bytes", *bytes}});
+  session.console().out << fmt::format("{}: {}\n", file, bytesText(double(*bytes)));
+}
+
+void runInfo(Session& session, const Arguments& arguments) {
+  useField(session, arguments);
+  if (session.wantsJson(arguments)) return printJson(session.console().out, fieldJson(session.current()));
+  session.console().out << fieldText(session.current());
+}
+
+void runQuery(Session& session, const Arguments& arguments) {
+  useField(session, arguments);
+  std::ifstream file;
+  const bool fromFile = arguments.has("points") && arguments.text("points") != "-";
+  if (fromFile) file = openPoints(arguments.text("points"));
+  std::istream& in = fromFile ? static_cast<std::istream&>(file) : session.console().in;
+  const std::string name = fromFile ? arguments.text("points") : "stdin";
+  const PointFormat format = session.wantsJson(arguments) ? PointFormat::json : PointFormat::csv;
+  const Field& field = session.current().field;
+  if (!arguments.has("output")) {
+    std::ostream& out = session.console().out;
+    queryPoints(field, in, name, format, [&out](std::string_view text) {
+      out.write(text.data(), static_cast<std::streamsize>(text.size()));
+      if (!out) throw Error("cannot write to standard output");
+    });
+    return;
+  }
+  OutputFile out(arguments.text("output"));
+  const std::size_t count = queryPoints(field, in, name, format, [&out](std::string_view text) { out.write(text); });
+  out.commit();
+  session.console().err << fmt::format("{}: {} points\n", arguments.text("output"), grouped(count));
+}
+
+Command buildCommand() {
+  Command command{
+      .name = "build",
+      .summary = "Build a field from a mesh or a built-in shape.",
+      .help =
+          "MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), builtin:SHAPE,parameter=value,… for the mesh of a built-in "
+          "shape, or analytic:SHAPE,… for its distance in closed form; 'hpsdf shapes' lists the shapes.\n"
+          "\n"
+          "The construction refines the worst cell, by a higher degree or by eight children, until the weighted "
+          "squared "
+          "error over the domain falls below the target error τ. τ is meant for a mesh whose longest side L is 2, as "
+          "in "
+          "the paper; internally it is τ·(L/2)^5, so that the same τ gives the same cells whether the mesh is in "
+          "metres "
+          "or in millimetres. A hundredth of τ is about a tenth of the RMS error.\n"
+          "\n"
+          "Inside and outside are defined for closed meshes; a warning says when yours is not. Ctrl-C stops and writes "
+          "nothing. In a script, the field becomes the current one, and the output may be left out.",
+      .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
+                   "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
+                   "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8"},
+      .parameters = {{.name = "mesh",
+                      .type = ParameterType::text,
+                      .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
+                      .valueName = "MESH",
+                      .positional = true,
+                      .need = Need::always},
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "The field's file, usually *.hpsdf.",
+                      .alias = 'o',
+                      .need = Need::onCommandLine}},
+      .action = runBuild};
+  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
+  return command;
+}
+
+}  // namespace
+
+Parameter fieldParameter() {
+  return {.name = "field",
+          .type = ParameterType::path,
+          .help = "A field's file; in a script, the current field when left out.",
+          .valueName = "FIELD",
+          .positional = true,
+          .need = Need::onCommandLine};
+}
+
+void loadField(Session& session, const std::string& file) {
+  Field field = load(file);
+  session.setField({std::move(field), file, std::filesystem::file_size(file)});
+}
+
+void useField(Session& session, const Arguments& arguments) {
+  if (arguments.has("field")) return loadField(session, arguments.text("field"));
+  session.current();  // throws where there is none
+}
+
+void addFieldCommands(Registry& registry) {
+  registry.add(buildCommand());
+  registry.add({.name = "info",
+                .summary = "Tell what a field holds and how exact it is.",
+                .help = "Leaves, coefficients, memory, errors, settings, the mesh it came from, and how its volume is "
+                        "divided among degrees and depths. The estimated RMS error is √(ε/|Ω|) in mesh units, ε the "
+                        "construction's own weighted estimate.",
+                .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
+                .parameters = {fieldParameter()},
+                .action = runInfo});
+  registry.add({.name = "query",
+                .summary = "Distances and gradients at points.",
+                .help = "Reads points, one a line, x,y,z or x y z, from a file or from standard input; empty lines, # "
+                        "comments and a header line are passed over. Writes CSV with the header "
+                        "x,y,z,distance,gx,gy,gz, numbers in full precision; with --json an array of objects.\n"
+                        "\n"
+                        "Negative distances are inside. Points outside the domain get a continuous extension.",
+                .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
+                             "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
+                .parameters = {fieldParameter(),
+                               {.name = "points",
+                                .type = ParameterType::path,
+                                .help = "File of points; standard input when left out or -.",
+                                .valueName = "POINTS",
+                                .positional = true},
+                               {.name = "output",
+                                .type = ParameterType::outputPath,
+                                .help = "File to write; standard output when left out.",
+                                .alias = 'o'}},
+                .action = runQuery});
+  registry.add({.name = "load",
+                .summary = "Load a field: it becomes the current one.",
+                .help = "The commands that follow work on it.",
+                .examples = {"load bunny.hpsdf"},
+                .parameters = {{.name = "field",
+                                .type = ParameterType::path,
+                                .help = "A field's file.",
+                                .valueName = "FIELD",
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runLoad,
+                .scriptOnly = true});
+  registry.add(
+      {.name = "save",
+       .summary = "Save the current field.",
+       .help = "Written under a temporary name and renamed: an interrupted save leaves an older file as it was.",
+       .examples = {"save output=bunny.hpsdf"},
+       .parameters = {{.name = "output",
+                       .type = ParameterType::outputPath,
+                       .help = "The field's file, usually *.hpsdf.",
+                       .alias = 'o',
+                       .need = Need::always}},
+       .action = runSave,
+       .scriptOnly = true});
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,279 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "commands.h"
+#include "hpsdf/output_file.h"
+#include "hpsdf/render/picture.h"
+#include "pictures.h"
+#include "session.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+enum class SliceFormat : std::uint8_t { png, pfm, csv };
+
+std::string extension(const std::string& file) {
+  std::string text = std::filesystem::path(file).extension().string();
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+SliceFormat sliceFormat(const std::string& file) {
+  const std::string kind = extension(file);
+  if (kind == ".png") return SliceFormat::png;
+  if (kind == ".pfm") return SliceFormat::pfm;
+  if (kind == ".csv") return SliceFormat::csv;
+  throw Error(fmt::format("{}: unknown kind of output '{}'; expected .png for a picture, .pfm or .csv for raw values",
+                          file, kind));
+}
+
+float valueOrNan(const render::ViewBuffers& buffers, std::size_t pixel) {
+  return buffers.hit(pixel) ? buffers.value[pixel] : std::numeric_limits<float>::quiet_NaN();
+}
+
+/// Portable float map: one channel, little-endian (the negative scale says so), rows bottom to top; NaN outside the
+/// domain.
+void writePfm(const render::ViewBuffers& buffers, OutputFile& out) {
+  static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
+  out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
+  std::vector<float> row(static_cast<std::size_t>(buffers.width));
+  for (int y = buffers.height; y-- > 0;) {
+    for (std::size_t x = 0; x < row.size(); ++x) row[x] = valueOrNan(buffers, std::size_t(y) * row.size() + x);
+    out.write(std::as_bytes(std::span(row)));
+  }
+}
+
+/// A row a pixel inside the domain: its point in world units and the value there.
+void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers, OutputFile& out) {
+  out.write("x,y,z,value\n");
+  for (int y = 0; y < buffers.height; ++y) {
+    std::string rows;
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t pixel = std::size_t(y) * std::size_t(buffers.width) + std::size_t(x);
+      if (!buffers.hit(pixel)) continue;
+      const Vector3 p =
+          view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
+      rows += fmt::format("{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel]);
+    }
+    out.write(rows);
+  }
+}
+
+void report(Session& session, const Arguments& arguments, int width, int height, const render::Renderer& renderer) {
+  const std::string file = arguments.text("output");
+  if (session.wantsJson(arguments))
+    return printJson(session.console().out,
+                     {{"output", file}, {"width", width}, {"height", height}, {"renderer", renderer.description()}});
+  session.console().out << fmt::format("{}: {}x{}, {}\n", file, width, height, renderer.description());
+}
+
+void runSlice(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  const SliceFormat format = sliceFormat(file);
+  const render::SlicePicture picture = slicePicture(arguments);
+  if (format != SliceFormat::png && picture.samples != 1)
+    throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
+  checkWritable(file);
+  useField(session, arguments);
+  render::Renderer& renderer = session.renderer(backend(arguments));
+  const Field& field = session.current().field;
+  if (format == SliceFormat::png) {
+    savePng(render::draw(renderer, field, picture), file);
+  } else {
+    const render::SliceView view = render::sliceView(field, picture);
+    const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
+    OutputFile out(file);
+    if (format == SliceFormat::pfm)
+      writePfm(buffers, out);
+    else
+      writeCsv(view, buffers, out);
+    out.commit();
+  }
+  report(session, arguments, picture.width, picture.height, renderer);
+}
+
+void runRender(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  if (extension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  const render::SurfacePicture picture = surfacePicture(arguments);
+  checkWritable(file);
+  useField(session, arguments);
+  render::Renderer& renderer = session.renderer(backend(arguments));
+  savePng(render::draw(renderer, session.current().field, picture), file);
+  report(session, arguments, picture.width, picture.height, renderer);
+}
+
+std::vector<Parameter> pictureParameters() {
+  std::vector<Parameter> parameters = {{.name = "size",
+                                        .type = ParameterType::size,
+                                        .help = "Of the whole picture, legend and caption included.",
+                                        .defaultText = "1280x720",
+                                        .unit = "pixels",
+                                        .minimum = 16,
+                                        .maximum = 16384,
+                                        .whole = true,
+                                        .counts = {2}},
+                                       {.name = "samples",
+                                        .type = ParameterType::wholeNumber,
+                                        .help = "Samples a pixel along each axis: 4 for a smooth picture to print.",
+                                        .defaultText = "1",
+                                        .minimum = 1,
+                                        .maximum = 8}};
+  for (Parameter& parameter : backendParameters()) parameters.push_back(std::move(parameter));
+  return parameters;
+}
+
+Command withParameters(Command command, std::vector<Parameter> more) {
+  for (Parameter& parameter : more) command.parameters.push_back(std::move(parameter));
+  return command;
+}
+
+}  // namespace
+
+std::vector<Parameter> backendParameters() {
+  return {{.name = "cpu",
+           .type = ParameterType::flag,
+           .help = "Draw in double precision on the CPU, without OpenGL: slow, and the reference.",
+           .defaultText = "false"},
+          {.name = "gl",
+           .type = ParameterType::choice,
+           .help = "Which OpenGL device to take; auto tries a hardware device first.",
+           .defaultText = "auto",
+           .choices = {"auto", "software", "hardware"}}};
+}
+
+Backend backend(const Arguments& arguments) {
+  const std::string gl = arguments.text("gl");
+  return {arguments.flag("cpu"), gl == "software"   ? render::GlChoice::software
+                                 : gl == "hardware" ? render::GlChoice::hardware
+                                                    : render::GlChoice::automatic};
+}
+
+render::SlicePicture slicePicture(const Arguments& arguments) {
+  render::SlicePicture picture;
+  if (arguments.given("plane")) {
+    if (arguments.given("axis") || arguments.given("offset"))
+      throw Error("plane: excludes axis and offset; give one or the other");
+    const auto n = arguments.numbers("plane");
+    picture.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
+  } else {
+    picture.plane = render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.number("offset")};
+  }
+  const std::string color = arguments.text("color");
+  picture.color = color == "depth"      ? render::SliceColor::depth
+                  : color == "distance" ? render::SliceColor::distance
+                                        : render::SliceColor::degree;
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const Arguments& arguments) {
+  render::SurfacePicture picture;
+  const auto camera = arguments.numbers("camera");
+  if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+  if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0, in domain diagonals");
+  picture.camera.azimuthDegrees = camera[0];
+  picture.camera.elevationDegrees = camera[1];
+  picture.camera.distance = camera[2];
+  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  picture.offset = arguments.number("offset");
+  const std::string color = arguments.text("color");
+  picture.color = color == "degree"  ? render::SurfaceColor::degree
+                  : color == "depth" ? render::SurfaceColor::depth
+                                     : render::SurfaceColor::normal;
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+  return picture;
+}
+
+void addPictureCommands(Registry& registry) {
+  registry.add(withParameters(
+      {.name = "slice",
+       .summary = "Draw a plane through a field, coloured by degree, depth or distance.",
+       .help =
+           "The plane is axis = offset, or any plane given by a point and a normal. degree and depth show the cells "
+           "with their outlines; distance shows iso-lines, the surface as a heavy line.\n"
+           "\n"
+           "The output's ending decides: .png is a picture with legend and caption; .pfm (32-bit floats, NaN outside "
+           "the domain) and .csv (x,y,z,value, a row a pixel inside) hold the raw values of size pixels.",
+       .examples = {"hpsdf slice bunny.hpsdf -o degree.png",
+                    "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
+                    "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",
+                    "hpsdf slice bunny.hpsdf -o values.csv --size 64x64"},
+       .parameters = {fieldParameter(),
+                      {.name = "output",
+                       .type = ParameterType::outputPath,
+                       .help = "*.png, *.pfm or *.csv.",
+                       .alias = 'o',
+                       .need = Need::always},
+                      {.name = "axis",
+                       .type = ParameterType::choice,
+                       .help = "The plane is perpendicular to this axis.",
+                       .defaultText = "z",
+                       .choices = {"x", "y", "z"}},
+                      {.name = "offset",
+                       .type = ParameterType::number,
+                       .help = "Where the plane crosses that axis.",
+                       .defaultText = "0",
+                       .unit = "world units"},
+                      {.name = "plane",
+                       .type = ParameterType::numbers,
+                       .help = "A point of the plane and its normal, instead of axis and offset.",
+                       .valueName = "PX,PY,PZ,NX,NY,NZ",
+                       .unit = "world units",
+                       .counts = {6}},
+                      {.name = "color",
+                       .type = ParameterType::choice,
+                       .help = "What the colours mean.",
+                       .defaultText = "degree",
+                       .choices = {"degree", "depth", "distance"}}},
+       .action = runSlice},
+      pictureParameters()));
+  registry.add(withParameters(
+      {.name = "render",
+       .summary = "Draw the surface of a field by sphere tracing.",
+       .help = "The surface is where the distance is 0, or the given offset: positive offsets swell it, negative ones "
+               "shrink it. The camera circles the centre of the domain.",
+       .examples = {"hpsdf render bunny.hpsdf -o surface.png",
+                    "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
+                    "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4"},
+       .parameters =
+           {fieldParameter(),
+            {.name = "output", .type = ParameterType::outputPath, .help = "*.png.", .alias = 'o', .need = Need::always},
+            {.name = "color",
+             .type = ParameterType::choice,
+             .help = "normal lights the surface; degree and depth show the cells that hold it.",
+             .defaultText = "normal",
+             .choices = {"normal", "degree", "depth"}},
+            {.name = "camera",
+             .type = ParameterType::numbers,
+             .help = "Azimuth and elevation in degrees, and the eye's distance from the centre in diagonals of "
+                     "the domain.",
+             .defaultText = "30,20,1",
+             .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+             .counts = {3}},
+            {.name = "up",
+             .type = ParameterType::choice,
+             .help = "The axis that points up in the picture.",
+             .defaultText = "y",
+             .choices = {"y", "z"}},
+            {.name = "offset",
+             .type = ParameterType::number,
+             .help = "The distance whose surface is drawn.",
+             .defaultText = "0",
+             .unit = "world units"}},
+       .action = runRender},
+      pictureParameters()));
+}
+
+}  // namespace hpsdf::app

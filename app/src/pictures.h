@@ -1,0 +1,18 @@
+#pragma once
+// From validated arguments to the settings of render.
+
+#include "hpsdf/render/picture.h"
+#include "registry.h"
+#include "session.h"
+
+namespace hpsdf::app {
+
+Backend backend(const Arguments& arguments);
+
+/// Throws `Error` when plane and axis are both given.
+render::SlicePicture slicePicture(const Arguments& arguments);
+
+/// Throws `Error` for a camera out of range.
+render::SurfacePicture surfacePicture(const Arguments& arguments);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,78 @@
+#include "program.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <new>
+#include <ostream>
+#include <system_error>
+
+#include "commands.h"
+#include "help.h"
+#include "hpsdf/error.h"
+#include "version.h"
+
+namespace hpsdf::app {
+namespace {
+
+bool asksForHelp(const std::string& word) { return word == "--help" || word == "-h"; }
+
+void execute(std::span<const std::string> words, const Registry& registry, const Console& console) {
+  if (words.empty()) throw Error("expected a command; 'hpsdf --help' lists them");
+  if (words[0] == "--version") {
+    console.out << versionText() << "\n";
+    return;
+  }
+  if (asksForHelp(words[0])) {
+    console.out << overviewHelp(registry);
+    return;
+  }
+  const Command& command = registry.command(words[0]);
+  if (std::ranges::any_of(words, asksForHelp)) {
+    console.out << commandHelp(command);
+    return;
+  }
+  if (command.scriptOnly)
+    throw Error(fmt::format("'{}' is a command of scripts: hpsdf run -e '{} …'", command.name, command.name));
+  std::vector<Word> arguments;
+  for (const std::string& word : words.subspan(1)) arguments.push_back({.text = word});
+  Session session(registry, console);
+  command.action(session, parseArguments(command, arguments, Origin::commandLine));
+}
+
+/// Output to a closed pipe or a full disk fails late, inside the stream's buffer.
+void checkOutput(const Console& console) {
+  errno = 0;
+  if (console.out.flush()) return;
+  const std::string reason = errno == 0 ? "" : fmt::format(" ({})", std::generic_category().message(errno));
+  throw Error("cannot write to standard output" + reason);
+}
+
+int fail(const Console& console, std::string message, int status) {
+  std::ranges::replace(message, '\n', ' ');
+  console.err << "hpsdf: error: " << message << std::endl;
+  return status;
+}
+
+}  // namespace
+
+int runProgram(std::span<const std::string> words, const Console& console) {
+  try {
+    const Registry registry = makeRegistry();
+    execute(words, registry, console);
+    checkOutput(console);
+    return kExitDone;
+  } catch (const Cancelled&) {
+    console.err << "hpsdf: cancelled; nothing was written" << std::endl;
+    return kExitCancelled;
+  } catch (const Error& error) {
+    return fail(console, error.what(), kExitBadInput);
+  } catch (const std::bad_alloc&) {
+    return fail(console, "not enough memory; a larger target error or a smaller grid needs less", kExitBadInput);
+  } catch (const std::exception& error) {
+    return fail(console, fmt::format("{} (this is a fault of the program)", error.what()), kExitBadInput);
+  }
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,286 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+
+#include "building.h"
+#include "commands.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/output_file.h"
+#include "hpsdf/render/picture.h"
+#include "pictures.h"
+#include "report_page.h"
+#include "session.h"
+#include "summaries.h"
+#include "version.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The report's folder, made when it is not there yet, and removed again when the report fails before `keep`.
+class ReportFolder {
+ public:
+  explicit ReportFolder(const fs::path& folder) : path_(folder) {
+    for (fs::path part = fs::absolute(folder).lexically_normal(); !part.empty() && !fs::exists(part);
+         part = part.parent_path())
+      created_.push_back(part);
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (!fs::is_directory(folder))
+      throw Error(fmt::format("{}: cannot make this folder ({}); name another", folder.string(),
+                              error ? error.message() : "a file of that name exists"));
+    try {
+      checkWritable(folder / "index.html");
+    } catch (...) {
+      removeCreated();
+      throw;
+    }
+  }
+  ~ReportFolder() { removeCreated(); }
+  ReportFolder(const ReportFolder&) = delete;
+  ReportFolder& operator=(const ReportFolder&) = delete;
+
+  void keep() { created_.clear(); }
+  const fs::path& path() const { return path_; }
+
+ private:
+  /// Innermost first; a folder that is not empty stays.
+  void removeCreated() {
+    std::error_code ignored;
+    for (const fs::path& part : created_) fs::remove(part, ignored);
+  }
+
+  fs::path path_;
+  std::vector<fs::path> created_;
+};
+
+/// "bunny" of bunny.obj, "torus" of builtin:torus,major=0.7: plain characters only, since it goes into commands.
+std::string plainName(const std::string& source) {
+  const bool isShape = source.starts_with("builtin:") || source.starts_with("analytic:");
+  std::string name = isShape ? source.substr(source.find(':') + 1) : fs::path(source).stem().string();
+  name = name.substr(0, name.find(','));
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
+  return name.empty() ? "field" : name;
+}
+
+/// As a shell takes it.
+std::string shellWord(const std::string& word) {
+  const bool plain = std::ranges::all_of(word, [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("._-/:,=+").find(char(c)) != std::string::npos;
+  });
+  if (plain && !word.empty()) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
+  std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
+  for (const Parameter& parameter : buildParameters()) {
+    if (!arguments.given(parameter.name)) continue;
+    const std::string text = arguments.text(parameter.name);
+    line += parameter.type == ParameterType::flag && arguments.flag(parameter.name)
+                ? fmt::format(" --{}", parameter.name)
+                : fmt::format(" --{}={}", parameter.name, text);
+  }
+  return line;
+}
+
+/// Mean seconds a frame of the surface's buffers, field resident: after one frame to warm up, some frames, or as many
+/// as fit into two seconds.
+double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int kFrames = 8;
+  constexpr std::chrono::seconds kEnough(2);
+  const render::SurfaceView view{render::pinhole(picture.camera, field.domain(), picture.width, picture.height), 0};
+  renderer.surface(view, picture.width, picture.height);
+  const auto start = Clock::now();
+  int frames = 0;
+  while (frames < kFrames && (frames == 0 || Clock::now() - start < kEnough)) {
+    renderer.surface(view, picture.width, picture.height);
+    ++frames;
+  }
+  return std::chrono::duration<double>(Clock::now() - start).count() / frames;
+}
+
+struct Drawing {
+  std::string file;
+  std::string title;
+  std::string caption;
+  std::string command;  ///< what follows the field's file
+  std::variant<render::SliceColor, render::SurfaceColor> color;
+};
+
+std::vector<Drawing> drawings() {
+  using render::SliceColor;
+  using render::SurfaceColor;
+  return {
+      {"surface.png", "Surface", "Sphere-traced, lit by the field's own gradient.", "render {} -o surface.png",
+       SurfaceColor::normal},
+      {"degree.png", "Degree", "The polynomial degree of each cell in the plane through the middle.",
+       "slice {} --color degree -o degree.png", SliceColor::degree},
+      {"depth.png", "Depth", "How often the octree has halved the base cells, in the same plane.",
+       "slice {} --color depth -o depth.png", SliceColor::depth},
+      {"distance.png", "Distance",
+       "The signed distance: iso-lines, and the surface as the heavy line where it is zero.",
+       "slice {} --color distance -o distance.png", SliceColor::distance},
+      {"surface-degree.png", "Degree on the surface", "The degree of the cells that hold the surface.",
+       "render {} --color degree -o surface-degree.png", SurfaceColor::degree},
+  };
+}
+
+/// The plane z = 0, or where the domain does not hold that, its middle.
+double sliceOffset(const Field& field) {
+  const Box& domain = field.domain();
+  return domain.min().z() <= 0 && domain.max().z() > 0 ? 0 : domain.center().z();
+}
+
+ReportPicture drawInto(const fs::path& folder, Session& session, render::Renderer& renderer,
+                       const std::string& fieldFile, const Drawing& drawing, int samples) {
+  const Field& field = session.current().field;
+  std::string command = "hpsdf " + fmt::format(fmt::runtime(drawing.command), fieldFile);
+  render::Image image;
+  if (const auto* color = std::get_if<render::SliceColor>(&drawing.color)) {
+    const double offset = sliceOffset(field);
+    if (offset != 0) command += fmt::format(" --offset={}", offset);
+    image =
+        render::draw(renderer, field,
+                     render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = *color, .samples = samples});
+  } else {
+    render::SurfacePicture picture;
+    picture.color = std::get<render::SurfaceColor>(drawing.color);
+    picture.samples = samples;
+    image = render::draw(renderer, field, picture);
+  }
+  if (samples != 1) command += fmt::format(" --samples={}", samples);
+  savePng(image, folder / drawing.file);
+  return {drawing.file, drawing.title, drawing.caption, command};
+}
+
+std::vector<ReportBar> bars(const std::map<int, double>& volume) {
+  std::vector<ReportBar> result;
+  for (const auto& [level, share] : volume) result.push_back({level, share});
+  return result;
+}
+
+std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
+                                                         const BuiltField* built) {
+  const FieldMetadata& metadata = field.metadata();
+  std::vector<std::pair<std::string, std::string>> rows;
+  if (metadata.source.faces > 0)
+    rows.emplace_back("Mesh", fmt::format("{}: {} vertices, {} faces", metadata.source.name,
+                                          grouped(metadata.source.vertices), grouped(metadata.source.faces)));
+  else
+    rows.emplace_back("Source", metadata.source.name);
+  if (built != nullptr && built->mesh)
+    rows.emplace_back("Surface", built->mesh->closed() ? "closed" : "not closed: signs may be wrong");
+  rows.emplace_back("Leaf cells", grouped(counts.leaves));
+  rows.emplace_back("Coefficients",
+                    fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
+  rows.emplace_back("Memory", bytesText(double(counts.bytes)));
+  rows.emplace_back("Target error τ", fmt::format("{:.3g}", metadata.targetError));
+  rows.emplace_back("Total error ε", fmt::format("{:.3g}, nearness {}", metadata.totalError, metadata.nearness));
+  rows.emplace_back(
+      "Estimated RMS error",
+      fmt::format("{:.3g} in mesh units, {:.2g} of the mesh's longest side", metadata.rmsEstimate(field.domain()),
+                  metadata.rmsEstimate(field.domain()) / metadata.referenceLength));
+  rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
+  if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));
+  return rows;
+}
+
+bool isFieldFile(const std::string& source) { return fs::path(source).extension() == ".hpsdf"; }
+
+void runReport(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  ReportFolder folder(arguments.text("output"));
+  std::optional<BuiltField> built;
+  if (arguments.has("source") && !isFieldFile(arguments.text("source"))) {
+    built = buildField(console, arguments.text("source"), arguments);
+    session.setField({std::move(built->field), arguments.text("source")});
+  } else if (arguments.has("source")) {
+    loadField(session, arguments.text("source"));
+  }
+  const CurrentField& current = session.current();
+  const Field& field = current.field;
+  render::Renderer& renderer = session.renderer(backend(arguments));
+  const std::string fieldFile = plainName(current.name) + ".hpsdf";
+  folder.keep();
+  save(field, folder.path() / fieldFile);
+
+  const FieldStatistics counts = statistics(field);
+  ReportPage page{
+      .title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
+      .subtitle = fmt::format("{} leaf cells, {}, estimated RMS error {:.2g}", grouped(counts.leaves),
+                              bytesText(double(counts.bytes)), field.metadata().rmsEstimate(field.domain())),
+      .figures = figures(field, counts, built ? &*built : nullptr),
+      .degrees = bars(counts.degreeVolume),
+      .depths = bars(counts.depthVolume),
+      .buildCommand = built ? buildCommandLine(arguments.text("source"), fieldFile, arguments) : "",
+      .footer = fmt::format("{}; {}", versionText(), renderer.description())};
+  for (const Drawing& drawing : drawings())
+    page.pictures.push_back(drawInto(folder.path(), session, renderer, fieldFile, drawing, arguments.whole("samples")));
+  const render::SurfacePicture traced;
+  const double seconds = frameSeconds(renderer, field, traced);
+  page.figures.emplace_back("Traced frame",
+                            fmt::format("{:.3f} s for {}x{}, field resident", seconds, traced.width, traced.height));
+  page.figures.emplace_back("Renderer", renderer.description());
+
+  const fs::path index = folder.path() / "index.html";
+  OutputFile out(index);
+  out.write(reportHtml(page));
+  out.commit();
+  if (session.wantsJson(arguments)) {
+    Json files = Json::array();
+    for (const ReportPicture& picture : page.pictures) files.push_back((folder.path() / picture.file).string());
+    return printJson(console.out, {{"page", index.string()},
+                                   {"field_file", (folder.path() / fieldFile).string()},
+                                   {"pictures", files},
+                                   {"build_seconds", built ? Json(built->seconds) : Json()},
+                                   {"frame_seconds", seconds},
+                                   {"renderer", renderer.description()},
+                                   {"field", fieldJson(current)}});
+  }
+  console.out << fmt::format("{}\ntraced frame {:.3f} s, {}\n{}\n", fieldLine(field), seconds, renderer.description(),
+                             index.string());
+}
+
+}  // namespace
+
+void addReportCommand(Registry& registry) {
+  Command command{
+      .name = "report",
+      .summary = "Write one offline page: pictures and figures of a field.",
+      .help =
+          "SOURCE is a field's file (*.hpsdf) or anything that 'hpsdf build' takes, with the same options. The folder "
+          "receives index.html, its pictures, each with the command that makes it, and the field itself.",
+      .examples = {"hpsdf report bunny.hpsdf -o report", "hpsdf report builtin:torus -o torus --target-error 1e-7"},
+      .parameters = {{.name = "source",
+                      .type = ParameterType::text,
+                      .help = "A field's file, a mesh or a shape; in a script, the current field when left out.",
+                      .valueName = "SOURCE",
+                      .positional = true,
+                      .need = Need::onCommandLine},
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "The folder; made when it is not there.",
+                      .valueName = "FOLDER",
+                      .alias = 'o',
+                      .need = Need::always},
+                     {.name = "samples",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Samples a pixel along each axis.",
+                      .defaultText = "1",
+                      .minimum = 1,
+                      .maximum = 8}},
+      .action = runReport};
+  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
+  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  registry.add(std::move(command));
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,36 @@
+#pragma once
+// Scripts: a command a line, `verb value key=value …`; docs/scripts.md is the manual.
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "registry.h"
+
+namespace hpsdf::app {
+
+using Variables = std::map<std::string, std::string, std::less<>>;
+
+/// A checked command of a script.
+struct Call {
+  const Command* command;
+  Arguments arguments;
+  std::string where;  ///< "file:line:column" of the verb
+};
+
+/// Reads and checks a whole script, so that a mistake in the last line shows before the first has run. `name` stands
+/// in messages; `variables` replace $name. The calls refer to the registry's commands.
+/// Throws `Error` "file:line:column: …".
+std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
+                              Variables variables);
+
+/// Runs the calls one after another; stops at the first that throws, and says where.
+void runScript(Session& session, const std::vector<Call>& calls);
+
+/// "name=value" words. Throws `Error` for one that is not of that form.
+Variables parseVariables(const std::vector<std::string>& words);
+
+bool isVariableAssignment(std::string_view word);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,38 @@
+#include "session.h"
+
+#include <utility>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+
+void Session::setField(CurrentField field) {
+  renderer_.reset();
+  field_ = std::make_unique<CurrentField>(std::move(field));
+}
+
+const CurrentField& Session::current() const {
+  if (!field_) throw Error("there is no field yet; 'build MESH' or 'load FIELD' comes first");
+  return *field_;
+}
+
+void Session::setFileBytes(std::uintmax_t bytes) { field_->fileBytes = bytes; }
+
+render::Renderer& Session::renderer(const Backend& backend) {
+  const Field& field = current().field;
+  if (renderer_ && backend_ == backend) return *renderer_;
+  renderer_.reset();
+  if (backend.cpu) {
+    renderer_ = render::makeCpuRenderer(field);
+  } else {
+    try {
+      renderer_ = render::makeGlRenderer(field, backend.gl);
+    } catch (const Error& error) {
+      throw Error(std::string(error.what()) + "; --cpu draws without OpenGL");
+    }
+  }
+  backend_ = backend;
+  return *renderer_;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "hpsdf/field.h"
+#include "hpsdf/render/renderer.h"
+#include "registry.h"
+
+namespace hpsdf::app {
+
+/// Where the program reads and writes: the process's own streams, or a test's.
+struct Console {
+  std::istream& in;
+  std::ostream& out;             ///< results
+  std::ostream& err;             ///< progress, notes and warnings
+  bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
+};
+
+/// The field that commands work on.
+struct CurrentField {
+  Field field;
+  std::string name;                              ///< file or mesh that it came from
+  std::optional<std::uintmax_t> fileBytes = {};  ///< of one that was loaded or saved
+};
+
+/// Which renderer draws.
+struct Backend {
+  bool cpu = false;
+  render::GlChoice gl = render::GlChoice::automatic;
+  bool operator==(const Backend&) const = default;
+};
+
+/// What lives from command to command: the current field and its renderer.
+class Session {
+ public:
+  Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
+
+  const Registry& registry() const { return registry_; }
+  const Console& console() const { return console_; }
+
+  bool wantsJson(const Arguments& arguments) const { return json_ || arguments.flag("json"); }
+  /// Lets all commands report as JSON; returns the setting before.
+  bool setJson(bool json) { return std::exchange(json_, json); }
+
+  /// Scripts that run each other without end are told from deep ones by this count of scripts now running.
+  int scriptDepth = 0;
+
+  void setField(CurrentField field);
+  /// Throws `Error` when there is none, saying how to get one.
+  const CurrentField& current() const;
+  void setFileBytes(std::uintmax_t bytes);
+
+  /// The renderer of the current field: kept, since its upload takes longer than most pictures.
+  render::Renderer& renderer(const Backend& backend);
+
+ private:
+  const Registry& registry_;
+  Console console_;
+  bool json_ = false;
+  std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
+  std::unique_ptr<render::Renderer> renderer_;
+  Backend backend_;
+};
+
+}  // namespace hpsdf::app

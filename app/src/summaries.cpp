@@ -1,0 +1,193 @@
+#include "summaries.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace hpsdf::app {
+namespace {
+
+constexpr int kBarCells = 40;
+
+Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+Json boxJson(const Box& box) { return Json::array({vectorJson(box.min()), vectorJson(box.max())}); }
+
+template <typename Value>
+Json levelsJson(const std::map<int, Value>& levels) {
+  Json json = Json::object();
+  for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
+  return json;
+}
+
+std::string row(std::string_view label, const std::string& value) { return fmt::format("  {:<22} {}\n", label, value); }
+
+std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
+
+/// A row a level: share of the volume, number of leaves, a bar as long as the share.
+std::string histogram(std::string_view name, const std::map<int, double>& volume,
+                      const std::map<int, std::size_t>& leaves) {
+  std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
+  for (const auto& [level, share] : volume) {
+    std::string bar;
+    const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kBarCells))) : 0;
+    for (int i = 0; i < cells; ++i) bar += "▇";
+    text += fmt::format("  {:>8} {:>6.2f} % {:>12}  {}\n", level, 100 * share, grouped(leaves.at(level)), bar);
+  }
+  return text;
+}
+
+std::string fingerprintText(std::uint64_t fingerprint) { return fmt::format("{:016x}", fingerprint); }
+
+/// "3 boundary, 1 non-manifold and 0 inconsistent edges"
+std::string faultyEdges(const MeshReport& report) {
+  return fmt::format("{} boundary, {} non-manifold and {} inconsistent edges", grouped(report.boundaryEdges),
+                     grouped(report.nonManifoldEdges), grouped(report.inconsistentEdges));
+}
+
+}  // namespace
+
+void printJson(std::ostream& out, const Json& json) {
+  out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+}
+
+std::string grouped(std::uint64_t number) {
+  std::string text = std::to_string(number);
+  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
+  return text;
+}
+
+std::string bytesText(double bytes) {
+  if (bytes < 1e3) return fmt::format("{:.0f} bytes", bytes);
+  if (bytes < 1e6) return fmt::format("{:.2f} kB", bytes / 1e3);
+  if (bytes < 1e9) return fmt::format("{:.2f} MB", bytes / 1e6);
+  return fmt::format("{:.2f} GB", bytes / 1e9);
+}
+
+std::string strategyName(Strategy strategy) {
+  switch (strategy) {
+    case Strategy::h1:
+      return "h1";
+    case Strategy::h2:
+      return "h2";
+    case Strategy::hp:
+      break;
+  }
+  return "hp";
+}
+
+Json meshJson(const std::string& name, const MeshReport& report) {
+  return {{"name", name},
+          {"vertices", report.vertices},
+          {"faces", report.faces},
+          {"parts", report.parts},
+          {"closed", report.closed()},
+          {"boundary_edges", report.boundaryEdges},
+          {"non_manifold_edges", report.nonManifoldEdges},
+          {"inconsistent_edges", report.inconsistentEdges},
+          {"welded_vertices", report.weldedVertices},
+          {"unreferenced_vertices", report.unreferencedVertices},
+          {"degenerate_faces", report.degenerateFaces},
+          {"duplicate_faces", report.duplicateFaces},
+          {"turned", report.turned},
+          {"volume", report.volume},
+          {"area", report.area},
+          {"box", boxJson(report.box)}};
+}
+
+std::string meshText(const std::string& name, const MeshReport& report) {
+  std::string text = name + "\n";
+  text += row("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
+  text += row("parts", grouped(report.parts));
+  text += row("surface", report.closed() ? "closed" : "not closed: " + faultyEdges(report));
+  text += row("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
+  text += row("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
+  if (report.weldedVertices > 0) text += row("welded", grouped(report.weldedVertices) + " vertices of equal position");
+  if (report.unreferencedVertices > 0)
+    text += row("unused", grouped(report.unreferencedVertices) + " vertices dropped");
+  if (report.degenerateFaces > 0) text += row("degenerate", grouped(report.degenerateFaces) + " faces dropped");
+  if (report.duplicateFaces > 0) text += row("duplicate", grouped(report.duplicateFaces) + " faces dropped");
+  if (report.turned) text += row("turned", "the whole mesh: its faces looked inward");
+  return text;
+}
+
+std::string meshWarning(const std::string& name, const MeshReport& report) {
+  if (report.closed()) return {};
+  return fmt::format("{}: the surface is not closed ({}): signs may be wrong", name, faultyEdges(report));
+}
+
+Json fieldJson(const CurrentField& current) {
+  const Field& field = current.field;
+  const FieldMetadata& metadata = field.metadata();
+  const FieldStatistics figures = statistics(field);
+  return {{"leaves", figures.leaves},
+          {"nodes", figures.nodes},
+          {"coefficients", figures.coefficients},
+          {"precision", field.singlePrecision() ? "float" : "double"},
+          {"bytes", figures.bytes},
+          {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
+          {"total_error", metadata.totalError},
+          {"target_error", metadata.targetError},
+          {"rms_estimate", metadata.rmsEstimate(field.domain())},
+          {"rounding_rms", metadata.roundingRms},
+          {"exact_evaluations", metadata.exactEvaluations},
+          {"domain", boxJson(field.domain())},
+          {"grid", field.grid()},
+          {"strategy", strategyName(metadata.strategy)},
+          {"nearness", metadata.nearness},
+          {"max_degree", metadata.maxDegree},
+          {"max_depth", metadata.maxDepth},
+          {"quadrature", metadata.quadrature},
+          {"band", metadata.band},
+          {"reference_length", metadata.referenceLength},
+          {"mesh",
+           {{"name", metadata.source.name},
+            {"fingerprint", fingerprintText(metadata.source.fingerprint)},
+            {"vertices", metadata.source.vertices},
+            {"faces", metadata.source.faces}}},
+          {"degree_volume", levelsJson(figures.degreeVolume)},
+          {"depth_volume", levelsJson(figures.depthVolume)},
+          {"degree_leaves", levelsJson(figures.degreeLeaves)},
+          {"depth_leaves", levelsJson(figures.depthLeaves)}};
+}
+
+std::string fieldLine(const Field& field) {
+  const FieldStatistics figures = statistics(field);
+  return fmt::format("{} leaves, {} coefficients ({}), {}", grouped(figures.leaves), grouped(figures.coefficients),
+                     field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
+}
+
+std::string fieldText(const CurrentField& current) {
+  const Field& field = current.field;
+  const FieldMetadata& metadata = field.metadata();
+  const FieldStatistics figures = statistics(field);
+  const auto& grid = field.grid();
+  const bool fromMesh = metadata.source.faces > 0;
+  std::string text = current.name + "\n";
+  text += row("made from", metadata.source.name.empty() ? "a function" : metadata.source.name);
+  if (fromMesh) {
+    text += row("vertices, faces",
+                fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
+    text += row("fingerprint", fingerprintText(metadata.source.fingerprint));
+  }
+  text += row("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
+  text += row("leaves", grouped(figures.leaves));
+  text += row("coefficients",
+              fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
+  text += row("memory", bytesText(double(figures.bytes)));
+  if (current.fileBytes) text += row("file", bytesText(double(*current.fileBytes)));
+  text += row("error, target", fmt::format("{:.4g}, {:.4g} (at the scale where the longest side is 2)",
+                                           metadata.totalError, metadata.targetError));
+  text += row("estimated RMS error", fmt::format("{:.4g} (mesh units)", metadata.rmsEstimate(field.domain())));
+  if (field.singlePrecision()) text += row("change by float", fmt::format("{:.4g} RMS", metadata.roundingRms));
+  text += row("exact distances", grouped(metadata.exactEvaluations));
+  text += row("settings", fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
+                                      strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
+                                      metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
+  if (metadata.band > 0) text += row("narrow band", fmt::format("{}", metadata.band));
+  text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
+  text += histogram("depth", figures.depthVolume, figures.depthLeaves);
+  return text;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,38 @@
+#pragma once
+// What is known of a mesh or a field, for people and for machines.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <string>
+
+#include "hpsdf/mesh_report.h"
+#include "session.h"
+
+namespace hpsdf::app {
+
+using Json = nlohmann::ordered_json;
+
+/// Indented, ending in a newline; names that are not UTF-8 are mended rather than refused.
+void printJson(std::ostream& out, const Json& json);
+
+Json meshJson(const std::string& name, const MeshReport& report);
+std::string meshText(const std::string& name, const MeshReport& report);
+
+/// One line for a mesh whose inside is not defined; "" for a closed one.
+std::string meshWarning(const std::string& name, const MeshReport& report);
+
+Json fieldJson(const CurrentField& current);
+std::string fieldText(const CurrentField& current);
+
+/// "54,935 leaves, 460,210 coefficients (float32), 2.3 MB"
+std::string fieldLine(const Field& field);
+
+/// 1234567 → "1,234,567"
+std::string grouped(std::uint64_t number);
+/// 8400000 → "8.40 MB"
+std::string bytesText(double bytes);
+
+std::string strategyName(Strategy strategy);
+
+}  // namespace hpsdf::app
