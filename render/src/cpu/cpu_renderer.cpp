@@ -1,0 +1,105 @@
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "cpu/trace.h"
+#include "hpsdf/error.h"
+#include "hpsdf/render/renderer.h"
+#include "view_buffers.h"
+
+namespace hpsdf::render {
+namespace {
+
+bool inside(const Vector3& p, const Vector3& grid) {
+  return (p.array() >= 0).all() && (p.array() <= grid.array()).all();
+}
+
+/// The part of a ray from the eye within the domain; t counts from its start. Empty where it misses.
+struct Entry {
+  Ray ray;
+  double fromEye;  ///< world units from the eye to the part's start
+};
+
+std::optional<Entry> enter(const GridSpace& space, const Vector3& eye, const Vector3& direction) {
+  double first = 0;
+  double last = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double toLo = (0 - eye[axis]) / direction[axis];
+    const double toHi = (space.grid[axis] - eye[axis]) / direction[axis];
+    if (direction[axis] != 0) {
+      first = std::max(first, std::min(toLo, toHi));
+      last = std::min(last, std::max(toLo, toHi));
+    } else if (!(eye[axis] >= 0 && eye[axis] <= space.grid[axis])) {
+      return std::nullopt;
+    }
+  }
+  if (!(first < last)) return std::nullopt;
+  return Entry{{eye + first * direction, direction, last - first}, first};
+}
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(const Field& field) : field_(field.data()) {}
+
+  ViewBuffers slice(const SliceView& view, int width, int height) override {
+    const SliceGeometry geometry(field_.space(), view, width, height);
+    ViewBuffers buffers = emptyBuffers(width, height, false);
+    tbb::parallel_for(0, height, [&](int y) {
+      for (int x = 0; x < width; ++x) slicePixel(geometry, x, y, buffers);
+    });
+    return buffers;
+  }
+
+  ViewBuffers surface(const SurfaceView& view, int width, int height) override {
+    checkOffset(view.offset);
+    const RayGeometry geometry(field_.space(), view.camera, width, height);
+    ViewBuffers buffers = emptyBuffers(width, height, true);
+    tbb::parallel_for(0, height, [&](int y) {
+      for (int x = 0; x < width; ++x) surfacePixel(geometry, view.offset, x, y, buffers);
+    });
+    return buffers;
+  }
+
+  std::string description() const override { return "CPU, double precision"; }
+
+ private:
+  void slicePixel(const SliceGeometry& geometry, int x, int y, ViewBuffers& buffers) const {
+    const Vector3 p = geometry.point(x, y);
+    if (!inside(p, field_.space().grid)) return;
+    const CellPoint at = field_.leafAt(p);
+    const std::size_t pixel = std::size_t(y) * buffers.width + x;
+    setCell(at, pixel, buffers);
+    buffers.value[pixel] = static_cast<float>(field_.value(at.node, 2 * at.fraction - Vector3::Ones()));
+  }
+
+  void surfacePixel(const RayGeometry& geometry, double offset, int x, int y, ViewBuffers& buffers) const {
+    const Vector3 direction = geometry.direction(x, y);
+    const auto entry = enter(field_.space(), geometry.eye, direction.cwiseProduct(geometry.scale));
+    if (!entry) return;
+    const auto hit = field_.trace(entry->ray, offset);
+    if (!hit) return;
+    const std::size_t pixel = std::size_t(y) * buffers.width + x;
+    setCell(hit->cell, pixel, buffers);
+    const Sample sample = field_.sample(hit->cell.node, hit->local);
+    const Vector3 gradient = field_.worldGradient(sample.gradient, hit->cell.depth);
+    const double length = gradient.norm();
+    // a cell of degree 0 has no gradient: face the eye
+    buffers.normal[pixel] = (length > 0 ? Vector3(gradient / length) : Vector3(-direction)).cast<float>();
+    buffers.value[pixel] = static_cast<float>(sample.value);
+    buffers.distance[pixel] = static_cast<float>(entry->fromEye + hit->t);
+  }
+
+  void setCell(const CellPoint& at, std::size_t pixel, ViewBuffers& buffers) const {
+    buffers.cell[pixel] = at.node;
+    buffers.degree[pixel] = static_cast<std::uint8_t>(field_.degree(at.node));
+    buffers.depth[pixel] = static_cast<std::uint8_t>(at.depth);
+  }
+
+  TraceField field_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> makeCpuRenderer(const Field& field) { return std::make_unique<CpuRenderer>(field); }
+
+}  // namespace hpsdf::render

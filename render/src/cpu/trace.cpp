@@ -1,0 +1,247 @@
+#include "cpu/trace.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hpsdf::render {
+namespace {
+
+// All lengths in domain diagonals, the same as in shaders/surface.frag.
+constexpr double kNudge = 1e-6;      // beyond a face; also the shortest step
+constexpr double kConverged = 1e-8;  // change of the root between two steps of its refinement
+constexpr int kMostSteps = 1 << 16;
+constexpr int kMostRefinements = 24;
+
+/// Calls f(coefficients) with a pointer to the leaf's coefficients, of either type.
+template <typename F>
+auto withCoefficients(const FieldData& field, std::uint32_t leaf, F&& f) {
+  return std::visit([&](const auto& c) { return f(c.data() + node::offset(field.nodes[leaf])); }, field.coefficients);
+}
+
+/// L_i(x) and L_i'(x) for i = 0..degree.
+struct Legendre {
+  Legendre(double x, int degree) {
+    value[0] = 1;
+    derivative[0] = 0;
+    for (int i = 1; i <= degree; ++i) {
+      const double before = i > 1 ? value[i - 2] : 0;
+      value[i] = ((2 * i - 1) * x * value[i - 1] - (i - 1) * before) / i;
+      derivative[i] = (2 * i - 1) * value[i - 1] + (i > 1 ? derivative[i - 2] : 0);
+    }
+  }
+  std::array<double, kMaxDegree + 1> value;
+  std::array<double, kMaxDegree + 1> derivative;
+};
+
+template <typename T>
+Sample evaluateWithGradient(const T* c, int degree, const Vector3& local) {
+  const Legendre x(local.x(), degree), y(local.y(), degree), z(local.z(), degree);
+  Sample result{0, Vector3::Zero()};
+  for (int i = 0; i <= degree; ++i)
+    for (int j = 0; j <= degree - i; ++j) {
+      double line = 0, lineDz = 0;
+      for (int k = 0; k <= degree - i - j; ++k) {
+        line += *c * z.value[k];
+        lineDz += *c++ * z.derivative[k];
+      }
+      result.value += line * y.value[j] * x.value[i];
+      result.gradient += Vector3(line * y.value[j] * x.derivative[i], line * y.derivative[j] * x.value[i],
+                                 lineDz * y.value[j] * x.value[i]);
+    }
+  return result;
+}
+
+template <typename T>
+double evaluate(const T* c, int degree, const Vector3& local) {
+  const Legendre x(local.x(), degree), y(local.y(), degree), z(local.z(), degree);
+  double value = 0;
+  for (int i = 0; i <= degree; ++i)
+    for (int j = 0; j <= degree - i; ++j) {
+      double line = 0;
+      for (int k = 0; k <= degree - i - j; ++k) line += *c++ * z.value[k];
+      value += line * y.value[j] * x.value[i];
+    }
+  return value;
+}
+
+Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
+
+/// World length from the point to where the ray leaves the node's box.
+double lengthToExit(const CellPoint& at, const Vector3& direction) {
+  double exit = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0) continue;
+    const double ahead = direction[axis] > 0 ? 1 - at.fraction[axis] : at.fraction[axis];
+    exit = std::min(exit, ahead / std::abs(std::ldexp(direction[axis], at.depth)));
+  }
+  return exit;
+}
+
+}  // namespace
+
+TraceField::TraceField(const FieldData& field) : field_(field), space_(field), bounds_(nodeBounds(field)) {}
+
+CellPoint TraceField::baseCellAt(const Vector3& p) const {
+  CellPoint at;
+  std::uint32_t index[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const double clamped = std::clamp(p[axis], 0.0, space_.grid[axis]);
+    index[axis] = std::min(static_cast<std::uint32_t>(clamped), field_.grid[axis] - 1);
+    at.base[axis] = index[axis];
+    at.fraction[axis] = clamped - index[axis];
+  }
+  at.node = (index[2] * field_.grid[1] + index[1]) * field_.grid[0] + index[0];
+  at.depth = 0;
+  at.path.setZero();
+  return at;
+}
+
+void TraceField::descend(CellPoint& at) const {
+  std::uint32_t child = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double doubled = 2 * at.fraction[axis];
+    const std::uint32_t upper = doubled >= 1;
+    at.fraction[axis] = doubled - upper;
+    at.path[axis] = 2 * at.path[axis] + upper;
+    child |= upper << axis;
+  }
+  at.node = node::firstChild(field_.nodes[at.node]) + child;
+  ++at.depth;
+}
+
+CellPoint TraceField::leafAt(const Vector3& p) const {
+  CellPoint at = baseCellAt(p);
+  while (!node::isLeaf(field_.nodes[at.node])) descend(at);
+  return at;
+}
+
+double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) const {
+  const int p = degree(leaf);
+  if (p == 0) return 0;
+  // c_100, c_010, c_001 in lexicographic order
+  return withCoefficients(field_, leaf, [&](const auto* c) {
+    return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
+           c[1] * direction.z();
+  });
+}
+
+bool TraceField::excludes(std::uint32_t node, double offset) const {
+  return bounds_[node].lo > offset || bounds_[node].hi < offset;
+}
+
+CellPoint TraceField::relevantNodeAt(const Vector3& p, double offset) const {
+  CellPoint at = baseCellAt(p);
+  while (!node::isLeaf(field_.nodes[at.node]) && !excludes(at.node, offset)) descend(at);
+  return at;
+}
+
+Sample TraceField::sample(std::uint32_t leaf, const Vector3& local) const {
+  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluateWithGradient(c, degree(leaf), local); });
+}
+
+double TraceField::value(std::uint32_t leaf, const Vector3& local) const {
+  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluate(c, degree(leaf), local); });
+}
+
+Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
+  return std::ldexp(2.0, depth) * local.cwiseProduct(space_.grid).cwiseQuotient(space_.size);
+}
+
+std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
+  const double nudge = kNudge * space_.diagonal;
+  const auto localAt = [&](const CellPoint& cell, double t) -> Vector3 {
+    const Vector3 inBase = ray.origin - cell.base + t * ray.direction;
+    return localFromFraction(inBase * std::ldexp(1.0, cell.depth) - cell.path);
+  };
+  // positive on the side of the surface on which the ray starts
+  double side = 0;
+  const auto heightAt = [&](const CellPoint& cell, double t) {
+    return side * (value(cell.node, localAt(cell, t)) - offset);
+  };
+
+  // The only root of a cell between a (height > 0) and b (height ≤ 0): regula falsi, Illinois variant.
+  const auto refine = [&](const CellPoint& cell, double a, double heightA, double b, double heightB) {
+    double t = b;
+    for (int i = 0; i < kMostRefinements; ++i) {
+      const double next = b - heightB * (b - a) / (heightB - heightA);
+      const double change = std::abs(next - t);
+      t = next;
+      if (change <= kConverged * space_.diagonal) break;
+      const double height = heightAt(cell, t);
+      if ((height > 0) == (heightB > 0)) {
+        heightA *= 0.5;
+      } else {
+        a = b;
+        heightA = heightB;
+      }
+      b = t;
+      heightB = height;
+    }
+    return Hit{t, cell, localAt(cell, t)};
+  };
+  const auto hitOnFace = [&](double t) {
+    const CellPoint cell = leafAt(ray.origin + t * ray.direction);
+    return Hit{t, cell, localFromFraction(cell.fraction)};
+  };
+
+  double t = 0;
+  // what the step before has left where it stayed in its leaf: the height at t, and the longest step to try
+  std::uint32_t lastLeaf = kNoCell;
+  double lastHeight = 0;
+  double reach = 0;
+  for (int step = 0; step < kMostSteps && t <= ray.length; ++step) {
+    const CellPoint at = relevantNodeAt(ray.origin + t * ray.direction, offset);
+    const NodeBounds& bounds = bounds_[at.node];
+    const double toExit = lengthToExit(at, ray.direction);
+    if (excludes(at.node, offset)) {
+      const double sideHere = bounds.lo > offset ? 1 : -1;
+      if (side == 0) side = sideHere;
+      if (side != sideHere) return hitOnFace(t);
+      t += toExit + nudge;
+      continue;
+    }
+    if (at.node != lastLeaf) {
+      const double here = value(at.node, localFromFraction(at.fraction)) - offset;
+      if (side == 0) side = here >= 0 ? 1 : -1;
+      lastLeaf = at.node;
+      lastHeight = side * here;
+      reach = std::numeric_limits<double>::infinity();
+      if (lastHeight < 0) return hitOnFace(t);
+    }
+    // within this leaf the height's slope along the ray lies between these two, its second derivative in ±curve
+    const Vector3 localDirection = std::ldexp(2.0, at.depth) * ray.direction;
+    const double slope = side * linearSlope(at.node, localDirection);
+    const double bend = bounds.bend * localDirection.norm();
+    const double curve = bounds.curve * localDirection.squaredNorm();
+    const double steepest = slope - bend;
+    const double shallowest = slope + bend;
+    if (lastHeight + steepest * toExit >= 0) {
+      t += toExit + nudge;
+      lastLeaf = kNoCell;
+      continue;
+    }
+    const bool falling = shallowest < 0;  // throughout: at most one root
+    const double safe = lastHeight / -steepest + nudge;
+    const double length =
+        std::min(toExit, falling ? lastHeight / -shallowest + nudge
+                                 : std::max(safe, std::min(reach, std::sqrt(4 * lastHeight / curve))));
+    const double ahead = heightAt(at, t + length);
+    const bool certain = falling || length <= safe;
+    if (ahead <= 0 && (certain || lastHeight - ahead > 0.5 * curve * length * length))
+      return refine(at, t, lastHeight, t + length, ahead);
+    // the height sags below its chord by at most curve · length² / 8
+    if (ahead > 0 && (certain || std::min(lastHeight, ahead) > 0.125 * curve * length * length)) {
+      const bool leaves = length == toExit;
+      t += leaves ? length + nudge : length;
+      if (leaves) lastLeaf = kNoCell;
+      lastHeight = ahead;
+      reach = std::numeric_limits<double>::infinity();
+    } else {
+      reach = 0.25 * length;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,76 @@
+#pragma once
+// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. shaders/field.glsl and
+// shaders/surface.frag hold the same steps under the same names in single precision.
+
+#include <optional>
+#include <vector>
+
+#include "grid_space.h"
+#include "hpsdf/field.h"
+#include "node_bounds.h"
+
+namespace hpsdf::render {
+
+/// A node that holds a point.
+struct CellPoint {
+  std::uint32_t node;
+  int depth;
+  Vector3 base;      ///< lower corner of the base cell, grid coordinates
+  Vector3 path;      ///< lower corner of the node within its base cell, counted in nodes of its depth
+  Vector3 fraction;  ///< of the point within the node, in [0, 1]
+};
+
+struct Sample {
+  double value;
+  Vector3 gradient;  ///< with respect to local coordinates
+};
+
+/// A part of a ray: point(t) = origin + t · direction, t from 0 to `length`.
+struct Ray {
+  Vector3 origin;     ///< grid coordinates, within the domain
+  Vector3 direction;  ///< grid coordinates per world unit
+  double length;      ///< world units, up to where it leaves the domain
+};
+
+struct Hit {
+  double t;
+  CellPoint cell;
+  Vector3 local;  ///< coordinates within the cell, in [-1, 1] but for rounding
+};
+
+/// A field made ready for tracing. Keeps a reference to the field.
+class TraceField {
+ public:
+  explicit TraceField(const FieldData& field);
+
+  const GridSpace& space() const { return space_; }
+
+  /// The leaf that holds a point given in grid coordinates.
+  CellPoint leafAt(const Vector3& p) const;
+
+  Sample sample(std::uint32_t leaf, const Vector3& local) const;
+  double value(std::uint32_t leaf, const Vector3& local) const;
+
+  int degree(std::uint32_t leaf) const { return node::degree(field_.nodes[leaf]); }
+
+  /// World gradient from one in local coordinates of a cell.
+  Vector3 worldGradient(const Vector3& local, int depth) const;
+
+  /// The first crossing of f = offset (docs/rendering.md, "Tracing").
+  std::optional<Hit> trace(const Ray& ray, double offset) const;
+
+ private:
+  CellPoint baseCellAt(const Vector3& p) const;
+  void descend(CellPoint& at) const;
+  /// Down to a leaf, or to a node in whose box the field cannot reach `offset`.
+  CellPoint relevantNodeAt(const Vector3& p, double offset) const;
+  /// Slope of the leaf's linear part along a direction in local coordinates.
+  double linearSlope(std::uint32_t leaf, const Vector3& direction) const;
+  bool excludes(std::uint32_t node, double offset) const;
+
+  const FieldData& field_;
+  GridSpace space_;
+  std::vector<NodeBounds> bounds_;
+};
+
+}  // namespace hpsdf::render

@@ -1,0 +1,203 @@
+#include "gl/egl_context.h"
+
+#include <dlfcn.h>
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+
+#include <array>
+#include <cstdio>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::render {
+namespace {
+
+/// A rung of the ladder: a name for messages and the display, or EGL_NO_DISPLAY.
+struct Rung {
+  std::string name;
+  std::function<EGLDisplay()> display;
+};
+
+bool hasExtension(const char* list, std::string_view name) {
+  std::string_view rest = list == nullptr ? "" : list;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find(' '), rest.size());
+    if (rest.substr(0, end) == name) return true;
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return false;
+}
+
+std::string eglErrorText() {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "EGL error 0x%04x", static_cast<unsigned>(eglGetError()));
+  return buffer;
+}
+
+bool isSoftware(std::string_view renderer) {
+  for (const std::string_view name : {"llvmpipe", "softpipe", "swrast", "Software Rasterizer"})
+    if (renderer.find(name) != std::string_view::npos) return true;
+  return false;
+}
+
+/// libepoxy ends the program where a library that it opens is missing: ask first.
+std::string missingLibraries() {
+  const auto opens = [](const char* name) {
+    void* library = dlopen(name, RTLD_LAZY | RTLD_LOCAL);
+    if (library != nullptr) dlclose(library);
+    return library != nullptr;
+  };
+  if (!opens("libEGL.so.1")) return "libEGL.so.1 is not installed";
+  if (!opens("libOpenGL.so.0") && !opens("libGL.so.1")) return "neither libOpenGL.so.0 nor libGL.so.1 is installed";
+  return {};
+}
+
+/// The devices that are, or are not, software.
+void addDevices(const char* clientExtensions, bool software, std::vector<Rung>& rungs, std::string& tried) {
+  const char* kind = software ? "software" : "hardware";
+  const bool enumerates = hasExtension(clientExtensions, "EGL_EXT_device_base") ||
+                          (hasExtension(clientExtensions, "EGL_EXT_device_enumeration") &&
+                           hasExtension(clientExtensions, "EGL_EXT_device_query"));
+  if (!enumerates || !hasExtension(clientExtensions, "EGL_EXT_platform_base") ||
+      !hasExtension(clientExtensions, "EGL_EXT_platform_device")) {
+    tried += std::string("; ") + kind + " devices: EGL cannot list devices";
+    return;
+  }
+  std::array<EGLDeviceEXT, 64> devices;
+  EGLint count = 0;
+  if (!eglQueryDevicesEXT(static_cast<EGLint>(devices.size()), devices.data(), &count)) count = 0;
+  int found = 0;
+  for (EGLint i = 0; i < count; ++i) {
+    EGLDeviceEXT device = devices[i];
+    const char* extensions = eglQueryDeviceStringEXT(device, EGL_EXTENSIONS);
+    if (hasExtension(extensions, "EGL_MESA_device_software") != software) continue;
+    ++found;
+    rungs.push_back({std::string(kind) + " device " + std::to_string(i),
+                     [device] { return eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr); }});
+  }
+  if (found == 0) tried += std::string("; ") + kind + " devices: none among " + std::to_string(count);
+}
+
+std::vector<Rung> ladder(GlChoice choice, std::string& tried) {
+  const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  std::vector<Rung> rungs;
+  if (choice != GlChoice::software) addDevices(client, false, rungs, tried);
+  if (choice != GlChoice::hardware) addDevices(client, true, rungs, tried);
+  if (hasExtension(client, "EGL_EXT_platform_base") && hasExtension(client, "EGL_MESA_platform_surfaceless"))
+    rungs.push_back({"surfaceless Mesa", [] {
+                       return eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
+                     }});
+  else
+    tried += "; surfaceless Mesa: not offered by EGL";
+  rungs.push_back({"default display", [] { return eglGetDisplay(EGL_DEFAULT_DISPLAY); }});
+  return rungs;
+}
+
+/// A context, or why there is none.
+struct Attempt {
+  EGLContext context;
+  std::string reason;
+};
+
+Attempt failed(std::string reason) { return {EGL_NO_CONTEXT, std::move(reason)}; }
+
+Attempt attempt(EGLDisplay display) {
+  if (display == EGL_NO_DISPLAY) return failed("no such display");
+  // A display is one of the whole process and its initialisation is not counted: another part of the program may use
+  // it too, so that it is never terminated here.
+  if (!eglInitialize(display, nullptr, nullptr)) return failed("does not initialise, " + eglErrorText());
+  const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
+  for (const char* needed : {"EGL_KHR_no_config_context", "EGL_KHR_surfaceless_context", "EGL_KHR_create_context"})
+    if (!hasExtension(extensions, needed)) return failed(std::string("lacks ") + needed);
+  if (!eglBindAPI(EGL_OPENGL_API)) return failed("has no desktop OpenGL");
+  constexpr EGLint kAttributes[] = {
+      EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes);
+  if (context == EGL_NO_CONTEXT) return failed("gives no OpenGL 4.5 core context, " + eglErrorText());
+  return {context, {}};
+}
+
+const char* choiceText(GlChoice choice) {
+  switch (choice) {
+    case GlChoice::software:
+      return "on a software device";
+    case GlChoice::hardware:
+      return "on a hardware device";
+    case GlChoice::automatic:
+      break;
+  }
+  return "on any device";
+}
+
+[[noreturn]] void noContext(GlChoice choice, std::string_view tried) {
+  const char* advice = choice == GlChoice::hardware
+                           ? "install the graphics driver, choose software or automatic, or render with --cpu"
+                           : "install libegl-mesa0 and libgl1-mesa-dri, or render with --cpu";
+  throw Error(std::string("no OpenGL 4.5 through EGL ") + choiceText(choice) + " (tried " + std::string(tried) +
+              "): " + advice);
+}
+
+}  // namespace
+
+struct EglContext::Current::Before {
+  EGLDisplay display;
+  EGLContext context;
+  EGLSurface draw, read;
+  EGLenum api;
+  EGLDisplay ours;
+};
+
+EglContext::Current::Current(const EglContext& context)
+    : before_(new Before{eglGetCurrentDisplay(), eglGetCurrentContext(), eglGetCurrentSurface(EGL_DRAW),
+                         eglGetCurrentSurface(EGL_READ), eglQueryAPI(), context.display_}) {
+  eglBindAPI(EGL_OPENGL_API);
+  if (!eglMakeCurrent(context.display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context.context_)) {
+    const std::string reason = eglErrorText();
+    eglBindAPI(before_->api);
+    throw Error("the OpenGL context cannot be made current (" + reason + "): use a renderer on one thread at a time");
+  }
+}
+
+EglContext::Current::~Current() {
+  if (before_->context == EGL_NO_CONTEXT)
+    eglMakeCurrent(before_->ours, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  else
+    eglMakeCurrent(before_->display, before_->draw, before_->read, before_->context);
+  eglBindAPI(before_->api);
+}
+
+EglContext::EglContext(GlChoice choice) {
+  const std::string missing = missingLibraries();
+  if (!missing.empty()) noContext(choice, missing);
+  std::string tried;
+  for (const Rung& rung : ladder(choice, tried)) {
+    display_ = rung.display();
+    Attempt result = attempt(display_);
+    context_ = result.context;
+    if (context_ != EGL_NO_CONTEXT) {
+      try {
+        const Current current(*this);
+        renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+      } catch (const Error& error) {
+        result.reason = error.what();
+      }
+      const bool software = isSoftware(renderer_);
+      if (result.reason.empty() && choice == GlChoice::hardware && software)
+        result.reason = "\"" + renderer_ + "\" is a software renderer";
+      if (result.reason.empty() && choice == GlChoice::software && !software)
+        result.reason = "\"" + renderer_ + "\" is not a software renderer";
+      if (result.reason.empty()) return;
+      eglDestroyContext(display_, context_);
+    }
+    tried += "; " + rung.name + ": " + result.reason;
+  }
+  noContext(choice, std::string_view(tried).substr(2));
+}
+
+EglContext::~EglContext() { eglDestroyContext(display_, context_); }
+
+}  // namespace hpsdf::render

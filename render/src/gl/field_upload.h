@@ -1,0 +1,27 @@
+#pragma once
+
+#include "gl/gl_objects.h"
+#include "hpsdf/field.h"
+
+namespace hpsdf::render {
+
+/// A field on the device, as two buffer textures: Mesa's llvmpipe allows them 2^27 texels, a storage buffer only 128
+/// MiB.
+///
+/// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the first texel of coefficients; the rest
+/// are `NodeBounds`: y = upper halves of the floats hi (high) and lo (low), rounded outwards, z = bend and w = curve,
+/// as bits of floats. coefficients, R32F: as in FieldData.
+class FieldUpload {
+ public:
+  /// Throws `Error` when the field exceeds what the device holds.
+  explicit FieldUpload(const FieldData& field);
+
+  /// To texture units 0 (nodes) and 1 (coefficients).
+  void bind() const;
+
+ private:
+  GlBuffer nodeBuffer_, coefficientBuffer_;
+  GlBufferTexture nodes_, coefficients_;
+};
+
+}  // namespace hpsdf::render

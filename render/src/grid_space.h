@@ -1,0 +1,58 @@
+#pragma once
+// Grid coordinates, in which both renderers work: the domain is [0, grid], a base cell a unit cube. Views are turned
+// into grid coordinates here, once and in double precision, so that CPU and GPU start from the same numbers.
+
+#include "hpsdf/field.h"
+#include "hpsdf/render/view.h"
+
+namespace hpsdf::render {
+
+/// Throws `Error` for a width or height below 1 or above 2^20.
+void checkViewSize(int width, int height);
+
+/// World to grid coordinates; in the order of operations of core's queries, so that a plane through the middle of the
+/// domain lands on the same side of a face.
+struct GridSpace {
+  explicit GridSpace(const FieldData& field);
+
+  Vector3 point(const Vector3& x) const;
+  Vector3 direction(const Vector3& d) const { return d.cwiseQuotient(size).cwiseProduct(grid); }
+
+  Vector3 lo;    ///< corner of the domain, world units
+  Vector3 size;  ///< of the domain, world units
+  Vector3 grid;  ///< base cells an axis
+  double diagonal;
+};
+
+/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) + up · (h−2y−1) · stepY: only
+/// products and sums, which every IEEE device rounds alike.
+struct SliceGeometry {
+  SliceGeometry(const GridSpace& space, const SliceView& view, int width, int height);
+
+  Vector3 point(int x, int y) const {
+    return (origin + right * ((2 * x + 1 - width) * stepX)) + up * ((height - 2 * y - 1) * stepY);
+  }
+
+  Vector3 origin, right, up;
+  int width, height;
+  double stepX, stepY;  ///< 1/(2w), 1/(2h)
+};
+
+/// The rays of a camera. Pixel (x, y) looks along forward + right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, in world
+/// units; `scale` takes a world direction to grid coordinates.
+struct RayGeometry {
+  RayGeometry(const GridSpace& space, const Pinhole& camera, int width, int height);
+
+  Vector3 direction(int x, int y) const {
+    const Vector3 d = forward + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
+    return d / d.norm();
+  }
+
+  Vector3 eye;                 ///< grid coordinates
+  Vector3 forward, right, up;  ///< world units
+  Vector3 scale;
+  int width, height;
+  double stepX, stepY;  ///< 1/w, 1/h
+};
+
+}  // namespace hpsdf::render

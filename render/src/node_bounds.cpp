@@ -1,0 +1,71 @@
+#include "node_bounds.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace hpsdf::render {
+namespace {
+
+constexpr double kWiden = 4e-6;  // some rounding errors of single precision, relative to the sum of the coefficients
+
+/// Largest |L_i'| and |L_i''| on [-1, 1]: at its ends.
+double firstDerivative(int i) { return 0.5 * i * (i + 1); }
+double secondDerivative(int i) { return 0.125 * (i - 1) * i * (i + 1) * (i + 2); }
+
+template <typename T>
+NodeBounds leafBounds(const T* c, int degree) {
+  double sum = 0;
+  Vector3 bend = Vector3::Zero();
+  Vector3 pure = Vector3::Zero();   // second derivatives xx, yy, zz
+  Vector3 mixed = Vector3::Zero();  // yz, zx, xy
+  const T* next = c;
+  for (int i = 0; i <= degree; ++i)
+    for (int j = 0; j <= degree - i; ++j)
+      for (int k = 0; k <= degree - i - j; ++k) {
+        const double magnitude = std::abs(double(*next++));
+        sum += magnitude;
+        if (i + j + k < 2) continue;
+        const Vector3 first(firstDerivative(i), firstDerivative(j), firstDerivative(k));
+        bend += magnitude * first;
+        pure += magnitude * Vector3(secondDerivative(i), secondDerivative(j), secondDerivative(k));
+        mixed += magnitude * Vector3(first.y() * first.z(), first.z() * first.x(), first.x() * first.y());
+      }
+  const double mean = c[0];
+  const double range = sum - std::abs(mean) + kWiden * sum;
+  // the Frobenius norm of the bounds is none below the matrix's own
+  const double curve = std::sqrt(pure.squaredNorm() + 2 * mixed.squaredNorm());
+  return {static_cast<float>(mean - range), static_cast<float>(mean + range),
+          static_cast<float>(bend.norm() * (1 + kWiden) + kWiden * sum),
+          static_cast<float>(curve * (1 + kWiden) + kWiden * sum)};
+}
+
+}  // namespace
+
+std::vector<NodeBounds> nodeBounds(const FieldData& field) {
+  std::vector<NodeBounds> bounds(field.nodes.size());
+  std::visit(
+      [&](const auto& coefficients) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
+          for (std::size_t n = range.begin(); n < range.end(); ++n)
+            if (node::isLeaf(field.nodes[n]))
+              bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
+        });
+      },
+      field.coefficients);
+  // children stand behind their parents
+  for (std::size_t n = bounds.size(); n-- > 0;) {
+    if (node::isLeaf(field.nodes[n])) continue;
+    const NodeBounds* children = &bounds[node::firstChild(field.nodes[n])];
+    bounds[n] = {children[0].lo, children[0].hi, -1, 0};
+    for (int child = 1; child < 8; ++child) {
+      bounds[n].lo = std::min(bounds[n].lo, children[child].lo);
+      bounds[n].hi = std::max(bounds[n].hi, children[child].hi);
+    }
+  }
+  return bounds;
+}
+
+}  // namespace hpsdf::render

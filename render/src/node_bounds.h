@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "hpsdf/field.h"
+
+namespace hpsdf::render {
+
+/// What is certain about the field within a node, from its coefficients alone (|L_i| ≤ 1, |L_i'| ≤ i(i+1)/2,
+/// |L_i''| ≤ (i−1)i(i+1)(i+2)/8): it lets a ray pass a node without evaluating it, and step within a leaf without ever
+/// passing a zero.
+struct NodeBounds {
+  float lo;  ///< the field's values within the node lie in [lo, hi]
+  float hi;
+  /// Leaves: the gradient in local coordinates differs from that of the polynomial's linear part by at most this.
+  /// Internal nodes: −1.
+  float bend;
+  float curve;  ///< leaves: no second derivative in local coordinates, along any unit vector, is larger than this
+};
+
+/// One for every node. A little wider than the coefficients say, by what single precision may add.
+std::vector<NodeBounds> nodeBounds(const FieldData& field);
+
+}  // namespace hpsdf::render

@@ -1,0 +1,89 @@
+// What both passes of a surface share: the pixel's ray, the descent along it, and the state between passes.
+
+layout(location = 1) uniform ivec2 firstPixel;
+layout(location = 2) uniform ivec2 size;
+layout(location = 3) uniform dvec3 eye;      // grid coordinates
+layout(location = 4) uniform dvec3 forward;  // world units
+layout(location = 5) uniform dvec3 right;
+layout(location = 6) uniform dvec3 up;
+layout(location = 7) uniform dvec3 scale;  // grid coordinates per world unit
+layout(location = 8) uniform dvec2 pixelStep;
+layout(location = 9) uniform float offset;
+layout(location = 10) uniform float diagonal;  // of the domain, world units
+
+// State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, height
+// at a, b, height at b), for a pixel under way (last height, reach, -, -).
+layout(binding = 2) uniform usampler2D stateIntegers;
+layout(binding = 3) uniform sampler2D stateFloats;
+
+const uint kMiss = 0u;
+const uint kUnderWay = 1u;
+const uint kOnFace = 2u;     // the surface is crossed at t, where the ray enters a leaf
+const uint kBracketed = 3u;  // the surface is crossed between a and b, within one leaf
+
+struct Ray {
+  dvec3 worldDirection;  // unit
+  dvec3 origin;          // where the ray enters the domain, grid coordinates
+  dvec3 direction;       // grid coordinates per world unit
+  double fromEye;        // world units from the eye to the origin
+  double length;         // world units within the domain; negative for a ray that misses it
+};
+
+Ray pixelRay() {
+  ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
+  Ray ray;
+  ray.worldDirection = forward + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
+                       up * (double(size.y - 2 * pixel.y - 1) * pixelStep.y);
+  ray.worldDirection /= sqrt(dot(ray.worldDirection, ray.worldDirection));
+  ray.direction = ray.worldDirection * scale;
+  double first = 0.0lf;
+  double last = 1e300lf;
+  for (int axis = 0; axis < 3; ++axis) {
+    double extent = double(grid[axis]);
+    if (ray.direction[axis] != 0.0lf) {
+      double toLo = -eye[axis] / ray.direction[axis];
+      double toHi = (extent - eye[axis]) / ray.direction[axis];
+      first = max(first, min(toLo, toHi));
+      last = min(last, max(toLo, toHi));
+    } else if (!(eye[axis] >= 0.0lf && eye[axis] <= extent)) {
+      last = -1.0lf;
+    }
+  }
+  ray.origin = eye + first * ray.direction;
+  ray.fromEye = first;
+  ray.length = first < last ? last - first : -1.0lf;
+  return ray;
+}
+
+// A node that holds a point.
+struct CellPoint {
+  Node node;
+  uint depth;
+  float scale;    // 2^depth
+  vec3 base;      // lower corner of the base cell, grid coordinates
+  uvec3 path;     // lower corner of the node within its base cell, counted in nodes of its depth
+  vec3 fraction;  // of the point within the node, in [0, 1]
+};
+
+CellPoint baseCellAt(vec3 p) {
+  p = clamp(p, vec3(0.0), vec3(grid));
+  uvec3 base = min(uvec3(p), grid - 1u);
+  CellPoint at;
+  at.node = fetchNode(baseCellIndex(base));
+  at.depth = 0u;
+  at.scale = 1.0;
+  at.base = vec3(base);
+  at.path = uvec3(0u);
+  at.fraction = p - at.base;
+  return at;
+}
+
+void descend(inout CellPoint at) {
+  vec3 doubled = 2.0 * at.fraction;
+  uvec3 upper = uvec3(greaterThanEqual(doubled, vec3(1.0)));
+  at.fraction = doubled - vec3(upper);
+  at.path = 2u * at.path + upper;
+  at.node = fetchNode(childIndex(at.node, upper));
+  ++at.depth;
+  at.scale *= 2.0;
+}
