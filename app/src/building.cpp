@@ -34,13 +34,13 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
   const Normalization to = normalizationOf(distance.source().box);
   Source source = distance.source();
   source.box = Box(to.scale * (source.box.min() - to.centre), to.scale * (source.box.max() - to.centre));
-  const auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
+  auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
     std::vector<Vector3> original(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.centre;
     distance(original, out);
     for (double& value : out) value *= to.scale;
   };
-  return DistanceFunction(evaluate, source);
+  return DistanceFunction(std::move(evaluate), source);  // moved: of an lvalue it would keep a reference
 }
 
 bool wantsNormalized(const Arguments& arguments) {

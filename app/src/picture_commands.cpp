@@ -149,12 +149,14 @@ std::vector<Parameter> backendParameters() {
            .choices = {"auto", "software", "hardware"}}};
 }
 
-Backend backend(const Arguments& arguments) {
+render::GlChoice glChoice(const Arguments& arguments) {
   const std::string gl = arguments.text("gl");
-  return {arguments.flag("cpu"), gl == "software"   ? render::GlChoice::software
-                                 : gl == "hardware" ? render::GlChoice::hardware
-                                                    : render::GlChoice::automatic};
+  return gl == "software"   ? render::GlChoice::software
+         : gl == "hardware" ? render::GlChoice::hardware
+                            : render::GlChoice::automatic;
 }
+
+Backend backend(const Arguments& arguments) { return {arguments.flag("cpu"), glChoice(arguments)}; }
 
 render::SlicePicture slicePicture(const Arguments& arguments) {
   render::SlicePicture picture;

@@ -7,6 +7,9 @@
 
 namespace hpsdf::app {
 
+/// Of --gl alone.
+render::GlChoice glChoice(const Arguments& arguments);
+
 Backend backend(const Arguments& arguments);
 
 /// Throws `Error` when plane and axis are both given.

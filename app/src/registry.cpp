@@ -175,7 +175,8 @@ class ArgumentReader {
     if (parameter.positional) names += "," + parameter.name;
     CLI::Option* option = parser.add_option(names);
     if (parameter.repeatable) option->expected(1, CLI::detail::expected_max_vector_size);
-    option->allow_extra_args(false);
+    // one value an occurrence: `-e A B` must leave B to the positional words
+    option->allow_extra_args(parameter.repeatable && parameter.positional);
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 

@@ -103,18 +103,17 @@ void runShapes(Session& session, const Arguments& arguments) {
     out << fmt::format("builtin:{}{}\n  {}\n", shape.name,
                        shape.analytic ? fmt::format(", analytic:{}", shape.name) : "", shape.help);
     for (const shapes::Parameter& parameter : shape.parameters)
-      out << fmt::format("    {:<10} {} ({}{} to {}; default {})\n", parameter.name, parameter.help,
+      out << fmt::format("    {:<12} {} ({}{} to {}; default {})\n", parameter.name, parameter.help,
                          parameter.whole ? "whole, " : "", parameter.minimum, parameter.maximum,
                          parameter.defaultValue);
   }
 }
 
 void runDoctor(Session& session, const Arguments& arguments) {
-  const Backend choice = backend(arguments);
   std::string renderer;
   std::string problem;
   try {
-    renderer = render::glDescription(choice.gl);
+    renderer = render::glDescription(glChoice(arguments));
   } catch (const Error& error) {
     problem = error.what();
   }

@@ -1,0 +1,747 @@
+// The program as its user meets it: most tests start the real one.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/render/image.h"
+#include "point_query.h"
+#include "progress_line.h"
+#include "report_page.h"
+#include "support/require_gl.h"
+#include "support/temporary_directory.h"
+
+extern char** environ;
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+using Clock = std::chrono::steady_clock;
+
+struct Outcome {
+  int status = -1;  ///< exit status, or -signal
+  std::string out;
+  std::string err;
+};
+
+struct Call {
+  std::vector<std::string> words;
+  std::string input = {};
+  std::map<std::string, std::string> environment = {};
+  fs::path folder = {};       ///< to run in; the caller's when empty
+  bool stdoutClosed = false;  ///< the reader of standard output has gone away
+};
+
+/// The program at work. Its output is read while it runs, so that it never waits for us.
+class Process {
+ public:
+  explicit Process(const Call& call) {
+    int in[2];
+    int out[2];
+    int err[2];
+    if (pipe2(in, O_CLOEXEC) != 0 || pipe2(out, O_CLOEXEC) != 0 || pipe2(err, O_CLOEXEC) != 0)
+      throw std::runtime_error("pipe");
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, in[0], STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, out[1], STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, err[1], STDERR_FILENO);
+    if (!call.folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, call.folder.c_str());
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    sigset_t defaults;
+    sigemptyset(&defaults);
+    sigaddset(&defaults, SIGINT);  // a test run in the background inherits an ignored one
+    sigaddset(&defaults, SIGPIPE);
+    posix_spawnattr_setsigdefault(&attributes, &defaults);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    if (call.stdoutClosed) close(out[0]);
+    const int error = spawn(call, actions, attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    close(in[0]);
+    close(out[1]);
+    close(err[1]);
+    out_ = call.stdoutClosed ? -1 : out[0];
+    err_ = err[0];
+    if (error != 0) throw std::runtime_error(std::string(HPSDF_PROGRAM ": ") + std::strerror(error));
+    feed(in[1], call.input);
+  }
+
+  ~Process() {
+    if (running_) {
+      kill(id_, SIGKILL);
+      waitpid(id_, nullptr, 0);
+    }
+    if (out_ >= 0) close(out_);
+    if (err_ >= 0) close(err_);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// Until the first line on standard error is whole, or it has ended.
+  void waitForErrorLine() {
+    while (outcome_.err.find('\n') == std::string::npos && readSome()) {
+    }
+  }
+
+  void send(int signal) { kill(id_, signal); }
+
+  Outcome finish() {
+    while (readSome()) {
+    }
+    int status = 0;
+    waitpid(id_, &status, 0);
+    running_ = false;
+    outcome_.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+    return outcome_;
+  }
+
+ private:
+  int spawn(const Call& call, const posix_spawn_file_actions_t& actions, const posix_spawnattr_t& attributes) {
+    std::vector<std::string> words = {HPSDF_PROGRAM};
+    words.insert(words.end(), call.words.begin(), call.words.end());
+    std::vector<std::string> variables;
+    for (char** entry = environ; *entry != nullptr; ++entry)
+      if (!call.environment.contains(std::string(*entry, std::strcspn(*entry, "=")))) variables.emplace_back(*entry);
+    for (const auto& [name, value] : call.environment) variables.push_back(name + "=" + value);
+    auto pointers = [](std::vector<std::string>& texts) {
+      std::vector<char*> result;
+      for (std::string& text : texts) result.push_back(text.data());
+      result.push_back(nullptr);
+      return result;
+    };
+    return posix_spawn(&id_, HPSDF_PROGRAM, &actions, &attributes, pointers(words).data(), pointers(variables).data());
+  }
+
+  /// Inputs of these tests fit into a pipe, so that this does not wait.
+  static void feed(int pipe, const std::string& input) {
+    std::signal(SIGPIPE, SIG_IGN);
+    if (!input.empty() && write(pipe, input.data(), input.size()) < 0) ADD_FAILURE() << "the program reads no input";
+    close(pipe);
+  }
+
+  /// Reads what is there; false once both streams have ended.
+  bool readSome() {
+    pollfd streams[] = {{out_, POLLIN, 0}, {err_, POLLIN, 0}};
+    if (out_ < 0 && err_ < 0) return false;
+    poll(streams, 2, -1);
+    if (streams[0].revents != 0) readFrom(out_, outcome_.out);
+    if (streams[1].revents != 0) readFrom(err_, outcome_.err);
+    return true;
+  }
+
+  static void readFrom(int& stream, std::string& text) {
+    char buffer[65536];
+    const ssize_t count = read(stream, buffer, sizeof buffer);
+    if (count > 0) {
+      text.append(buffer, static_cast<std::size_t>(count));
+    } else {
+      close(stream);
+      stream = -1;
+    }
+  }
+
+  pid_t id_ = 0;
+  bool running_ = true;
+  int out_ = -1;
+  int err_ = -1;
+  Outcome outcome_;
+};
+
+Outcome run(const Call& call) { return Process(call).finish(); }
+
+void writeFile(const fs::path& file, std::string_view text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  ASSERT_TRUE(stream.flush()) << file;
+}
+
+std::string readFile(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  EXPECT_TRUE(stream) << file;
+  return text.str();
+}
+
+std::set<std::string> namesIn(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+std::size_t lineCount(const std::string& text) { return static_cast<std::size_t>(std::ranges::count(text, '\n')); }
+
+constexpr std::string_view kTetrahedron =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
+/// A folder of its own for each test, and in it a small field, built once by the program itself.
+class Cli : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new support::TemporaryDirectory;
+    const Outcome built = run({.words = {"build", "builtin:torus", "-o", field(), "--target-error", "1e-4"}});
+    ASSERT_EQ(built.status, 0) << built.err;
+  }
+  static void TearDownTestSuite() {
+    delete shared_;
+    shared_ = nullptr;
+  }
+  static std::string field() { return (*shared_ / "torus.hpsdf").string(); }
+
+  std::string at(const std::string& name) const { return (folder_ / name).string(); }
+
+  /// Bad input: status 2, one line that holds `message`, nothing on standard output, and no file besides `before`.
+  void expectRefused(const Call& call, const std::string& message, const std::set<std::string>& before) const {
+    std::string line;
+    for (const std::string& word : call.words) line += " " + word;
+    SCOPED_TRACE("hpsdf" + line);
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+    EXPECT_THAT(outcome.err, StartsWith("hpsdf: error: "));
+    EXPECT_THAT(outcome.err, HasSubstr(message));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_EQ(namesIn(folder_.path()), before);
+  }
+  void expectRefused(const Call& call, const std::string& message) const {
+    expectRefused(call, message, namesIn(folder_.path()));
+  }
+
+  support::TemporaryDirectory folder_;
+
+ private:
+  static inline support::TemporaryDirectory* shared_ = nullptr;
+};
+
+// Help and plain behaviour
+
+TEST_F(Cli, helpAndVersion) {
+  for (const Call& call : {Call{{"--help"}}, Call{{"-h"}}, Call{{"help"}}}) {
+    const Outcome help = run(call);
+    EXPECT_EQ(help.status, 0);
+    EXPECT_THAT(help.err, IsEmpty());
+    for (const char* verb : {"build", "info", "query", "slice", "render", "run", "shapes", "doctor", "report", "mesh"})
+      EXPECT_THAT(help.out, HasSubstr("\n  " + std::string(verb)));
+  }
+  const Outcome verb = run({{"slice", "--help"}});
+  EXPECT_EQ(verb.out, run({{"help", "slice"}}).out);
+  EXPECT_THAT(verb.out, HasSubstr("--plane PX,PY,PZ,NX,NY,NZ"));
+  EXPECT_THAT(run({{"build", "--help"}}).out, HasSubstr("τ·(L/2)^5"));
+  EXPECT_THAT(run({{"--version"}}).out, testing::MatchesRegex("hpsdf [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(Cli, usageMistakesAreRefused) {
+  expectRefused({{}}, "expected a command");
+  expectRefused({{"bild"}}, "unknown command 'bild'; did you mean 'build'?");
+  expectRefused({{"--halp"}}, "unknown command '--halp'");
+  expectRefused({{"help", "slcie"}}, "did you mean 'slice'?");
+  expectRefused({{"save", "-o", at("x.hpsdf")}}, "'save' is a command of scripts");
+  expectRefused({{"build", "builtin:torus"}}, "--output is missing");
+  expectRefused({{"slice", field(), "-o", at("x.gif")}}, "expected .png for a picture, .pfm or .csv");
+  expectRefused({{"render", field(), "-o", at("x.csv")}}, "written as .png");
+  expectRefused({{"slice", field(), "-o", at("x.pfm"), "--samples", "2"}}, "one sample a pixel");
+}
+
+TEST_F(Cli, buildWritesAFieldThatLoads) {
+  const Outcome built = run({{"build", "builtin:sphere", "-o", at("s.hpsdf"), "--target-error", "1e-3", "--json"}});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const Json json = Json::parse(built.out);
+  EXPECT_GT(json.at("build_seconds").get<double>(), 0);
+  const Field loaded = load(at("s.hpsdf"));
+  const FieldStatistics counts = statistics(loaded);
+  EXPECT_EQ(json.at("leaves"), counts.leaves);
+  EXPECT_EQ(json.at("coefficients"), counts.coefficients);
+  EXPECT_EQ(json.at("mesh_report").at("closed"), true);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("s.hpsdf"));
+}
+
+TEST_F(Cli, normalizedCubeIsExact) {
+  writeFile(at("t.obj"), kTetrahedron);
+  const auto domainOf = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"build", at("t.obj"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome built = run({words});
+    EXPECT_EQ(built.status, 0) << built.err;
+    return Json::parse(built.out).at("domain");
+  };
+  const double edge = 1 + 0.1;
+  EXPECT_EQ(domainOf({"--normalize"}), Json({{-edge, -edge, -edge}, {edge, edge, edge}}));
+  EXPECT_EQ(domainOf({"--paper"}), Json({{-edge, -edge, -edge}, {edge, edge, edge}}));
+  EXPECT_EQ(domainOf({"--normalize", "--margin", "0.5"}), Json({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}));
+  EXPECT_EQ(domainOf({"--domain", "-1,-2,-3,4,5,6"}), Json({{-1, -2, -3}, {4, 5, 6}}));
+  const Json plain = domainOf({});
+  EXPECT_NEAR(plain[0][0].get<double>(), -0.05, 1e-12);
+  EXPECT_NEAR(plain[1][2].get<double>(), 1.05, 1e-12);
+}
+
+TEST_F(Cli, analyticShapesAreNormalizedToo) {
+  const Outcome built = run({{"build", "analytic:sphere,radius=0.25", "-o", at("s.hpsdf"), "--normalize",
+                              "--target-error", "1e-5", "--grid", "3"}});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const Field sphere = load(at("s.hpsdf"));
+  EXPECT_NEAR(sphere.value(Vector3(1, 0, 0)), 0, 0.02);
+  EXPECT_NEAR(sphere.value(Vector3(0, 0.5, 0)), -0.5, 0.02);
+}
+
+TEST_F(Cli, openMeshesAreWarnedAbout) {
+  writeFile(at("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const Outcome built =
+      run({{"build", at("open.obj"), "-o", at("f.hpsdf"), "--target-error", "1", "--domain", "-1,-1,-1,2,2,2"}});
+  EXPECT_EQ(built.status, 0) << built.err;
+  EXPECT_THAT(built.err, HasSubstr("open.obj: the surface is not closed (3 boundary"));
+  const Json mesh = Json::parse(run({{"mesh", at("open.obj"), "--json"}}).out);
+  EXPECT_EQ(mesh.at("closed"), false);
+  EXPECT_EQ(mesh.at("boundary_edges"), 3);
+}
+
+TEST_F(Cli, infoTellsWhatTheFieldHolds) {
+  const Outcome info = run({{"info", field(), "--json"}});
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_THAT(info.err, IsEmpty());
+  const Json json = Json::parse(info.out);
+  const Field torus = load(field());
+  const FieldStatistics counts = statistics(torus);
+  EXPECT_EQ(json.at("leaves"), counts.leaves);
+  EXPECT_EQ(json.at("coefficients"), counts.coefficients);
+  EXPECT_EQ(json.at("bytes"), counts.bytes);
+  EXPECT_EQ(json.at("total_error"), torus.metadata().totalError);
+  EXPECT_EQ(json.at("target_error"), 1e-4);
+  EXPECT_EQ(json.at("rms_estimate"), torus.metadata().rmsEstimate(torus.domain()));
+  EXPECT_EQ(json.at("exact_evaluations"), torus.metadata().exactEvaluations);
+  EXPECT_EQ(json.at("mesh").at("faces"), torus.metadata().source.faces);
+  EXPECT_EQ(std::stoull(json.at("mesh").at("fingerprint").get<std::string>(), nullptr, 16),
+            torus.metadata().source.fingerprint);
+  EXPECT_EQ(json.at("file_bytes"), fs::file_size(field()));
+  EXPECT_EQ(json.at("domain")[1][0], torus.domain().max().x());
+  for (const char* histogram : {"degree_volume", "depth_volume"}) {
+    double sum = 0;
+    for (const auto& [level, share] : json.at(histogram).items()) sum += share.get<double>();
+    EXPECT_NEAR(sum, 1, 1e-12) << histogram;
+  }
+  const Outcome text = run({{"info", field()}});
+  EXPECT_THAT(text.out, HasSubstr("leaves"));
+  EXPECT_THAT(text.out, HasSubstr("▇"));
+}
+
+TEST_F(Cli, everyCommandSpeaksJson) {
+  for (const Call& call :
+       {Call{{"shapes", "--json"}}, Call{{"help", "--json"}}, Call{{"mesh", "builtin:box", "--json"}},
+        Call{{"doctor", "--gl", "software", "--json"}}, Call{{"query", field(), "--json"}, "0 0 0\n"},
+        Call{{"run", "--json", "-e", "load \"" + field() + "\""}}}) {
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_TRUE(Json::accept(outcome.out)) << call.words[0] << ":\n" << outcome.out;
+  }
+  const Json doctor = Json::parse(run({{"doctor", "--json"}}).out);
+  for (const char* key : {"version", "compiler", "renderer", "simd", "threads", "assimp"})
+    EXPECT_TRUE(doctor.contains(key));
+}
+
+// Points
+
+TEST_F(Cli, queryAnswersPoints) {
+  const Outcome outcome =
+      run({{"query", field()}, "x,y,z\n0.1,0.2,0.3\n\n# a comment\n-0.5 1e-1 0 # here too\n9,9,9\r\n"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, IsEmpty());
+  std::istringstream lines(outcome.out);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "x,y,z,distance,gx,gy,gz");
+  const Field torus = load(field());
+  for (const Vector3& x : {Vector3(0.1, 0.2, 0.3), Vector3(-0.5, 0.1, 0), Vector3(9, 9, 9)}) {
+    ASSERT_TRUE(std::getline(lines, line));
+    std::ranges::replace(line, ',', ' ');
+    std::istringstream numbers(line);
+    std::array<double, 7> row{};
+    for (double& number : row) numbers >> number;
+    const auto [value, gradient] = torus.valueAndGradient(x);
+    EXPECT_THAT(row, ElementsAre(x.x(), x.y(), x.z(), value, gradient.x(), gradient.y(), gradient.z()));
+  }
+  EXPECT_FALSE(std::getline(lines, line));
+}
+
+TEST_F(Cli, queryReadsAndWritesFiles) {
+  writeFile(at("points.txt"), "0 0 0\n1 1 1");
+  const Outcome toFile = run({{"query", field(), at("points.txt"), "-o", at("out.csv")}});
+  EXPECT_EQ(toFile.status, 0) << toFile.err;
+  EXPECT_EQ(readFile(at("out.csv")), run({{"query", field()}, "0 0 0\n1 1 1\n"}).out);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("out.csv", "points.txt"));
+  EXPECT_EQ(run({{"query", field(), "--json"}, ""}).out, "[]\n");
+}
+
+TEST_F(Cli, badPointsAreRefusedByLine) {
+  for (const char* bad : {"1 2", "1 2 3 4", "a b c", "1,,2", "1 2 3x", "nan 0 0", "1 inf 2", ",1,2,3"}) {
+    writeFile(at("points.txt"), "0 0 0\n" + std::string(bad) + "\n");
+    expectRefused({{"query", field(), at("points.txt"), "-o", at("out.csv")}}, "points.txt:2: expected three finite");
+  }
+  const Outcome first = run({{"query", field()}, "nan,nan,nan\n"});
+  EXPECT_EQ(first.status, 2);
+  EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));
+  expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");
+  expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
+}
+
+TEST(PointQuery, answersManyBatchesInOrder) {
+  const Field field(FieldData{.domain = Box(Vector3::Zero(), Vector3::Ones()),
+                              .nodes = {node::leaf(0, 0)},
+                              .coefficients = std::vector<double>{0.25},
+                              .metadata = {}});
+  std::string text;
+  constexpr std::size_t kPoints = 40000;
+  for (std::size_t i = 0; i < kPoints; ++i) text += "0.5 0.5 " + std::to_string(double(i % 100) / 100) + "\n";
+  std::istringstream in(text);
+  std::string out;
+  std::size_t writes = 0;
+  EXPECT_EQ(queryPoints(field, in, "points", PointFormat::json,
+                        [&](std::string_view part) {
+                          out += part;
+                          ++writes;
+                        }),
+            kPoints);
+  EXPECT_GT(writes, 2u);
+  const Json json = Json::parse(out);
+  ASSERT_EQ(json.size(), kPoints);
+  for (std::size_t i = 0; i < kPoints; i += 997) {
+    EXPECT_EQ(json[i].at("z"), double(i % 100) / 100);
+    EXPECT_EQ(json[i].at("distance"), 0.25);
+  }
+}
+
+// Pictures
+
+TEST_F(Cli, drawsOnTheCpu) {
+  const Outcome slice = run({{"slice", field(), "-o", at("s.png"), "--size", "200x120", "--cpu", "--json"}});
+  ASSERT_EQ(slice.status, 0) << slice.err;
+  EXPECT_THAT(Json::parse(slice.out).at("renderer").get<std::string>(), HasSubstr("CPU"));
+  const render::Image image = render::loadPng(at("s.png"));
+  EXPECT_EQ(image.width, 200);
+  EXPECT_EQ(image.height, 120);
+  const Outcome surface = run({{"render", field(), "-o", at("r.png"), "--size", "160x90", "--cpu"}});
+  ASSERT_EQ(surface.status, 0) << surface.err;
+  EXPECT_EQ(render::loadPng(at("r.png")).width, 160);
+}
+
+TEST_F(Cli, rawSlicesHoldTheFieldsValues) {
+  ASSERT_EQ(run({{"slice", field(), "-o", at("s.csv"), "--size", "40x20", "--cpu"}}).status, 0);
+  const Field torus = load(field());
+  std::istringstream rows(readFile(at("s.csv")));
+  std::string row;
+  std::getline(rows, row);
+  EXPECT_EQ(row, "x,y,z,value");
+  std::size_t count = 0;
+  std::vector<float> values;
+  while (std::getline(rows, row)) {
+    Vector3 x;
+    double value = 0;
+    ASSERT_EQ(std::sscanf(row.c_str(), "%lf,%lf,%lf,%lf", &x[0], &x[1], &x[2], &value), 4) << row;
+    EXPECT_EQ(x.z(), 0);
+    EXPECT_NEAR(value, torus.value(x), 1e-6);
+    values.push_back(static_cast<float>(value));
+    ++count;
+  }
+  EXPECT_GT(count, 100u);
+
+  ASSERT_EQ(run({{"slice", field(), "-o", at("s.pfm"), "--size", "40x20", "--cpu"}}).status, 0);
+  const std::string pfm = readFile(at("s.pfm"));
+  const std::string header = "Pf\n40 20\n-1.0\n";
+  ASSERT_THAT(pfm, StartsWith(header));
+  ASSERT_EQ(pfm.size(), header.size() + 40 * 20 * sizeof(float));
+  std::vector<float> inside;  // in the order of the CSV: rows top to bottom
+  for (int y = 20; y-- > 0;)
+    for (int x = 0; x < 40; ++x) {
+      float value = 0;
+      std::memcpy(&value, pfm.data() + header.size() + sizeof(float) * (std::size_t(y) * 40 + std::size_t(x)),
+                  sizeof value);
+      if (!std::isnan(value)) inside.push_back(value);
+    }
+  EXPECT_EQ(inside, values);
+}
+
+TEST_F(Cli, drawsWithOpenGl) {
+  HPSDF_REQUIRE_GL();
+  const Outcome slice = run({{"slice", field(), "-o", at("s.png"), "--size", "200x120", "--gl", "software"}});
+  EXPECT_EQ(slice.status, 0) << slice.err;
+  const Outcome surface = run({{"render", field(), "-o", at("r.png"), "--size", "200x120", "--gl", "software"}});
+  EXPECT_EQ(surface.status, 0) << surface.err;
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("r.png", "s.png"));
+}
+
+TEST_F(Cli, withoutEglPicturesAreRefusedAndTheCpuStillDraws) {
+  const std::map<std::string, std::string> noEgl = {{"__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"}};
+  expectRefused({.words = {"slice", field(), "-o", at("s.png")}, .environment = noEgl}, "--cpu draws without OpenGL");
+  expectRefused({.words = {"render", field(), "-o", at("r.png")}, .environment = noEgl}, "--cpu draws without OpenGL");
+  expectRefused({.words = {"report", field(), "-o", at("report")}, .environment = noEgl}, "--cpu draws without OpenGL");
+  const Outcome doctor = run({.words = {"doctor", "--json"}, .environment = noEgl});
+  EXPECT_EQ(doctor.status, 0) << doctor.err;
+  EXPECT_TRUE(Json::parse(doctor.out).at("renderer").is_null());
+  EXPECT_EQ(
+      run({.words = {"slice", field(), "-o", at("s.png"), "--cpu", "--size", "64x64"}, .environment = noEgl}).status,
+      0);
+}
+
+// Scripts
+
+TEST_F(Cli, scriptsWorkOnTheCurrentField) {
+  writeFile(at("s.hps"),
+            "build analytic:sphere target-error=$tau grid=2\nslice size=64x64 cpu=true output=\"a b.png\"\n"
+            "save -o s.hpsdf\nload s.hpsdf\nquery points=points.txt output=q.csv\n");
+  writeFile(at("points.txt"), "0 0 0\n");
+  const Outcome outcome = run({.words = {"run", "s.hps", "tau=1e-3"}, .folder = folder_.path()});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("a b.png", "points.txt", "q.csv", "s.hps", "s.hpsdf"));
+  EXPECT_EQ(load(at("s.hpsdf")).metadata().targetError, 1e-3);
+}
+
+TEST_F(Cli, scriptLinesOnTheCommandLine) {
+  const Outcome outcome = run({{"run", "-e", "load \"$file\"; info --json", "-e", "info --json", "file=" + field()}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out.find("\"leaves\""), outcome.out.rfind("\"leaves\"", outcome.out.size() / 2));
+  EXPECT_NE(outcome.out.find("\"leaves\""), outcome.out.rfind("\"leaves\""));
+}
+
+TEST_F(Cli, scriptsRunScripts) {
+  writeFile(at("inner.hps"), "slice size=64x64 cpu=true output=$name.png\n");
+  writeFile(at("outer.hps"), "load \"$field\"\nrun inner.hps name=one\nrun inner.hps name=two\n");
+  const Outcome outcome = run({.words = {"run", "outer.hps", "field=" + field()}, .folder = folder_.path()});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("inner.hps", "one.png", "outer.hps", "two.png"));
+  writeFile(at("loop.hps"), "run loop.hps\n");
+  expectRefused({.words = {"run", "loop.hps"}, .folder = folder_.path()}, "does one run itself?");
+}
+
+TEST_F(Cli, scriptMistakesAreRefused) {
+  writeFile(at("s.hps"), "load \"" + field() + "\"\nslice colour=degree output=x.png\n");
+  expectRefused({.words = {"run", "s.hps"}, .folder = folder_.path()},
+                "s.hps:2:7: slice: unknown option 'colour'; did you mean 'color'?");
+  expectRefused({{"run", "-e", "info"}}, "-e:1:1: there is no field yet");
+  expectRefused({{"run", "-e", "load " + at("none.hpsdf")}}, "none.hpsdf");
+  expectRefused({{"run", at("none.hps")}}, "none.hps: no such file");
+  expectRefused({{"run", folder_.path().string()}}, "is a folder");
+  expectRefused({{"run", at("s.hps"), "tau"}}, "expected name=value, found 'tau'");
+  expectRefused({{"run"}}, "give a script's file");
+}
+
+// Report
+
+TEST_F(Cli, reportIsOnePageWithItsPictures) {
+  const Outcome outcome =
+      run({{"report", "builtin:torus", "-o", at("new/report"), "--target-error", "1e-3", "--cpu", "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  EXPECT_GT(json.at("frame_seconds").get<double>(), 0);
+  const std::string page = readFile(at("new/report/index.html"));
+  for (const char* picture : {"surface.png", "degree.png", "depth.png", "distance.png", "surface-degree.png"}) {
+    EXPECT_THAT(page, HasSubstr("src=\"" + std::string(picture) + "\""));
+    EXPECT_EQ(render::loadPng(at("new/report/") + picture).width, 1280);
+  }
+  EXPECT_THAT(page, HasSubstr("hpsdf build builtin:torus -o torus.hpsdf --target-error=1e-3"));
+  EXPECT_THAT(page, Not(HasSubstr("http")));
+  EXPECT_THAT(page, Not(HasSubstr("<script")));
+  EXPECT_NO_THROW(load(at("new/report/torus.hpsdf")));
+}
+
+TEST(ReportPage, escapesWhatItShows) {
+  ReportPage page{.title = "<b>&\"", .subtitle = "s"};
+  page.pictures.push_back({"x.png", "a<b", "c&d", "hpsdf build 'a<b'"});
+  const std::string html = reportHtml(page);
+  EXPECT_THAT(html, HasSubstr("<h1>&lt;b&gt;&amp;&quot;</h1>"));
+  EXPECT_THAT(html, HasSubstr("hpsdf build 'a&lt;b'"));
+  EXPECT_THAT(html, Not(HasSubstr("<b>&")));
+}
+
+// Bad input: one line that names the file, exit status 2, no output file
+
+TEST_F(Cli, badMeshesAreRefused) {
+  writeFile(at("empty.obj"), "");
+  writeFile(at("text.obj"), "this is no mesh\n");
+  writeFile(at("text.xyz"), "this is no mesh\n");
+  writeFile(at("nan.obj"), "v 0 0 nan\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n");
+  writeFile(at("flat.obj"), "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  writeFile(at("range.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+  fs::create_directory(at("folder.obj"));
+  const auto before = namesIn(folder_.path());
+  for (const char* name :
+       {"missing.obj", "empty.obj", "text.obj", "text.xyz", "nan.obj", "flat.obj", "range.obj", "folder.obj"}) {
+    expectRefused({{"build", at(name), "-o", at("f.hpsdf")}}, name, before);
+    expectRefused({{"mesh", at(name)}}, name, before);
+    expectRefused({{"report", at(name), "-o", at("report/deep")}}, name, before);
+  }
+  expectRefused({{"build", "builtin:tours", "-o", at("f.hpsdf")}}, "torus", before);
+  expectRefused({{"build", "builtin:torus,majr=1", "-o", at("f.hpsdf")}}, "major", before);
+  expectRefused({{"build", "analytic:gear", "-o", at("f.hpsdf")}}, "gear", before);
+  expectRefused({{"mesh", "analytic:sphere"}}, "analytic", before);
+}
+
+TEST_F(Cli, badOptionsAreRefused) {
+  const auto build = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"build", "builtin:torus", "-o", at("f.hpsdf")};
+    words.insert(words.end(), more.begin(), more.end());
+    return Call{words};
+  };
+  expectRefused(build({"--target-error", "0"}), "--target-error: expected a number above 0");
+  expectRefused(build({"--target-error", "-1"}), "--target-error: expected a number above 0");
+  expectRefused(build({"--target-error", "nan"}), "--target-error: expected a number above 0");
+  expectRefused(build({"--grid", "0"}), "--grid: expected");
+  expectRefused(build({"--grid", "100000"}), "builtin:torus: base grid 100000");
+  expectRefused(build({"--grid", "2000000000"}), "base grid");
+  expectRefused(build({"--max-degree", "31"}), "--max-degree: expected a whole number from 1 to 30");
+  expectRefused(build({"--domain", "1,1,1,0,0,0"}), "expected lower corner");
+  expectRefused(build({"--nearness", "nan"}), "--nearness");
+  expectRefused(build({"--margin", "inf"}), "--margin");
+}
+
+TEST_F(Cli, badFieldFilesAreRefused) {
+  const std::string good = readFile(field());
+  const auto variant = [&](const std::string& name, const std::string& bytes) { writeFile(at(name), bytes); };
+  variant("truncated.hpsdf", good.substr(0, good.size() / 2));
+  variant("short.hpsdf", good.substr(0, 5));
+  variant("empty.hpsdf", "");
+  variant("foreign.hpsdf", std::string(kTetrahedron));
+  variant("longer.hpsdf", good + "x");
+  for (const std::size_t byte : {good.size() / 3, good.size() - 100, std::size_t{100}}) {
+    std::string altered = good;
+    altered[byte] = static_cast<char>(altered[byte] ^ 0x10);
+    variant("altered" + std::to_string(byte) + ".hpsdf", altered);
+  }
+  std::string version = good;
+  version[8] = static_cast<char>(version[8] + 1);  // docs/file-format.md: the version follows 8 bytes of magic
+  variant("newer.hpsdf", version);
+  fs::create_directory(at("folder.hpsdf"));
+  const auto before = namesIn(folder_.path());
+  for (std::string name : before) {
+    expectRefused({{"info", at(name)}}, name, before);
+    expectRefused({{"slice", at(name), "-o", at("s.png"), "--cpu"}}, name, before);
+    expectRefused({{"query", at(name), "-o", at("q.csv")}, "0 0 0\n"}, name, before);
+  }
+  expectRefused({{"info", at("newer.hpsdf")}}, "version 2", before);
+  expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
+}
+
+TEST_F(Cli, unwritableOutputsAreRefusedBeforeTheWork) {
+  writeFile(at("file"), "x");
+  for (const std::string& output :
+       {at("none/f.hpsdf"), at("file/f.hpsdf"), folder_.path().string(), std::string("/dev/null")}) {
+    const auto start = Clock::now();
+    // a target that takes minutes: were the file opened after the construction, this test would run into its limit
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12"}}, output);
+    EXPECT_LT(Clock::now() - start, std::chrono::seconds(10));
+  }
+  expectRefused({{"slice", field(), "-o", at("none/s.png"), "--cpu"}}, "none/s.png");
+  expectRefused({{"slice", field(), "-o", at("none/s.csv"), "--cpu"}}, "none/s.csv");
+  expectRefused({{"render", field(), "-o", at("none/s.png"), "--cpu"}}, "none/s.png");
+  expectRefused({{"query", field(), "-o", at("none/q.csv")}}, "none/q.csv");
+  expectRefused({{"report", field(), "-o", at("file")}}, "file");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST_F(Cli, aReaderThatWentAwayIsAnError) {
+  const Outcome outcome = run({.words = {"info", field()}, .stdoutClosed = true});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
+  EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+}
+
+// Ctrl-C
+
+TEST_F(Cli, interruptStopsTheConstruction) {
+  for (const auto& words :
+       {std::vector<std::string>{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"},
+        std::vector<std::string>{"report", "builtin:gear", "-o", at("report"), "--target-error", "1e-12"}}) {
+    Process process({words});
+    process.waitForErrorLine();
+    const auto start = Clock::now();
+    process.send(SIGINT);
+    const Outcome outcome = process.finish();
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    EXPECT_EQ(outcome.status, 130) << outcome.err;
+    EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing was written\n"));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_LT(seconds, 5) << "the promise is one second; this machine may be busy";
+    EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+  }
+}
+
+TEST_F(Cli, anOlderFileSurvivesAnInterrupt) {
+  fs::copy_file(field(), at("f.hpsdf"));
+  Process process({{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"}});
+  process.waitForErrorLine();
+  process.send(SIGINT);
+  EXPECT_EQ(process.finish().status, 130);
+  EXPECT_EQ(readFile(at("f.hpsdf")), readFile(field()));
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
+}
+
+// Progress
+
+TEST(Progress, aPipeGetsALineAQuarterAndEveryTenSeconds) {
+  std::ostringstream out;
+  const Clock::time_point start{};
+  const auto after = [&](double seconds) {
+    return start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  };
+  {
+    ProgressLine line(out, false, start);
+    line.report("refining", 0, after(0));
+    line.report("refining", 0.1, after(5));
+    line.report("refining", 0.26, after(6));
+    line.report("refining", 0.3, after(7));
+    line.report("refining", 0.31, after(17));
+    line.report("refining", 1, after(18));
+  }
+  EXPECT_EQ(out.str(),
+            "refining   0 %, 0 s\n"
+            "refining  26 %, 6 s, about 17 s left\n"
+            "refining  31 %, 17 s, about 38 s left\n"
+            "refining 100 %, 18 s\n");
+}
+
+TEST(Progress, aTerminalGetsOneLineThatIsErased) {
+  std::ostringstream out;
+  const Clock::time_point start{};
+  {
+    ProgressLine line(out, true, start);
+    for (int i = 0; i <= 1000; ++i) line.report("refining", i / 1000.0, start + std::chrono::milliseconds(i));
+  }
+  EXPECT_EQ(lineCount(out.str()), 0u);
+  EXPECT_LE(std::ranges::count(out.str(), '['), 2 * 12);  // a bar and an escape sequence each: at most 10 a second
+  EXPECT_THAT(out.str(), EndsWith("\r\x1b[K"));
+}
+
+TEST(Progress, durationsAreReadable) {
+  EXPECT_EQ(durationText(0.2), "0 s");
+  EXPECT_EQ(durationText(187), "3 min 07 s");
+  EXPECT_EQ(durationText(7500), "2 h 05 min");
+}
+
+}  // namespace
+}  // namespace hpsdf::app
