@@ -1,0 +1,144 @@
+#include "hpsdf/exact_distance.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "distance/hierarchy.h"
+#include "distance/pseudonormals.h"
+#include "distance/triangle_frame.h"
+#include "hpsdf/error.h"
+#include "mesh/mesh_checks.h"
+
+namespace hpsdf {
+namespace {
+
+using distance::FramePoint;
+using distance::TriangleFrame;
+
+void check(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw Error(messagePrefix(mesh) + "no faces; a distance needs at least one triangle");
+  if (mesh.triangles.size() > distance::Hierarchy::kMaxTriangles)
+    throw Error(messagePrefix(mesh) + std::to_string(mesh.triangles.size()) + " faces are more than the " +
+                std::to_string(distance::Hierarchy::kMaxTriangles) + " that a distance takes; simplify the mesh first");
+  requireValidIndices(mesh);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    if (!mesh.vertices[v].allFinite())
+      throw Error(messagePrefix(mesh) + "vertex " + std::to_string(v + 1) +
+                  " has a coordinate that is not a finite number; repair or export the mesh again");
+}
+
+std::vector<TriangleFrame> makeFrames(const TriangleMesh& mesh) {
+  std::vector<TriangleFrame> frames;
+  frames.reserve(mesh.triangles.size());
+  for (const auto& [a, b, c] : mesh.triangles)
+    frames.push_back(distance::makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]},
+                                         static_cast<std::uint32_t>(frames.size())));
+  return frames;
+}
+
+std::vector<Vector3> unitNormals(const std::vector<TriangleFrame>& frames) {
+  std::vector<Vector3> normals;
+  normals.reserve(frames.size());
+  for (const TriangleFrame& frame : frames)
+    normals.push_back(distance::hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()));
+  return normals;
+}
+
+/// The point of segment ab closest to x, as its parameter in [0, 1].
+double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
+  const Vector3 direction = b - a;
+  const double squaredLength = direction.squaredNorm();
+  return squaredLength > 0 ? std::clamp((x - a).dot(direction) / squaredLength, 0.0, 1.0) : 0.0;
+}
+
+}  // namespace
+
+struct ExactDistance::Data {
+  explicit Data(const TriangleMesh& mesh) : Data(mesh, makeFrames(mesh)) {}
+
+  /// What x is to the triangle at `slot`, which is nearest: from the mesh's own corners, so that a point on a vertex is
+  /// at distance 0.
+  ClosestPoint resolve(const Vector3& x, std::uint32_t slot) const {
+    const TriangleFrame& frame = hierarchy.triangles()[slot];
+    const FramePoint point = distance::locate(frame, x);
+    std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
+    if (point.side[2] < point.side[side]) side = 2;
+    // within the roundings of a place in the plane, a point on a side is no point of the face
+    const double rounding =
+        distance::kFlat * distance::kFlat * (frame.length * frame.length + point.height * point.height);
+    if (point.inside && point.side[side] > rounding)  // adding 0 turns -0 into 0
+      return {x - frame.normal * point.height, point.height + 0.0, frame.triangle, Feature::face};
+
+    const std::uint32_t from = (frame.firstCorner + side) % 3;
+    const std::array<std::uint32_t, 3>& corners = triangles[frame.triangle];
+    const Vector3& a = vertices[corners[from]];
+    const Vector3& b = vertices[corners[(from + 1) % 3]];
+    const double t = closestParameter(x, a, b);
+    if (t <= 0) return at(a, x - a, normals.vertices[corners[from]], frame.triangle, Feature::vertex);
+    if (t >= 1) return at(b, x - b, normals.vertices[corners[(from + 1) % 3]], frame.triangle, Feature::vertex);
+    const Vector3& normal = normals.edges[normals.triangleEdges[frame.triangle][from]];
+    return at(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
+  }
+
+  distance::Hierarchy hierarchy;
+  distance::Pseudonormals normals;
+  std::vector<Vector3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  Source source;
+
+ private:
+  Data(const TriangleMesh& mesh, const std::vector<TriangleFrame>& frames)
+      : hierarchy(frames),
+        normals(distance::makePseudonormals(mesh, unitNormals(frames))),
+        vertices(mesh.vertices),
+        triangles(mesh.triangles),
+        source{mesh.name, fingerprint(mesh), mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {}
+
+  /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.
+  static ClosestPoint at(const Vector3& closest, const Vector3& difference, const Vector3& normal,
+                         std::uint32_t triangle, Feature feature) {
+    const double length = difference.norm();
+    return {closest, (difference.dot(normal) < 0 ? -length : length) + 0.0, triangle, feature};
+  }
+};
+
+ExactDistance::ExactDistance(const TriangleMesh& mesh) {
+  check(mesh);
+  data_ = std::make_unique<const Data>(mesh);
+}
+
+ExactDistance::~ExactDistance() = default;
+ExactDistance::ExactDistance(ExactDistance&&) noexcept = default;
+ExactDistance& ExactDistance::operator=(ExactDistance&&) noexcept = default;
+
+double ExactDistance::operator()(const Vector3& x) const { return closestPoint(x).signedDistance; }
+
+void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
+  assert(points.size() == out.size());
+  std::uint32_t slot = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    // the neighbour's nearest triangle is a tight bound from the outset
+    const auto& hierarchy = data_->hierarchy;
+    slot = (i == 0 ? hierarchy.nearest(points[i]) : hierarchy.nearest(points[i], slot)).slot;
+    out[i] = data_->resolve(points[i], slot).signedDistance;
+  }
+}
+
+ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
+  return data_->resolve(x, data_->hierarchy.nearest(x).slot);
+}
+
+const Source& ExactDistance::source() const { return data_->source; }
+
+std::size_t ExactDistance::bytes() const {
+  const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  return data_->hierarchy.bytes() + sizeOf(data_->normals.edges) + sizeOf(data_->normals.vertices) +
+         sizeOf(data_->normals.triangleEdges) + sizeOf(data_->vertices) + sizeOf(data_->triangles);
+}
+
+}  // namespace hpsdf
