@@ -28,9 +28,9 @@ struct ClosestPoint {
 /// intersect themselves. Equal distances are decided by the lower triangle index, so that a result depends on neither
 /// the order nor the grouping of queries: single and batched queries agree bit for bit.
 ///
-/// A triangle without area (its height within the roundings of its coordinates) answers by its sides and adds nothing to
-/// the pseudonormals. A point that is not finite gets a value that is not finite; the sign is lost where the distance
-/// exceeds the mesh by so much (some 1e15) that all triangles are equally near.
+/// A triangle without area (its height within the roundings of its coordinates) answers by its sides and adds nothing
+/// to the pseudonormals. A point that is not finite gets a value that is not finite; the sign is lost where the
+/// distance exceeds the mesh by so much (some 1e15) that all triangles are equally near.
 ///
 /// Const and thread-safe after construction. Keeps no reference to the mesh.
 class ExactDistance {
