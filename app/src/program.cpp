@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <new>
 #include <ostream>
-#include <system_error>
 
 #include "commands.h"
 #include "help.h"
@@ -43,10 +41,7 @@ void execute(std::span<const std::string> words, const Registry& registry, const
 
 /// Output to a closed pipe or a full disk fails late, inside the stream's buffer.
 void checkOutput(const Console& console) {
-  errno = 0;
-  if (console.out.flush()) return;
-  const std::string reason = errno == 0 ? "" : fmt::format(" ({})", std::generic_category().message(errno));
-  throw Error("cannot write to standard output" + reason);
+  if (!console.out.flush()) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
 }
 
 int fail(const Console& console, std::string message, int status) {

@@ -22,15 +22,7 @@ render::Renderer& Session::renderer(const Backend& backend) {
   const Field& field = current().field;
   if (renderer_ && backend_ == backend) return *renderer_;
   renderer_.reset();
-  if (backend.cpu) {
-    renderer_ = render::makeCpuRenderer(field);
-  } else {
-    try {
-      renderer_ = render::makeGlRenderer(field, backend.gl);
-    } catch (const Error& error) {
-      throw Error(std::string(error.what()) + "; --cpu draws without OpenGL");
-    }
-  }
+  renderer_ = backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
   backend_ = backend;
   return *renderer_;
 }

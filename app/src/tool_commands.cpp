@@ -140,7 +140,7 @@ void runDoctor(Session& session, const Arguments& arguments) {
   };
   row("version", versionText());
   row("compiler", compilerText());
-  row("renderer", problem.empty() ? renderer : "none (" + problem + "); --cpu draws without OpenGL");
+  row("renderer", problem.empty() ? renderer : "none: " + problem);
   row("processor", processorName());
   row("SIMD", fmt::format("has {}; the program uses the baseline of x86-64 only",
                           present.empty() ? "none beyond it" : fmt::format("{}", fmt::join(present, ", "))));

@@ -498,9 +498,9 @@ TEST_F(Cli, drawsWithOpenGl) {
 
 TEST_F(Cli, withoutEglPicturesAreRefusedAndTheCpuStillDraws) {
   const std::map<std::string, std::string> noEgl = {{"__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"}};
-  expectRefused({.words = {"slice", field(), "-o", at("s.png")}, .environment = noEgl}, "--cpu draws without OpenGL");
-  expectRefused({.words = {"render", field(), "-o", at("r.png")}, .environment = noEgl}, "--cpu draws without OpenGL");
-  expectRefused({.words = {"report", field(), "-o", at("report")}, .environment = noEgl}, "--cpu draws without OpenGL");
+  expectRefused({.words = {"slice", field(), "-o", at("s.png")}, .environment = noEgl}, "render with --cpu");
+  expectRefused({.words = {"render", field(), "-o", at("r.png")}, .environment = noEgl}, "render with --cpu");
+  expectRefused({.words = {"report", field(), "-o", at("report")}, .environment = noEgl}, "render with --cpu");
   const Outcome doctor = run({.words = {"doctor", "--json"}, .environment = noEgl});
   EXPECT_EQ(doctor.status, 0) << doctor.err;
   EXPECT_TRUE(Json::parse(doctor.out).at("renderer").is_null());
