@@ -261,7 +261,7 @@ void addPictureCommands(Registry& registry) {
              .type = ParameterType::numbers,
              .help = "Azimuth and elevation in degrees, and the eye's distance from the centre in diagonals of "
                      "the domain.",
-             .defaultText = "30,20,1",
+             .defaultText = "30,20,1.1",
              .valueName = "AZIMUTH,ELEVATION,DISTANCE",
              .counts = {3}},
             {.name = "up",

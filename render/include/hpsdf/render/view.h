@@ -30,7 +30,7 @@ enum class UpAxis : std::uint8_t { y, z };
 struct OrbitCamera {
   double azimuthDegrees = 30;      ///< about the up axis, 0 looks along −z (y up) or from −y (z up)
   double elevationDegrees = 20;    ///< above the horizon, −90 to 90
-  double distance = 1.0;           ///< of the eye from the centre, in domain diagonals, > 0
+  double distance = 1.1;           ///< of the eye from the centre, in domain diagonals, > 0
   double fieldOfViewDegrees = 35;  ///< vertical
   UpAxis up = UpAxis::y;
 };
