@@ -35,9 +35,9 @@ void runBuild(Session& session, const Arguments& arguments) {
   }
   if (built.mesh) console.out << meshText(surface, *built.mesh);
   const Field& field = session.current().field;
-  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {:.3g} (mesh units)\n",
+  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {} (mesh units)\n",
                              saves ? arguments.text("output") + ": " : "", fieldLine(field), built.seconds,
-                             field.metadata().rmsEstimate(field.domain()));
+                             shortNumber(field.metadata().rmsEstimate(field.domain())));
 }
 
 void runLoad(Session& session, const Arguments& arguments) {

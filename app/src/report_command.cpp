@@ -170,6 +170,7 @@ std::vector<ReportBar> bars(const std::map<int, double>& volume) {
 std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
                                                          const BuiltField* built) {
   const FieldMetadata& metadata = field.metadata();
+  const double rms = metadata.rmsEstimate(field.domain());
   std::vector<std::pair<std::string, std::string>> rows;
   if (metadata.source.faces > 0)
     rows.emplace_back("Mesh", fmt::format("{}: {} vertices, {} faces", metadata.source.name,
@@ -182,12 +183,11 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Coefficients",
                     fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
   rows.emplace_back("Memory", bytesText(double(counts.bytes)));
-  rows.emplace_back("Target error τ", fmt::format("{:.3g}", metadata.targetError));
-  rows.emplace_back("Total error ε", fmt::format("{:.3g}, nearness {}", metadata.totalError, metadata.nearness));
-  rows.emplace_back(
-      "Estimated RMS error",
-      fmt::format("{:.3g} in mesh units, {:.2g} of the mesh's longest side", metadata.rmsEstimate(field.domain()),
-                  metadata.rmsEstimate(field.domain()) / metadata.referenceLength));
+  rows.emplace_back("Target error τ", shortNumber(metadata.targetError));
+  rows.emplace_back("Total error ε",
+                    fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.nearness));
+  rows.emplace_back("Estimated RMS error", fmt::format("{} in mesh units, {} of the mesh's longest side",
+                                                       shortNumber(rms), shortNumber(rms / metadata.referenceLength)));
   rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
   if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));
   return rows;
@@ -215,7 +215,7 @@ void runReport(Session& session, const Arguments& arguments) {
   const FieldStatistics counts = statistics(field);
   ReportPage page{
       .title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
-      .subtitle = fmt::format("{} leaf cells, {}, estimated RMS error {:.2g}", grouped(counts.leaves),
+      .subtitle = fmt::format("{} leaf cells, {}, estimated RMS error {}", grouped(counts.leaves),
                               bytesText(double(counts.bytes)), field.metadata().rmsEstimate(field.domain())),
       .figures = figures(field, counts, built ? &*built : nullptr),
       .degrees = bars(counts.degreeVolume),

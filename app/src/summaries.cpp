@@ -64,6 +64,17 @@ std::string bytesText(double bytes) {
   return fmt::format("{:.2f} GB", bytes / 1e9);
 }
 
+std::string shortNumber(double number) {
+  const double size = std::abs(number);
+  if (number == 0 || (size >= 0.01 && size < 1e5)) return fmt::format("{:.3g}", number);
+  std::string mantissa = fmt::format("{:.2e}", number);
+  const std::size_t e = mantissa.find('e');
+  const int exponent = std::stoi(mantissa.substr(e + 1));
+  mantissa.erase(mantissa.find_last_not_of("0", e - 1) + 1);
+  if (mantissa.ends_with('.')) mantissa.pop_back();
+  return fmt::format("{}e{}", mantissa, exponent);
+}
+
 std::string strategyName(Strategy strategy) {
   switch (strategy) {
     case Strategy::h1:
@@ -176,10 +187,10 @@ std::string fieldText(const CurrentField& current) {
               fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
   text += row("memory", bytesText(double(figures.bytes)));
   if (current.fileBytes) text += row("file", bytesText(double(*current.fileBytes)));
-  text += row("error, target", fmt::format("{:.4g}, {:.4g} (at the scale where the longest side is 2)",
-                                           metadata.totalError, metadata.targetError));
-  text += row("estimated RMS error", fmt::format("{:.4g} (mesh units)", metadata.rmsEstimate(field.domain())));
-  if (field.singlePrecision()) text += row("change by float", fmt::format("{:.4g} RMS", metadata.roundingRms));
+  text += row("error, target", fmt::format("{}, {} (at the scale where the longest side is 2)",
+                                           shortNumber(metadata.totalError), shortNumber(metadata.targetError)));
+  text += row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + " (mesh units)");
+  if (field.singlePrecision()) text += row("change by float", shortNumber(metadata.roundingRms) + " RMS");
   text += row("exact distances", grouped(metadata.exactEvaluations));
   text += row("settings", fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
                                       strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,

@@ -33,6 +33,9 @@ std::string grouped(std::uint64_t number);
 /// 8400000 → "8.40 MB"
 std::string bytesText(double bytes);
 
+/// Three digits, and a short exponent where it saves zeros: 1e-6, 3.06e-4, 0.125
+std::string shortNumber(double number);
+
 std::string strategyName(Strategy strategy);
 
 }  // namespace hpsdf::app

@@ -27,6 +27,7 @@
 #include "point_query.h"
 #include "progress_line.h"
 #include "report_page.h"
+#include "summaries.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
 
@@ -36,7 +37,7 @@ namespace hpsdf::app {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::json;  // keys sorted: equality of what is read, whatever its order
 using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
@@ -577,6 +578,18 @@ TEST(ReportPage, escapesWhatItShows) {
   EXPECT_THAT(html, HasSubstr("<h1>&lt;b&gt;&amp;&quot;</h1>"));
   EXPECT_THAT(html, HasSubstr("hpsdf build 'a&lt;b'"));
   EXPECT_THAT(html, Not(HasSubstr("<b>&")));
+}
+
+TEST(Summaries, numbersAreReadable) {
+  EXPECT_EQ(shortNumber(1e-6), "1e-6");
+  EXPECT_EQ(shortNumber(-3.0591e-4), "-3.06e-4");
+  EXPECT_EQ(shortNumber(9.999e-7), "1e-6");
+  EXPECT_EQ(shortNumber(2.5e12), "2.5e12");
+  EXPECT_EQ(shortNumber(0.125), "0.125");
+  EXPECT_EQ(shortNumber(0), "0");
+  EXPECT_EQ(grouped(1234567), "1,234,567");
+  EXPECT_EQ(grouped(999), "999");
+  EXPECT_EQ(bytesText(8.4e6), "8.40 MB");
 }
 
 // Bad input: one line that names the file, exit status 2, no output file
