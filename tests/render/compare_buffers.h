@@ -1,0 +1,70 @@
+#pragma once
+// The rule by which a renderer's buffers are held against the oracle's.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hpsdf/render/view.h"
+
+namespace hpsdf::render {
+
+struct BufferTolerance {
+  double value = 0;        ///< of f, world units
+  double position = 0;     ///< of a hit across the surface, world units
+  double normalAngle = 0;  ///< radians
+  double pixels = 1e-3;    ///< fraction whose hit, cell, degree or depth may differ, at edges only
+};
+
+/// Some pixel around (x, y), itself included, sees another cell, or none.
+inline bool atEdge(const ViewBuffers& buffers, int x, int y) {
+  const std::uint32_t cell = buffers.cell[std::size_t(y) * buffers.width + x];
+  for (int v = std::max(0, y - 1); v <= std::min(buffers.height - 1, y + 1); ++v)
+    for (int u = std::max(0, x - 1); u <= std::min(buffers.width - 1, x + 1); ++u)
+      if (buffers.cell[std::size_t(v) * buffers.width + u] != cell) return true;
+  return false;
+}
+
+/// Direction of a pixel's ray, unit.
+inline Vector3 rayDirection(const Pinhole& camera, int width, int height, int x, int y) {
+  return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
+      .normalized();
+}
+
+/// Cells, degrees and depths agree but for few pixels, each within one pixel of an edge; where they agree, values,
+/// and, for a surface (`camera` given), positions across the surface and normals agree within the tolerances.
+inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuffers& actual,
+                                      const BufferTolerance& tolerance, const Pinhole* camera = nullptr) {
+  if (expected.width != actual.width || expected.height != actual.height)
+    return testing::AssertionFailure() << "sizes differ";
+  std::size_t differing = 0;
+  for (int y = 0; y < expected.height; ++y)
+    for (int x = 0; x < expected.width; ++x) {
+      const std::size_t i = std::size_t(y) * expected.width + x;
+      const auto failure = [&] { return testing::AssertionFailure() << "pixel (" << x << ", " << y << "): "; };
+      if (expected.cell[i] != actual.cell[i] || expected.degree[i] != actual.degree[i] ||
+          expected.depth[i] != actual.depth[i]) {
+        ++differing;
+        if (!atEdge(expected, x, y) && !atEdge(actual, x, y))
+          return failure() << "cell " << actual.cell[i] << " instead of " << expected.cell[i] << ", far from any edge";
+        continue;
+      }
+      if (!expected.hit(i)) continue;
+      if (!(std::abs(expected.value[i] - actual.value[i]) <= tolerance.value))
+        return failure() << "value " << actual.value[i] << " instead of " << expected.value[i];
+      if (camera == nullptr) continue;
+      const Eigen::Vector3f normal = expected.normal[i];
+      const double cosine =
+          std::abs(rayDirection(*camera, expected.width, expected.height, x, y).dot(normal.cast<double>()));
+      if (!(std::abs(expected.distance[i] - actual.distance[i]) * cosine <= tolerance.position))
+        return failure() << "distance " << actual.distance[i] << " instead of " << expected.distance[i];
+      if (!((normal - actual.normal[i]).norm() <= tolerance.normalAngle))
+        return failure() << "normal differs by " << (normal - actual.normal[i]).norm();
+    }
+  if (static_cast<double>(differing) > tolerance.pixels * static_cast<double>(expected.cell.size()))
+    return testing::AssertionFailure() << differing << " of " << expected.cell.size() << " pixels differ";
+  return testing::AssertionSuccess();
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,557 @@
+#include "hpsdf/render/renderer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <random>
+#include <thread>
+
+#include "compare_buffers.h"
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "hpsdf/shapes.h"
+#include "random_field.h"
+#include "support/require_gl.h"
+
+namespace hpsdf::render {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr int kWidth = 160;
+constexpr int kHeight = 120;
+
+const Box kCube(Vector3(-1.1, -1.1, -1.1), Vector3(1.1, 1.1, 1.1));
+
+/// Built once: all tests of this program look at these.
+const Field& shape(const std::string& spec) {
+  static std::map<std::string, Field> fields;
+  const auto found = fields.find(spec);
+  if (found != fields.end()) return found->second;
+  return fields.emplace(spec, build(shapes::analytic(spec), kCube, {.targetError = 1e-7})).first->second;
+}
+
+const std::vector<std::string> kShapes = {"sphere", "torus", "box"};
+
+/// What single precision may change, for fields of size about 1.
+constexpr BufferTolerance kSliceTolerance{.value = 2e-6};
+/// Positions: 1e-6 of the diagonal.
+BufferTolerance surfaceTolerance(const Field& field) {
+  return {.value = 1e-5, .position = 1e-6 * field.domain().sizes().norm(), .normalAngle = 2e-3};
+}
+
+Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+  const Vector3 unit = forward.normalized();
+  const Vector3 right = unit.unitOrthogonal();
+  return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
+}
+
+/// Cameras of every kind: orbits near and far, eyes anywhere within the domain (also inside the solid) and eyes beside
+/// the surface looking along it.
+std::vector<Pinhole> cameras(const Field& field, unsigned seed, int count) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] { return Vector3(normal(random), normal(random), normal(random)).normalized(); };
+  const Box& domain = field.domain();
+  const auto somewhere = [&] {
+    return Vector3(domain.min() + domain.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random))));
+  };
+  std::vector<Pinhole> result;
+  for (int i = 0; i < count; ++i) {
+    if (i % 3 == 0) {
+      const OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
+                              .elevationDegrees = 180 * unit(random) - 90,
+                              .distance = std::exp(4 * unit(random) - 2),
+                              .fieldOfViewDegrees = 20 + 60 * unit(random)};
+      result.push_back(pinhole(orbit, domain, kWidth, kHeight));
+    } else if (i % 3 == 1) {
+      result.push_back(lookingAt(somewhere(), direction(), 0.2 + unit(random)));
+    } else {
+      Vector3 eye = somewhere();
+      for (int step = 0; step < 20; ++step) {
+        const ValueAndGradient at = field.valueAndGradient(eye);
+        eye -= (at.value - 1e-3) * at.gradient.normalized();
+        eye = eye.cwiseMax(domain.min()).cwiseMin(domain.max());
+      }
+      const Vector3 away = field.valueAndGradient(eye).gradient.normalized();
+      const Vector3 along = direction();
+      result.push_back(lookingAt(eye, along - along.dot(away) * away, 0.1 + 0.5 * unit(random)));
+    }
+  }
+  return result;
+}
+
+std::size_t hits(const ViewBuffers& buffers) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < buffers.cell.size(); ++i) count += buffers.hit(i);
+  return count;
+}
+
+Vector3 samplePoint(const SliceView& view, int width, int height, int x, int y) {
+  return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
+}
+
+// --- The oracle against the field itself ---------------------------------------------------------------------------
+
+/// Cells, levels and values of a slice are those of the field's own queries at the samples' points. The view is moved a
+/// little within its plane, so that no row or column of samples runs along a face between cells.
+void expectFieldsAnswers(const Field& field, SliceView view) {
+  view.origin += 0.00137 * view.right + 0.00211 * view.up;
+  const ViewBuffers buffers = makeCpuRenderer(field)->slice(view, kWidth, kHeight);
+  ASSERT_EQ(buffers.cell.size(), std::size_t(kWidth) * kHeight);
+  EXPECT_TRUE(buffers.normal.empty());
+  int otherCells = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const std::size_t i = std::size_t(y) * kWidth + x;
+      const Vector3 point = samplePoint(view, kWidth, kHeight, x, y);
+      if (!buffers.hit(i)) {
+        EXPECT_FALSE(field.domain().contains(point));
+        EXPECT_EQ(buffers.degree[i] + buffers.depth[i] + buffers.value[i], 0);
+        continue;
+      }
+      const Cell cell = field.cellAt(point);
+      if (buffers.cell[i] != cell.id) {
+        ++otherCells;  // the sample's point rounds differently in world and grid coordinates
+        EXPECT_LT(cell.box.exteriorDistance(point) + 1e-12, 1e-9);
+        continue;
+      }
+      EXPECT_EQ(buffers.degree[i], cell.degree);
+      EXPECT_EQ(buffers.depth[i], cell.depth);
+      EXPECT_NEAR(buffers.value[i], field.value(point), 1e-6);
+    }
+  EXPECT_LE(otherCells, kWidth * kHeight / 1000);
+}
+
+TEST(CpuSlice, IsWhatTheFieldAnswers) {
+  for (const std::string& name : kShapes) {
+    const Field& field = shape(name);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double offset : {0.0, 0.31, -1.1, 1.1})
+        expectFieldsAnswers(field, axisSlice(field.domain(), axis, offset, kWidth, kHeight));
+    expectFieldsAnswers(field, planeSlice(field.domain(), Vector3(0.1, 0.2, 0), Vector3(1, -2, 0.5), kWidth, kHeight));
+  }
+}
+
+TEST(CpuSlice, PlaneOnFacesShowsTheUpperCells) {
+  // z = 0 is a face of the even base grid, and of every child of it
+  const Field& field = shape("torus");
+  const ViewBuffers at = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, 0, kWidth, kHeight), kWidth, kHeight);
+  const ViewBuffers above = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, 1e-9, kWidth, kHeight), kWidth, kHeight);
+  const ViewBuffers below = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, -1e-9, kWidth, kHeight), kWidth, kHeight);
+  EXPECT_EQ(at.cell, above.cell);
+  EXPECT_NE(at.cell, below.cell);
+}
+
+TEST(CpuSlice, BoxDomainsAndBothKindsOfCoefficients) {
+  RandomFieldOptions options{.domain = Box(Vector3(-3, 10, 0.5), Vector3(4, 11, 2)), .grid = {5, 1, 3}};
+  for (const bool single : {false, true}) {
+    options.single = single;
+    const Field field = randomField(3, options);
+    expectFieldsAnswers(field, axisSlice(field.domain(), 0, 0.25, kWidth, kHeight));
+    expectFieldsAnswers(field, planeSlice(field.domain(), field.domain().center(), Vector3(1, 1, 1), kWidth, kHeight));
+  }
+}
+
+// --- The oracle's tracing against the truth ------------------------------------------------------------------------
+
+/// Length of a ray until it enters or leaves the box; empty where it misses.
+std::optional<std::pair<double, double>> stretchWithin(const Box& box, const Vector3& eye, const Vector3& direction) {
+  double first = 0;
+  double last = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (box.min()[axis] - eye[axis]) / direction[axis];
+    const double b = (box.max()[axis] - eye[axis]) / direction[axis];
+    first = std::max(first, std::min(a, b));
+    last = std::min(last, std::max(a, b));
+  }
+  if (!(first < last)) return std::nullopt;
+  return std::pair(first, last);
+}
+
+/// Follows every 7th pixel's ray in small steps. Before the hit, and all along the ray where there is none,
+/// `height(point)` must stay on the side of the surface on which it starts, down to -tolerance.
+template <typename Height>
+void expectNothingPassed(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int steps,
+                         double tolerance, double nearHit, Height&& height) {
+  for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
+    const int x = static_cast<int>(i % buffers.width);
+    const int y = static_cast<int>(i / buffers.width);
+    const Vector3 direction = rayDirection(view.camera, buffers.width, buffers.height, x, y);
+    const auto stretch = stretchWithin(field.domain(), view.camera.eye, direction);
+    if (!stretch) {
+      EXPECT_FALSE(buffers.hit(i));
+      continue;
+    }
+    const auto [first, last] = *stretch;
+    const double end = buffers.hit(i) ? buffers.distance[i] - nearHit : last - 1e-9;
+    const double start = height(view.camera.eye + (first + 1e-9) * direction) - view.offset;
+    if (std::abs(start) <= tolerance) continue;  // starts on the surface
+    for (int step = 1; step < steps; ++step) {
+      const double t = first + 1e-9 + (end - first) * step / steps;
+      if (t >= end) break;
+      const double here = height(view.camera.eye + t * direction) - view.offset;
+      ASSERT_GT(start > 0 ? here : -here, -tolerance) << "pixel (" << x << ", " << y << ") at " << t << " of " << end;
+    }
+  }
+}
+
+TEST(CpuTrace, FindsTheFirstCrossingOfTheField) {
+  for (const std::string& name : kShapes) {
+    const Field& field = shape(name);
+    const auto renderer = makeCpuRenderer(field);
+    std::size_t seen = 0;
+    for (const Pinhole& camera : cameras(field, 11, 9))
+      for (const double offset : {0.0, 0.05}) {
+        const SurfaceView view{camera, offset};
+        const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
+        seen += hits(buffers);
+        expectNothingPassed(field, view, buffers, 500, 0, 1e-5, [&](const Vector3& p) { return field.value(p); });
+      }
+    EXPECT_GT(seen, std::size_t(kWidth) * kHeight);
+  }
+}
+
+TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const Field field = randomField(seed, {.roughness = seed % 2 ? 1.0 : 0.2, .maxDepth = 5, .maxDegree = 8});
+    const auto renderer = makeCpuRenderer(field);
+    for (const Pinhole& camera : cameras(field, seed, 6)) {
+      const SurfaceView view{camera, 0};
+      const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
+      expectNothingPassed(field, view, buffers, 500, 0, 1e-5, [&](const Vector3& p) { return field.value(p); });
+    }
+  }
+}
+
+/// Never past the true surface by more than the field's own error there.
+TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
+  for (const std::string& name : kShapes) {
+    const Field& field = shape(name);
+    const DistanceFunction exact = shapes::analytic(name);
+    const auto distance = [&](const Vector3& p) {
+      double d = 0;
+      exact(std::span(&p, 1), std::span(&d, 1));
+      return d;
+    };
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(-1.1, 1.1);
+    double error = 0;
+    for (int i = 0; i < 200000; ++i) {
+      const Vector3 p(unit(random), unit(random), unit(random));
+      const double d = distance(p);
+      if (std::abs(d) < 0.02) error = std::max(error, std::abs(field.value(p) - d));
+    }
+    EXPECT_LT(error, 0.01) << name;
+    const double tolerance = 1.5 * error + 1e-6;  // the largest error lies between the points that were tried
+    const auto renderer = makeCpuRenderer(field);
+    for (const Pinhole& camera : cameras(field, 23, 15)) {
+      const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+      expectNothingPassed(field, {camera, 0}, buffers, 300, tolerance, 0, distance);
+      for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
+        if (!buffers.hit(i)) continue;
+        const Vector3 direction = rayDirection(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
+        const Vector3 hit = camera.eye + double(buffers.distance[i]) * direction;
+        // where the ray begins within the error of the surface the field may see it already crossed
+        if (std::abs(distance(camera.eye)) > tolerance) {
+          EXPECT_NEAR(distance(hit), 0, tolerance) << name;
+        }
+      }
+    }
+  }
+}
+
+TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
+  const double radius = 0.8;
+  const Field& field = shape("sphere,radius=0.8");
+  const Pinhole camera = pinhole({}, kCube, kWidth, kHeight);
+  const ViewBuffers buffers = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
+  const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
+  const ViewBuffers other = gl ? gl->surface({camera, 0}, kWidth, kHeight) : buffers;
+  int compared = 0;
+  for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+    const Vector3 direction = rayDirection(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
+    const double toMiddle = -camera.eye.dot(direction);
+    const double nearest2 = camera.eye.squaredNorm() - toMiddle * toMiddle;
+    if (nearest2 > 1.01 * radius * radius) {
+      EXPECT_FALSE(buffers.hit(i) || other.hit(i));
+    }
+    if (nearest2 > 0.98 * radius * radius) continue;
+    const double expected = toMiddle - std::sqrt(radius * radius - nearest2);
+    const Vector3 normal = (camera.eye + expected * direction).normalized();
+    ASSERT_TRUE(buffers.hit(i) && other.hit(i));
+    for (const ViewBuffers* b : {&buffers, &other}) {
+      EXPECT_NEAR(b->distance[i], expected, 1e-3);
+      EXPECT_LT((b->normal[i].cast<double>() - normal).norm(), 0.03);
+      EXPECT_NEAR(b->value[i], 0, 1e-6);
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 2000);
+}
+
+TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
+  const Field& field = shape("sphere,radius=0.8");
+  const auto renderer = makeCpuRenderer(field);
+  // a pinhole at the centre sees the inside all around
+  const Pinhole centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
+  const ViewBuffers inside = renderer->surface({centered, 0}, kWidth, kHeight);
+  EXPECT_EQ(hits(inside), inside.cell.size());
+  EXPECT_NEAR(inside.distance[kWidth * kHeight / 2 + kWidth / 2], 0.79, 2e-3);
+  EXPECT_GT(inside.normal[kWidth * kHeight / 2 + kWidth / 2].x(), 0.99);
+
+  const Pinhole outside = lookingAt(Vector3(4, 0.01, 0.02), Vector3(-1, 0, 0), 0.1);
+  const std::size_t middle = kWidth * kHeight / 2 + kWidth / 2;
+  for (const double offset : {-0.3, 0.0, 0.2}) {
+    const ViewBuffers buffers = renderer->surface({outside, offset}, kWidth, kHeight);
+    ASSERT_TRUE(buffers.hit(middle));
+    EXPECT_NEAR(buffers.distance[middle], 4 - 0.8 - offset, 2e-3);
+    EXPECT_NEAR(buffers.value[middle], offset, 1e-6);
+  }
+  // f reaches about 1.1·√3 - 0.8 in the corners and nothing more: no surface
+  EXPECT_EQ(hits(renderer->surface({outside, 1.5}, kWidth, kHeight)), 0u);
+  // looking away
+  EXPECT_EQ(hits(renderer->surface({lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.1), 0}, kWidth, kHeight)), 0u);
+}
+
+TEST(CpuRenderer, RefusesViewsThatAreNone) {
+  const Field field = randomField(1);
+  const auto renderer = makeCpuRenderer(field);
+  const SliceView slice = axisSlice(field.domain(), 2, 0, 8, 8);
+  const Pinhole camera = pinhole({}, field.domain(), 8, 8);
+  EXPECT_THROW(renderer->slice(slice, 0, 8), Error);
+  EXPECT_THROW(renderer->surface({camera, 0}, 8, -3), Error);
+  EXPECT_THAT([&] { renderer->surface({camera, std::nan("")}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("offset")));
+  SliceView badSlice = slice;
+  badSlice.up.x() = std::nan("");
+  EXPECT_THROW(renderer->slice(badSlice, 8, 8), Error);
+  Pinhole badCamera = camera;
+  badCamera.forward.setZero();
+  EXPECT_THAT([&] { renderer->surface({badCamera, 0}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("forward")));
+}
+
+// --- OpenGL against the oracle -------------------------------------------------------------------------------------
+
+class Gl : public testing::Test {
+ protected:
+  void SetUp() override { HPSDF_REQUIRE_GL(); }
+
+  static void expectSameSlice(const Field& field, const SliceView& view, const BufferTolerance& tolerance,
+                              int width = kWidth, int height = kHeight) {
+    EXPECT_TRUE(agree(makeCpuRenderer(field)->slice(view, width, height),
+                      makeGlRenderer(field, GlChoice::software)->slice(view, width, height), tolerance));
+  }
+};
+
+TEST_F(Gl, SlicesOfBuiltInShapes) {
+  BufferTolerance tolerance = kSliceTolerance;
+  tolerance.pixels = 0;  // positions are in double precision on both sides
+  for (const std::string& name : kShapes) {
+    const Field& field = shape(name);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double offset : {0.0, 0.37, -1.1, 1.1})
+        expectSameSlice(field, axisSlice(kCube, axis, offset, kWidth, kHeight), tolerance);
+    for (const Vector3& normal : {Vector3(1, 1, 1), Vector3(0.3, -2, 0.1), Vector3(1, 0, 1)})
+      expectSameSlice(field, planeSlice(kCube, Vector3(0.1, 0, -0.2), normal, kWidth, kHeight), tolerance);
+  }
+}
+
+TEST_F(Gl, SlicesOfDegreesUpTo30) {
+  for (const int degree : {0, 1, 2, 13, 30}) {
+    const Field field = randomField(degree, {.roughness = 1, .maxDepth = 1, .minDegree = degree, .maxDegree = degree});
+    const ViewBuffers buffers =
+        makeCpuRenderer(field)->slice(axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), kWidth, kHeight);
+    EXPECT_EQ(*std::max_element(buffers.degree.begin(), buffers.degree.end()), degree);
+    expectSameSlice(field, axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), {.value = 1e-5});
+  }
+}
+
+TEST_F(Gl, SlicesOfDeepOctreesAndBoxDomains) {
+  // a magnified corner of a tree 12 levels deep
+  const Field deep =
+      randomField(4, {.grid = {3, 3, 3}, .refinement = 0.1, .maxDepth = 12, .deepAt = Vector3(0.1, 0.2, 0.3)});
+  int depth = 0;
+  Box deepest;
+  deep.forEachCell([&](const Cell& cell) {
+    if (cell.depth <= depth) return;
+    depth = cell.depth;
+    deepest = cell.box;
+  });
+  ASSERT_EQ(depth, 12);
+  const SliceView close{deepest.center(), 40 * deepest.sizes().x() * Vector3::UnitX(),
+                        30 * deepest.sizes().y() * Vector3::UnitY()};
+  const ViewBuffers buffers = makeCpuRenderer(deep)->slice(close, kWidth, kHeight);
+  EXPECT_EQ(*std::max_element(buffers.depth.begin(), buffers.depth.end()), depth);
+  expectSameSlice(deep, close, kSliceTolerance);
+
+  const Field box = randomField(6, {.domain = Box(Vector3(-3, 10, 0.5), Vector3(4, 11, 2)), .grid = {5, 1, 3}});
+  expectSameSlice(box, axisSlice(box.domain(), 1, 10.5, kWidth, kHeight), kSliceTolerance);
+  expectSameSlice(box, planeSlice(box.domain(), box.domain().center(), Vector3(1, 1, 1), kWidth, kHeight),
+                  kSliceTolerance);
+}
+
+TEST_F(Gl, ViewsLargerThanATile) {
+  const Field& field = shape("torus");
+  expectSameSlice(field, axisSlice(kCube, 2, 0, 4500, 9), kSliceTolerance, 4500, 9);
+  expectSameSlice(field, axisSlice(kCube, 2, 0, 5, 4500), kSliceTolerance, 5, 4500);
+  const Pinhole camera = pinhole({}, kCube, 2100, 64);
+  EXPECT_TRUE(agree(makeCpuRenderer(field)->surface({camera, 0}, 2100, 64),
+                    makeGlRenderer(field, GlChoice::software)->surface({camera, 0}, 2100, 64), surfaceTolerance(field),
+                    &camera));
+}
+
+TEST_F(Gl, SurfacesOfBuiltInShapesFromAnywhere) {
+  for (const std::string& name : kShapes) {
+    const Field& field = shape(name);
+    const auto cpu = makeCpuRenderer(field);
+    const auto gl = makeGlRenderer(field, GlChoice::software);
+    std::size_t seen = 0;
+    for (const Pinhole& camera : cameras(field, 31, 18))
+      for (const double offset : {0.0, -0.04}) {
+        const ViewBuffers expected = cpu->surface({camera, offset}, kWidth, kHeight);
+        seen += hits(expected);
+        EXPECT_TRUE(agree(expected, gl->surface({camera, offset}, kWidth, kHeight), surfaceTolerance(field), &camera))
+            << name << " offset " << offset;
+      }
+    EXPECT_GT(seen, std::size_t(kWidth) * kHeight);
+  }
+}
+
+TEST_F(Gl, SurfacesOfTheRudestFields) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const Field field = randomField(
+        seed,
+        {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)), .grid = {2, 3, 2}, .roughness = 0.5, .maxDepth = 4});
+    const auto cpu = makeCpuRenderer(field);
+    const auto gl = makeGlRenderer(field, GlChoice::software);
+    // many hits lie on faces between leaves, where f jumps over the offset: they are known across the face, which the
+    // ray may meet at a shallow angle, and the field is steep
+    BufferTolerance tolerance = surfaceTolerance(field);
+    tolerance.value = 1e-4;
+    tolerance.position *= 10;
+    for (const Pinhole& camera : cameras(field, seed, 6))
+      EXPECT_TRUE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
+                        tolerance, &camera))
+          << seed;
+  }
+}
+
+/// Degree 30 takes the march many passes: see shaders/surface_march.frag.
+TEST_F(Gl, SurfacesOfDegree30) {
+  const Field field = randomField(9, {.grid = {1, 1, 1}, .maxDepth = 1, .minDegree = 30, .maxDegree = 30});
+  const auto cpu = makeCpuRenderer(field);
+  const auto gl = makeGlRenderer(field, GlChoice::software);
+  const Pinhole camera = pinhole({}, field.domain(), 64, 48);
+  const ViewBuffers expected = cpu->surface({camera, 0}, 64, 48);
+  EXPECT_GT(hits(expected), 300u);
+  EXPECT_TRUE(agree(expected, gl->surface({camera, 0}, 64, 48), surfaceTolerance(field), &camera));
+}
+
+/// Slightly wrong buffers must not pass: one coefficient of one visible cell is changed a little.
+TEST_F(Gl, NegativeControl) {
+  const Field field = randomField(2);
+  const SliceView slice = axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
+  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const ViewBuffers expectedSlice = makeCpuRenderer(field)->slice(slice, kWidth, kHeight);
+  const ViewBuffers expectedSurface = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
+  const auto rendered = [&](std::uint32_t cell, double change) {
+    FieldData data = field.data();
+    std::get<std::vector<double>>(data.coefficients)[node::offset(data.nodes[cell])] += change;
+    const Field changed(std::move(data));
+    const auto gl = makeGlRenderer(changed, GlChoice::software);
+    return std::pair(gl->slice(slice, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight));
+  };
+  std::size_t hit = expectedSurface.cell.size() / 2 + kWidth / 2;
+  while (!expectedSurface.hit(hit)) ++hit;
+  std::size_t sliced = expectedSlice.cell.size() / 2 + kWidth / 2;
+  while (!expectedSlice.hit(sliced)) ++sliced;
+
+  const auto [sameSlice, sameSurface] = rendered(expectedSurface.cell[hit], 0);
+  EXPECT_TRUE(agree(expectedSlice, sameSlice, kSliceTolerance));
+  EXPECT_TRUE(agree(expectedSurface, sameSurface, surfaceTolerance(field), &camera));
+  EXPECT_FALSE(agree(expectedSlice, rendered(expectedSlice.cell[sliced], 1e-5).first, kSliceTolerance));
+  EXPECT_FALSE(
+      agree(expectedSurface, rendered(expectedSurface.cell[hit], 2e-5).second, surfaceTolerance(field), &camera));
+}
+
+TEST_F(Gl, SeveralRenderersAtOnceAndOnAnyThread) {
+  const Field a = randomField(12);
+  const Field b = randomField(13);
+  const SliceView view = axisSlice(a.domain(), 1, 0.2, kWidth, kHeight);
+  const ViewBuffers expectedA = makeCpuRenderer(a)->slice(view, kWidth, kHeight);
+  const ViewBuffers expectedB = makeCpuRenderer(b)->slice(view, kWidth, kHeight);
+  auto first = makeGlRenderer(a, GlChoice::software);
+  auto second = makeGlRenderer(b, GlChoice::software);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(agree(expectedA, first->slice(view, kWidth, kHeight), kSliceTolerance));
+    EXPECT_TRUE(agree(expectedB, second->slice(view, kWidth, kHeight), kSliceTolerance));
+  }
+  first.reset();
+  std::thread([&] { EXPECT_TRUE(agree(expectedB, second->slice(view, kWidth, kHeight), kSliceTolerance)); }).join();
+  EXPECT_TRUE(agree(expectedB, second->slice(view, kWidth, kHeight), kSliceTolerance));
+}
+
+TEST_F(Gl, RepeatsItselfBitByBit) {
+  const Field& field = shape("torus");
+  const SurfaceView view{pinhole({}, kCube, kWidth, kHeight), 0};
+  const auto gl = makeGlRenderer(field, GlChoice::software);
+  const ViewBuffers once = gl->surface(view, kWidth, kHeight);
+  const ViewBuffers again = gl->surface(view, kWidth, kHeight);
+  EXPECT_EQ(once.cell, again.cell);
+  EXPECT_EQ(once.distance, again.distance);
+  EXPECT_EQ(once.value, again.value);
+}
+
+TEST_F(Gl, NamesItsDevice) {
+  EXPECT_THAT(glDescription(GlChoice::software), HasSubstr("llvmpipe"));
+  const Field field = randomField(1);
+  EXPECT_EQ(makeGlRenderer(field, GlChoice::software)->description(), glDescription(GlChoice::software));
+}
+
+TEST_F(Gl, RefusesViewsThatAreNone) {
+  const Field field = randomField(1);
+  const auto renderer = makeGlRenderer(field, GlChoice::software);
+  EXPECT_THROW(renderer->slice(axisSlice(field.domain(), 2, 0, 8, 8), 0, 8), Error);
+  EXPECT_THROW(renderer->surface({pinhole({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
+}
+
+/// In a fresh process, so that EGL looks for its drivers again: there are none, and the error says all that was tried.
+TEST(GlDeathTest, WithoutADriverTheErrorSaysWhatWasTriedAndWhatToDo) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto withoutDrivers = [](GlChoice choice) {
+    ::setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);
+    try {
+      glDescription(choice);
+    } catch (const Error& error) {
+      std::fputs(error.what(), stderr);
+      ::_exit(7);
+    }
+    ::_exit(0);
+  };
+  EXPECT_EXIT(withoutDrivers(GlChoice::software), testing::ExitedWithCode(7),
+              "no OpenGL 4.5 through EGL on a software device \\(tried .*default display: .*\\): install libegl-mesa0 "
+              "and libgl1-mesa-dri, or render with --cpu");
+  EXPECT_EXIT(withoutDrivers(GlChoice::hardware), testing::ExitedWithCode(7),
+              "on a hardware device \\(tried hardware devices: .*surfaceless Mesa: .*--cpu");
+}
+
+/// Only where there is no graphics hardware does the choice fail; elsewhere it must not give a software device.
+TEST(GlHardware, IsHardwareOrAnError) {
+  try {
+    EXPECT_THAT(glDescription(GlChoice::hardware), testing::Not(HasSubstr("llvmpipe")));
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("on a hardware device"));
+    EXPECT_THAT(error.what(), HasSubstr("tried"));
+  }
+}
+
+}  // namespace
+}  // namespace hpsdf::render
