@@ -23,7 +23,8 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// n-gons triangulated, then `cleaned`.
 ///
 /// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6),
-/// and indices out of range in OFF and PLY files are mended silently, so that they cannot be reported.
+/// and indices out of range in OFF and PLY files are mended (in glTF files, their faces left out) silently, so that
+/// they cannot be reported.
 ///
 /// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, non-finite, or without area.
 ImportedMesh importMesh(const std::filesystem::path& file);

@@ -1,6 +1,5 @@
 #include "hpsdf/mesh_import.h"
 
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -17,6 +17,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
+#include "mesh/triangulate.h"
 
 namespace hpsdf {
 namespace {
@@ -60,6 +61,39 @@ void requireReadable(const fs::path& file) {
     throw Error(name + ": cannot be read; check its permissions");
 }
 
+/// The largest count that the header of a PLY or an OFF file promises, 0 where there is none.
+double promisedElements(const fs::path& file) {
+  const std::string extension = extensionOf(file);
+  double most = 0;
+  std::ifstream stream(file, std::ios::binary);
+  std::string line;
+  if (extension == "ply") {
+    for (int i = 0; i < 1000 && std::getline(stream, line) && !line.starts_with("end_header"); ++i) {
+      std::istringstream words(line);
+      std::string keyword, name;
+      double count = 0;
+      if (words >> keyword >> name >> count && keyword == "element") most = std::max(most, count);
+    }
+  } else if (extension == "off") {
+    for (int i = 0; i < 1000 && most == 0 && std::getline(stream, line); ++i) {
+      line = line.substr(0, line.find('#'));
+      if (const std::size_t keyword = line.find("OFF"); keyword != std::string::npos) line.erase(0, keyword + 3);
+      std::istringstream words(line);
+      for (double count = 0; words >> count;) most = std::max(most, count);
+    }
+  }
+  return most;
+}
+
+/// assimp takes memory for what a header promises before it reads on: a few wrong bytes could ask for all there is.
+void requirePromisesKept(const fs::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (!error && promisedElements(file) > static_cast<double>(size))
+    throw Error(file.string() +
+                ": its header promises more vertices or faces than the file has bytes; export it again");
+}
+
 /// A message of assimp's as part of one line.
 std::string oneLine(std::string text) {
   std::replace_if(
@@ -72,7 +106,7 @@ Error unreadable(const std::string& name, const std::string& reason) {
   return Error(name + ": cannot be read as a mesh (" + oneLine(reason) + "); check or export the file again");
 }
 
-/// assimp's steps trust the indices that its readers hand on, so that this comes before any step.
+/// assimp's readers check the indices of some formats only.
 void requireValidIndices(const aiScene& scene, const std::string& name) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     const aiMesh& part = *scene.mMeshes[m];
@@ -85,22 +119,17 @@ void requireValidIndices(const aiScene& scene, const std::string& name) {
   }
 }
 
-/// Reads the scene into `importer`, which owns it, with n-gons triangulated.
+/// Reads the scene into `importer`, which owns it.
 const aiScene& readScene(Assimp::Importer& importer, const fs::path& file) {
   const std::string name = file.string();
   const aiScene* scene = nullptr;
   try {
     scene = importer.ReadFile(name, 0);
-    if (scene && scene->mRootNode) {
-      requireValidIndices(*scene, name);
-      scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
-    }
-  } catch (const Error&) {
-    throw;
   } catch (const std::exception& e) {
     throw unreadable(name, e.what());
   }
   if (!scene || !scene->mRootNode) throw unreadable(name, importer.GetErrorString());
+  requireValidIndices(*scene, name);
   return *scene;
 }
 
@@ -108,6 +137,20 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
   Eigen::Affine3d result;
   result.matrix() << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, 0, 0, 0, 1;
   return result;
+}
+
+/// The face's triangles as indices of the part's vertices; none of a point or a line, which bound nothing.
+std::vector<std::array<std::uint32_t, 3>> trianglesOf(const aiFace& face, const aiMesh& part) {
+  if (face.mNumIndices < 3) return {};
+  std::vector<Vector3> corners;
+  for (unsigned i = 0; i < face.mNumIndices; ++i) {
+    const aiVector3D& p = part.mVertices[face.mIndices[i]];
+    corners.emplace_back(p.x, p.y, p.z);
+  }
+  auto triangles = triangulate(corners);
+  for (auto& triangle : triangles)
+    for (std::uint32_t& v : triangle) v = face.mIndices[v];
+  return triangles;
 }
 
 void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& worldFromPart) {
@@ -119,14 +162,11 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& world
     mesh.vertices.push_back(worldFromPart * Vector3(p.x, p.y, p.z));
   }
   const bool mirrored = worldFromPart.linear().determinant() < 0;  // would turn the faces inside out
-  for (unsigned f = 0; f < part.mNumFaces; ++f) {
-    const aiFace& face = part.mFaces[f];
-    if (face.mNumIndices != 3) continue;  // points and lines bound nothing
-    std::array<std::uint32_t, 3> triangle = {first + face.mIndices[0], first + face.mIndices[1],
-                                             first + face.mIndices[2]};
-    if (mirrored) std::swap(triangle[1], triangle[2]);
-    mesh.triangles.push_back(triangle);
-  }
+  for (unsigned f = 0; f < part.mNumFaces; ++f)
+    for (auto [a, b, c] : trianglesOf(part.mFaces[f], part)) {
+      if (mirrored) std::swap(b, c);
+      mesh.triangles.push_back({first + a, first + b, first + c});
+    }
 }
 
 /// All meshes of the scene, as often as nodes show them, in world coordinates.
@@ -152,6 +192,7 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
 
 ImportedMesh importMesh(const fs::path& file) {
   requireReadable(file);
+  requirePromisesKept(file);
   TriangleMesh mesh;
   {
     Assimp::Importer importer;  // gone, with its copy of the mesh, before the cleaning takes memory

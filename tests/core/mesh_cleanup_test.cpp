@@ -1,0 +1,385 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Triangle = std::array<std::uint32_t, 3>;
+
+TriangleMesh tetrahedron() {
+  return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, "tetrahedron"};
+}
+
+TriangleMesh cube(double halfSize = 1, const Vector3& center = Vector3::Zero()) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices.push_back(center + halfSize * Vector3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  mesh.name = "cube";
+  return mesh;
+}
+
+TriangleMesh turned(TriangleMesh mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
+  const auto first = static_cast<std::uint32_t>(a.vertices.size());
+  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
+  for (const Triangle& t : b.triangles) a.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  return a;
+}
+
+/// Every triangle with three vertices of its own, as in an STL file.
+TriangleMesh separated(const TriangleMesh& mesh) {
+  TriangleMesh soup;
+  for (const Triangle& t : mesh.triangles) {
+    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+    for (const std::uint32_t v : t) soup.vertices.push_back(mesh.vertices[v]);
+    soup.triangles.push_back({first, first + 1, first + 2});
+  }
+  return soup;
+}
+
+std::string errorOf(const TriangleMesh& mesh) {
+  try {
+    cleaned(mesh);
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(MeshCleanup, LeavesACleanMeshAsItIs) {
+  const TriangleMesh mesh = cube();
+  const auto [clean, report] = cleaned(mesh);
+  EXPECT_EQ(clean.vertices, mesh.vertices);
+  EXPECT_EQ(clean.triangles, mesh.triangles);
+  EXPECT_EQ(clean.name, "cube");
+  EXPECT_EQ(report.vertices, 8u);
+  EXPECT_EQ(report.faces, 12u);
+  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.weldedVertices + report.unreferencedVertices + report.degenerateFaces + report.flippedFaces +
+                report.duplicateFaces,
+            0u);
+  EXPECT_FALSE(report.turned);
+  EXPECT_TRUE(report.closed());
+  EXPECT_DOUBLE_EQ(report.volume, 8);
+  EXPECT_DOUBLE_EQ(report.area, 24);
+  EXPECT_EQ(report.box.min(), Vector3(-1, -1, -1));
+  EXPECT_EQ(report.box.max(), Vector3(1, 1, 1));
+}
+
+TEST(MeshCleanup, WeldsEqualPositionsInOrderOfFirstUse) {
+  const auto [clean, report] = cleaned(separated(tetrahedron()));
+  EXPECT_EQ(report.vertices, 4u);
+  EXPECT_EQ(report.weldedVertices, 8u);
+  EXPECT_EQ(report.unreferencedVertices, 0u);
+  EXPECT_TRUE(report.closed());
+  const std::vector<Vector3> expected = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
+  EXPECT_EQ(clean.vertices, expected);
+  const std::vector<Triangle> faces = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {2, 1, 3}};
+  EXPECT_EQ(clean.triangles, faces);
+}
+
+TEST(MeshCleanup, WeldsNegativeZeroWithZeroAndNothingElse) {
+  TriangleMesh mesh = separated(tetrahedron());
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += 2)
+    for (double& x : mesh.vertices[i])
+      if (x == 0) x = -0.0;
+  EXPECT_EQ(cleaned(mesh).report.vertices, 4u);
+  for (const Vector3& v : cleaned(mesh).mesh.vertices)
+    for (const double x : v) EXPECT_FALSE(std::signbit(x));
+
+  mesh.vertices[0].x() = std::numeric_limits<double>::denorm_min();  // nearly equal is not equal
+  EXPECT_EQ(cleaned(mesh).report.vertices, 5u);
+}
+
+TEST(MeshCleanup, DropsFacesWithEqualCornersAndUnusedVertices) {
+  TriangleMesh mesh = tetrahedron();
+  mesh.vertices.insert(mesh.vertices.begin(), {7, 7, 7});  // used by nothing
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& v : t) ++v;
+  mesh.vertices.push_back({1, 0, 0});  // welded with vertex 2
+  mesh.vertices.push_back({9, 9, 9});  // used by a collapsed face only
+  mesh.triangles.push_back({1, 2, 5});
+  mesh.triangles.push_back({6, 6, 1});
+  const auto [clean, report] = cleaned(mesh);
+  EXPECT_EQ(clean.vertices, tetrahedron().vertices);
+  EXPECT_EQ(clean.triangles, tetrahedron().triangles);
+  EXPECT_EQ(report.degenerateFaces, 2u);
+  EXPECT_EQ(report.weldedVertices, 1u);
+  EXPECT_EQ(report.unreferencedVertices, 2u);
+  EXPECT_TRUE(report.closed());
+}
+
+TEST(MeshCleanup, DropsFacesOnOneLine) {
+  TriangleMesh mesh = cube();
+  mesh.vertices.push_back({-1, -1, 0.3});  // on the edge from 0 to 4, which has two faces already
+  mesh.triangles.push_back({0, 4, 8});
+  // a line that no coordinate plane holds; its middle is the rounded middle
+  mesh = joined(mesh, {{{5, 0, 0}, {5.1, 0.7, 0.3}, {5 + (5.1 - 5) / 2, 0.35, 0.15}}, {{0, 1, 2}}, ""});
+  const auto [clean, report] = cleaned(mesh);
+  EXPECT_EQ(report.degenerateFaces, 2u);
+  EXPECT_EQ(report.flippedFaces, 0u);
+  EXPECT_EQ(report.faces, 12u);
+  EXPECT_EQ(report.vertices, 8u);
+  EXPECT_TRUE(report.closed());
+}
+
+TEST(MeshCleanup, KeepsThinTrianglesThatHaveAnArea) {
+  TriangleMesh mesh = tetrahedron();
+  mesh.vertices.push_back({0.5, -1e-12, 0});
+  mesh.triangles.push_back({0, 1, 4});
+  EXPECT_EQ(cleaned(mesh).report.faces, 5u);
+  EXPECT_EQ(cleaned(mesh).report.degenerateFaces, 0u);
+}
+
+TEST(MeshCleanup, FlipsAFaceOnOneLineThatHoldsItsNeighboursTogether) {
+  // A corner on the cube's edge 0-4: the faces of x = -1 use it, those of y = -1 do not, and a face on one line fills
+  // the slit. Dropping that face would open the mesh.
+  TriangleMesh mesh = cube();
+  mesh.vertices.push_back({-1, -1, 0.3});
+  mesh.triangles[0] = {0, 8, 6};
+  mesh.triangles.push_back({8, 4, 6});
+  mesh.triangles.push_back({0, 4, 8});
+  ASSERT_TRUE(inspect(mesh).closed());
+  const auto [clean, report] = cleaned(mesh);
+  EXPECT_EQ(report.flippedFaces, 1u);
+  EXPECT_EQ(report.degenerateFaces, 0u);
+  EXPECT_EQ(report.faces, 14u);
+  EXPECT_EQ(report.vertices, 9u);
+  EXPECT_TRUE(report.closed());
+  EXPECT_DOUBLE_EQ(report.volume, 8);
+  EXPECT_DOUBLE_EQ(report.area, 24);
+  for (const auto& [a, b, c] : clean.triangles) {
+    const Vector3& origin = clean.vertices[a];
+    EXPECT_GT((clean.vertices[b] - origin).cross(clean.vertices[c] - origin).norm(), 0.1);
+  }
+}
+
+TEST(MeshCleanup, FlipsChainsOfFacesOnOneLine) {
+  TriangleMesh mesh = cube();
+  mesh.vertices.push_back({-1, -1, -0.5});  // 8
+  mesh.vertices.push_back({-1, -1, 0});     // 9
+  mesh.vertices.push_back({-1, -1, 0.5});   // 10
+  mesh.triangles[0] = {0, 8, 6};
+  mesh.triangles.push_back({8, 9, 6});
+  mesh.triangles.push_back({9, 10, 6});
+  mesh.triangles.push_back({10, 4, 6});
+  mesh.triangles.push_back({0, 9, 8});  // waits for the next but one
+  mesh.triangles.push_back({9, 4, 10});
+  mesh.triangles.push_back({0, 4, 9});
+  ASSERT_TRUE(inspect(mesh).closed());
+  const auto report = cleaned(mesh).report;
+  EXPECT_EQ(report.flippedFaces, 3u);
+  EXPECT_EQ(report.faces, 18u);
+  EXPECT_TRUE(report.closed());
+  EXPECT_DOUBLE_EQ(report.area, 24);
+}
+
+TEST(MeshCleanup, DropsFacesOverTheSameCornersWhicheverWayTheyLook) {
+  TriangleMesh mesh = tetrahedron();
+  mesh.triangles.push_back({2, 1, 0});  // as the first, rotated
+  mesh.triangles.push_back({1, 0, 3});  // as the second, turned
+  const auto [clean, report] = cleaned(mesh);
+  EXPECT_EQ(clean.triangles, tetrahedron().triangles);
+  EXPECT_EQ(report.duplicateFaces, 2u);
+  EXPECT_TRUE(report.closed());
+}
+
+TEST(MeshCleanup, SizeDoesNotMatter) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0.9, 1.1);
+  for (const double size : {1e-30, 1e-6, 1.0, 1e6, 1e30}) {
+    TriangleMesh mesh = cube(size);
+    for (Vector3& v : mesh.vertices) v *= uniform(random);
+    const auto [clean, report] = cleaned(mesh);
+    EXPECT_EQ(report.faces, 12u) << size;
+    EXPECT_EQ(report.degenerateFaces, 0u) << size;
+    EXPECT_TRUE(report.closed()) << size;
+    EXPECT_NEAR(report.volume / std::pow(size, 3), 8, 4) << size;
+  }
+}
+
+TEST(MeshCleanup, TurnsTheWholeMeshWhenItsVolumeIsNegative) {
+  const auto [clean, report] = cleaned(turned(cube()));
+  EXPECT_TRUE(report.turned);
+  EXPECT_EQ(clean.triangles, cube().triangles);
+  EXPECT_DOUBLE_EQ(report.volume, 8);
+  EXPECT_DOUBLE_EQ(signedVolume(clean), 8);
+}
+
+TEST(MeshCleanup, KeepsACavityAndTurnsItOnlyWithTheWhole) {
+  const TriangleMesh hollow = joined(cube(1), turned(cube(0.5)));
+  const auto [clean, report] = cleaned(hollow);
+  EXPECT_FALSE(report.turned);
+  EXPECT_EQ(clean.triangles, hollow.triangles);
+  EXPECT_EQ(report.parts, 2u);
+  EXPECT_DOUBLE_EQ(report.volume, 7);
+
+  const auto [again, mended] = cleaned(turned(hollow));
+  EXPECT_TRUE(mended.turned);
+  EXPECT_EQ(again.triangles, hollow.triangles);
+  EXPECT_DOUBLE_EQ(mended.volume, 7);
+}
+
+TEST(MeshCleanup, TurnsAnOpenMeshOnlyWhenItsVolumeIsClear) {
+  TriangleMesh lidless = cube();
+  lidless.triangles.resize(10);
+  EXPECT_FALSE(cleaned(lidless).report.turned);
+  EXPECT_TRUE(cleaned(turned(lidless)).report.turned);
+
+  // two triangles, slightly folded either way: the sign of their volume means nothing
+  for (const double fold : {-1e-3, 1e-3}) {
+    const TriangleMesh sheet = {{{0, 0, 0}, {1, 0, 0}, {1, 1, fold}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, ""};
+    EXPECT_FALSE(cleaned(sheet).report.turned);
+    EXPECT_FALSE(cleaned(turned(sheet)).report.turned);
+  }
+}
+
+TEST(MeshCleanup, VolumeFarFromTheOrigin) {
+  EXPECT_NEAR(cleaned(cube(1, {1e8, -1e8, 1e8})).report.volume, 8, 1e-12);
+  EXPECT_TRUE(cleaned(turned(cube(1, {1e8, -1e8, 1e8}))).report.turned);
+}
+
+TEST(MeshCleanup, RefusesWhatIsNoSurface) {
+  TriangleMesh mesh = tetrahedron();
+  mesh.triangles[2][1] = 4;
+  EXPECT_THAT(errorOf(mesh), AllOf(HasSubstr("tetrahedron: face 3 refers to vertex 5"), HasSubstr("only 4")));
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200}) {
+    mesh = tetrahedron();
+    mesh.vertices[1].z() = bad;
+    EXPECT_THAT(errorOf(mesh), HasSubstr("tetrahedron: vertex 2 has a coordinate that is not a finite number"));
+  }
+  EXPECT_THAT(errorOf({{{0, 0, 0}}, {}, "dust"}), HasSubstr("dust: no faces"));
+  EXPECT_THAT(errorOf({}), HasSubstr("mesh: no faces"));
+  EXPECT_THAT(errorOf({{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}, {{0, 1, 2}, {0, 0, 1}}, "line"}),
+              AllOf(HasSubstr("line: no face with an area (2 faces are degenerate)"), Not(HasSubstr("\n"))));
+}
+
+TEST(MeshReport, CountsEdgesByHand) {
+  TriangleMesh open = tetrahedron();
+  open.triangles.pop_back();
+  MeshReport report = inspect(open);
+  EXPECT_EQ(report.boundaryEdges, 3u);
+  EXPECT_EQ(report.parts, 1u);
+  EXPECT_FALSE(report.closed());
+
+  TriangleMesh flipped = tetrahedron();
+  std::swap(flipped.triangles[0][0], flipped.triangles[0][1]);
+  report = inspect(flipped);
+  EXPECT_EQ(report.boundaryEdges, 0u);
+  EXPECT_EQ(report.inconsistentEdges, 3u);
+  EXPECT_FALSE(report.closed());
+
+  const TriangleMesh fan = {
+      {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}}, ""};
+  report = inspect(fan);
+  EXPECT_EQ(report.nonManifoldEdges, 1u);
+  EXPECT_EQ(report.boundaryEdges, 6u);
+  EXPECT_EQ(report.inconsistentEdges, 0u);
+  EXPECT_EQ(report.parts, 1u);
+}
+
+TEST(MeshReport, PartsShareEdgesNotJustCorners) {
+  TriangleMesh two = joined(tetrahedron(), cube(1, {5, 0, 0}));
+  EXPECT_EQ(inspect(two).parts, 2u);
+  EXPECT_EQ(inspect(two).vertices, 12u);
+
+  // two tetrahedra that meet in one corner
+  TriangleMesh other = tetrahedron();
+  for (Vector3& v : other.vertices) v = -v;
+  const MeshReport report = cleaned(joined(tetrahedron(), turned(other))).report;
+  EXPECT_EQ(report.vertices, 7u);
+  EXPECT_EQ(report.parts, 2u);
+  EXPECT_TRUE(report.closed());
+}
+
+TEST(MeshReport, AnEmptyMeshIsNotClosed) {
+  const MeshReport report = inspect({});
+  EXPECT_EQ(report.faces, 0u);
+  EXPECT_EQ(report.parts, 0u);
+  EXPECT_TRUE(report.box.isEmpty());
+  EXPECT_FALSE(report.closed());
+}
+
+TEST(TriangleMesh, BoxIsThatOfTheTriangles) {
+  TriangleMesh mesh = tetrahedron();
+  mesh.vertices.push_back({100, 100, 100});
+  EXPECT_EQ(boundingBox(mesh).max(), Vector3(1, 1, 1));
+  EXPECT_EQ(boundingBox(mesh).min(), Vector3(0, 0, 0));
+  EXPECT_TRUE(boundingBox({{{1, 2, 3}}, {}, ""}).isEmpty());
+}
+
+TEST(TriangleMesh, VolumeAndArea) {
+  EXPECT_DOUBLE_EQ(signedVolume(tetrahedron()), 1.0 / 6);
+  EXPECT_DOUBLE_EQ(signedVolume(turned(tetrahedron())), -1.0 / 6);
+  EXPECT_DOUBLE_EQ(surfaceArea(tetrahedron()), 1.5 + std::sqrt(3.0) / 2);
+}
+
+TEST(TriangleMesh, FingerprintIsStable) {
+  // XXH3 over counts, vertices and triangles written out by hand as little-endian bytes
+  EXPECT_EQ(fingerprint({}), 0xd0a66a65c7528968u);
+  EXPECT_EQ(fingerprint(tetrahedron()), 0x83695951d65216dau);
+  TriangleMesh mesh = tetrahedron();
+  mesh.name = "another name";
+  EXPECT_EQ(fingerprint(mesh), fingerprint(tetrahedron()));
+  mesh.vertices[0].x() = -0.0;
+  EXPECT_EQ(fingerprint(mesh), fingerprint(tetrahedron()));
+  mesh.vertices[0].x() = std::numeric_limits<double>::denorm_min();
+  EXPECT_NE(fingerprint(mesh), fingerprint(tetrahedron()));
+  EXPECT_NE(fingerprint(turned(tetrahedron())), fingerprint(tetrahedron()));
+}
+
+TEST(TriangleMesh, NormalizedSpansExactlyTwo) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const double size = std::pow(10, 8 * uniform(random));
+    const Vector3 offset = 10 * size * Vector3(uniform(random), uniform(random), uniform(random));
+    TriangleMesh mesh;
+    for (int i = 0; i < 30; ++i)
+      mesh.vertices.push_back(offset + size * Vector3(uniform(random), 0.9 * uniform(random), 0.3 * uniform(random)));
+    for (std::uint32_t i = 0; i < 30; i += 3) mesh.triangles.push_back({i, i + 1, i + 2});
+    const TriangleMesh result = normalized(mesh);
+    const Box box = boundingBox(result);
+    Eigen::Index longest = 0;
+    boundingBox(mesh).sizes().maxCoeff(&longest);
+    EXPECT_EQ(box.min()[longest], -1);
+    EXPECT_EQ(box.max()[longest], 1);
+    EXPECT_TRUE((box.min().array() >= -1).all() && (box.max().array() <= 1).all());
+    EXPECT_TRUE((box.min() + box.max()).isZero(1e-15)) << (box.min() + box.max()).transpose();
+    const double ratio = boundingBox(mesh).sizes()[longest] / 2;
+    EXPECT_NEAR((result.vertices[0] - result.vertices[1]).norm() * ratio, (mesh.vertices[0] - mesh.vertices[1]).norm(),
+                1e-13 * size);
+  }
+}
+
+TEST(TriangleMesh, NormalizedNeedsAnExtent) {
+  EXPECT_THROW(normalized({}), Error);
+  EXPECT_THROW(normalized({{{1, 1, 1}}, {{0, 0, 0}}, "dot"}), Error);
+  EXPECT_THROW(normalized({{{1, 1, 1}}, {{0, 0, 1}}, "broken"}), Error);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(normalized({{{0, 0, 0}, {nan, nan, nan}, {nan, 0, 0}}, {{0, 1, 2}}, "nan"}), Error);
+}
+
+}  // namespace
+}  // namespace hpsdf

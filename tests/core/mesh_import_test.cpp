@@ -1,0 +1,588 @@
+#include "hpsdf/mesh_import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <ostream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "mesh/triangulate.h"
+#include "support/temporary_directory.h"
+#include "support/test_mesh.h"
+
+namespace hpsdf {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+static_assert(std::endian::native == std::endian::little, "the binary files below are written as they lie in memory");
+
+/// Bytes of a binary file, number by number.
+struct Bytes {
+  std::string data;
+  template <typename T>
+  Bytes& add(T value) {
+    data.append(reinterpret_cast<const char*>(&value), sizeof value);
+    return *this;
+  }
+  Bytes& add(const Bytes& other) {
+    data += other.data;
+    return *this;
+  }
+};
+
+// A tetrahedron unlike itself in any other position: sides 1, 2, 3 along x, y, z, the right-angled corner at (5, 6, 7).
+constexpr float kCorners[4][3] = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, 10}};
+constexpr std::uint16_t kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+class MeshImport : public ::testing::Test {
+ protected:
+  fs::path write(const std::string& name, const std::string& content) const {
+    std::ofstream(directory_ / name, std::ios::binary) << content;
+    return directory_ / name;
+  }
+
+  ImportedMesh import(const std::string& name, const std::string& content) const {
+    return importMesh(write(name, content));
+  }
+
+  std::string errorOf(const fs::path& file) const {
+    try {
+      importMesh(file);
+    } catch (const Error& e) {
+      EXPECT_THAT(e.what(), Not(HasSubstr("\n")));
+      return e.what();
+    }
+    return "no error";
+  }
+
+  std::string errorOf(const std::string& name, const std::string& content) const {
+    return errorOf(write(name, content));
+  }
+
+  void expectTetrahedron(const ImportedMesh& imported, const std::string& name) const {
+    const auto& [mesh, report] = imported;
+    EXPECT_EQ(mesh.name, name);
+    EXPECT_EQ(report.vertices, 4u);
+    EXPECT_EQ(report.faces, 4u);
+    EXPECT_TRUE(report.closed());
+    EXPECT_FALSE(report.turned);
+    EXPECT_NEAR(report.volume, 1, 1e-12);
+    EXPECT_EQ(report.box.min(), Vector3(5, 6, 7));
+    EXPECT_EQ(report.box.max(), Vector3(6, 8, 10));
+  }
+
+  support::TemporaryDirectory directory_;
+};
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Formats
+
+TEST_F(MeshImport, Obj) {
+  expectTetrahedron(import("t.obj",
+                           "mtllib missing.mtl\nv 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nvn 0 0 1\nvt 0 0\n"
+                           "f 1 3 2\nf 1/1/1 2/1/1 4/1/1\nf 1//1 4//1 3//1\nf -3 -2 -1\n"),
+                    "t.obj");
+}
+
+TEST_F(MeshImport, ExtensionsInAnyCase) {
+  expectTetrahedron(import("T.OBJ", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
+                    "T.OBJ");
+}
+
+TEST_F(MeshImport, PlyAscii) {
+  expectTetrahedron(
+      import("t.ply",
+             "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+             "5 6 7\n6 6 7\n5 8 7\n5 6 10\n0 0 0\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
+      "t.ply");
+}
+
+TEST_F(MeshImport, PlyBinary) {
+  Bytes file{
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+      "property double z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"};
+  for (const auto& corner : kCorners)
+    for (const float x : corner) file.add(double{x});
+  for (const auto& face : kFaces) {
+    file.add(std::uint8_t{3});
+    for (const std::uint16_t v : face) file.add(std::int32_t{v});
+  }
+  expectTetrahedron(import("t.ply", file.data), "t.ply");
+}
+
+TEST_F(MeshImport, Off) {
+  expectTetrahedron(import("t.off", "OFF\n4 4 0\n5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
+                    "t.off");
+}
+
+TEST_F(MeshImport, StlAscii) {
+  std::string file = "solid t\n";
+  for (const auto& face : kFaces) {
+    file += "facet normal 0 0 0\nouter loop\n";
+    for (const std::uint16_t v : face)
+      file += "vertex " + std::to_string(kCorners[v][0]) + " " + std::to_string(kCorners[v][1]) + " " +
+              std::to_string(kCorners[v][2]) + "\n";
+    file += "endloop\nendfacet\n";
+  }
+  const ImportedMesh imported = import("t.stl", file + "endsolid t\n");
+  expectTetrahedron(imported, "t.stl");
+  EXPECT_EQ(imported.report.weldedVertices, 8u);
+}
+
+TEST_F(MeshImport, StlBinary) {
+  Bytes file{std::string(80, ' ')};
+  file.add(std::uint32_t{4});
+  for (const auto& face : kFaces) {
+    for (int i = 0; i < 3; ++i) file.add(0.0f);
+    for (const std::uint16_t v : face)
+      for (const float x : kCorners[v]) file.add(x);
+    file.add(std::uint16_t{0});
+  }
+  expectTetrahedron(import("t.stl", file.data), "t.stl");
+}
+
+Bytes chunk3ds(std::uint16_t id, const Bytes& content) {
+  return Bytes().add(id).add(static_cast<std::uint32_t>(content.data.size() + 6)).add(content);
+}
+
+TEST_F(MeshImport, Discreet3dsKeepsTheFilesCoordinates) {
+  Bytes vertices, faces;
+  vertices.add(std::uint16_t{4});
+  for (const auto& corner : kCorners)
+    for (const float x : corner) vertices.add(x);
+  faces.add(std::uint16_t{4});
+  for (const auto& face : kFaces) {
+    for (const std::uint16_t v : face) faces.add(v);
+    faces.add(std::uint16_t{7});
+  }
+  const Bytes mesh = chunk3ds(0x4100, chunk3ds(0x4110, vertices).add(chunk3ds(0x4120, faces)));
+  const Bytes object = chunk3ds(0x4000, Bytes{std::string("t\0", 2)}.add(mesh));
+  expectTetrahedron(import("t.3ds", chunk3ds(0x4d4d, chunk3ds(0x3d3d, object)).data), "t.3ds");
+}
+
+TEST_F(MeshImport, Installed3dsFile) {
+  const fs::path file = "/usr/share/glmark2/models/cube.3ds";
+  if (!fs::exists(file)) GTEST_SKIP() << file << " is not installed (package glmark2-data)";
+  const MeshReport report = importMesh(file).report;
+  EXPECT_EQ(report.faces, 12u);
+  EXPECT_TRUE(report.closed());
+  EXPECT_NEAR(report.volume, 8, 1e-5);
+}
+
+/// The tetrahedron's positions and 16-bit indices as a glTF buffer.
+Bytes gltfBuffer() {
+  Bytes buffer;
+  for (const auto& corner : kCorners)
+    for (const float x : corner) buffer.add(x);
+  for (const auto& face : kFaces)
+    for (const std::uint16_t v : face) buffer.add(v);
+  return buffer;
+}
+
+/// A glTF scene that shows the tetrahedron by the given nodes.
+std::string gltfScene(const std::string& nodes, const std::string& roots, const std::string& uri = "", int mode = 4) {
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + roots + R"(]}],"nodes":[)" + nodes +
+         R"(],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"mode":)" + std::to_string(mode) +
+         R"(}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[5,6,7],"max":[6,8,10]},
+{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],
+"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],
+"buffers":[{"byteLength":72)" +
+         (uri.empty() ? "" : R"(,"uri":")" + uri + R"(")") + "}]}";
+}
+
+TEST_F(MeshImport, Gltf) {
+  write("t.bin", gltfBuffer().data);
+  expectTetrahedron(import("t.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")), "t.gltf");
+}
+
+TEST_F(MeshImport, Glb) {
+  std::string json = gltfScene(R"({"mesh":0})", "0");
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const Bytes buffer = gltfBuffer();
+  Bytes file{"glTF"};
+  file.add(std::uint32_t{2}).add(static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + buffer.data.size()));
+  file.add(static_cast<std::uint32_t>(json.size())).add(std::uint32_t{0x4e4f534a}).add(Bytes{json});
+  file.add(static_cast<std::uint32_t>(buffer.data.size())).add(std::uint32_t{0x004e4942}).add(buffer);
+  expectTetrahedron(import("t.glb", file.data), "t.glb");
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Scenes
+
+TEST_F(MeshImport, NodeTransformsAreAppliedAndInstancesRepeated) {
+  write("t.bin", gltfBuffer().data);
+  // the parent doubles and shifts; its child turns a quarter about z: (x, y, z) → (-y, x, z)
+  const auto [mesh, report] =
+      import("t.gltf", gltfScene(R"({"mesh":0},{"children":[2],"scale":[2,2,2],"translation":[100,0,0]},
+                             {"mesh":0,"rotation":[0,0,0.70710678118,0.70710678118]})",
+                                 "0,1", "t.bin"));
+  EXPECT_EQ(report.vertices, 8u);
+  EXPECT_EQ(report.parts, 2u);
+  EXPECT_TRUE(report.closed());
+  EXPECT_NEAR(report.volume, 1 + 8, 1e-4);
+  EXPECT_TRUE(report.box.min().isApprox(Vector3(5, 6, 7)));
+  EXPECT_TRUE(report.box.max().isApprox(Vector3(100 - 12, 12, 20), 1e-6)) << report.box.max().transpose();
+}
+
+TEST_F(MeshImport, MirroringNodesKeepFacesOutward) {
+  write("t.bin", gltfBuffer().data);
+  const auto [mesh, report] = import("t.gltf", gltfScene(R"({"mesh":0},{"mesh":0,"scale":[-2,1,1]})", "0,1", "t.bin"));
+  EXPECT_FALSE(report.turned);
+  EXPECT_TRUE(report.closed());
+  EXPECT_NEAR(report.volume, 1 + 2, 1e-12);  // 1 - 2 where the mirrored one is left inside out
+  EXPECT_EQ(report.box.min(), Vector3(-12, 6, 7));
+}
+
+TEST_F(MeshImport, AllMeshesOfASceneAreJoinedAndWelded) {
+  const auto [mesh, report] = import("two.obj",
+                                     "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
+                                     "o b\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 5 6 7\n");
+  EXPECT_EQ(report.vertices, 4u);
+  EXPECT_EQ(report.parts, 1u);
+  EXPECT_TRUE(report.closed());
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Polygons
+
+// A prism over an L: the first corner of each cap does not see the whole cap.
+const std::string kPrismCorners =
+    "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1\nv 0 0 1\n";
+const std::string kPrismSides = "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n";
+
+TEST_F(MeshImport, ConcavePolygons) {
+  const auto [mesh, report] =
+      import("l.obj", kPrismCorners + kPrismSides + "f 6 1 7 12\nf 7 8 9 10 11 12\nf 6 5 4 3 2 1\n");
+  EXPECT_EQ(report.faces, 4u + 4 + 12);
+  EXPECT_TRUE(report.closed());
+  EXPECT_DOUBLE_EQ(report.volume, 3);
+  EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);  // more where a triangle reaches outside the L
+}
+
+TEST_F(MeshImport, PolygonsWithCornersOnAStraightSideStayClosed) {
+  // The caps have two corners more along the side from 6 to 1, as do the two faces there.
+  const auto [mesh, report] =
+      import("l.obj", kPrismCorners + "v 1 0 0\nv 1 0 1\nv 1.5 0 0\nv 1.5 0 1\n" + kPrismSides +
+                          "f 6 13 14 12\nf 13 15 16 14\nf 15 1 7 16\nf 7 8 9 10 11 12 14 16\nf 6 5 4 3 2 1 15 13\n");
+  EXPECT_EQ(report.vertices, 16u);
+  EXPECT_EQ(report.faces, 2u * 16 - 4);
+  EXPECT_TRUE(report.closed());
+  EXPECT_DOUBLE_EQ(report.volume, 3);
+  EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);
+}
+
+TEST_F(MeshImport, PointsAndLinesAreLeftOut) {
+  const auto [mesh, report] = import(
+      "t.obj", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nv 50 0 0\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nl 1 5\np 5\n");
+  EXPECT_EQ(report.faces, 4u);
+  EXPECT_EQ(report.vertices, 4u);
+  EXPECT_EQ(report.box.max(), Vector3(6, 8, 10));
+}
+
+TEST_F(MeshImport, PositionsPassThroughFloat) {
+  const TriangleMesh mesh =
+      import(
+          "t.obj",
+          "v 1000000.03 0 0\nv 1000002 0 0\nv 1000000.03 1 0\nv 1000000.03 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+          .mesh;
+  EXPECT_EQ(mesh.vertices[0].x(), double{1000000.03f});
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// What is refused
+
+TEST_F(MeshImport, FilesThatAreNoFiles) {
+  EXPECT_EQ(errorOf(directory_ / "mesh.obj"), (directory_ / "mesh.obj").string() + ": no such file; check the path");
+  fs::create_directory(directory_ / "folder.obj");
+  EXPECT_THAT(errorOf(directory_ / "folder.obj"), HasSubstr("folder.obj: a directory, not a file"));
+  ASSERT_EQ(::mkfifo((directory_ / "pipe.obj").c_str(), 0600), 0);
+  EXPECT_THAT(errorOf(directory_ / "pipe.obj"), HasSubstr("pipe.obj: not a regular file"));
+  EXPECT_THAT(errorOf("empty.obj", ""), HasSubstr("empty.obj: the file is empty"));
+  EXPECT_THAT(errorOf(fs::path()), HasSubstr("the mesh file's name is empty"));
+}
+
+TEST_F(MeshImport, UnreadableFile) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may read every file";
+  const fs::path file = write("secret.obj", "v 0 0 0\n");
+  fs::permissions(file, fs::perms::none);
+  EXPECT_THAT(errorOf(file), HasSubstr("secret.obj: cannot be read; check its permissions"));
+}
+
+TEST_F(MeshImport, UnknownFormatsNameTheKnownOnes) {
+  for (const std::string name : {"mesh.fbx", "mesh", "mesh.obj.gz", "mesh.hpsdf"})
+    EXPECT_THAT(
+        errorOf(name, "v 0 0 0\n"),
+        AllOf(HasSubstr("/" + name + ": "), HasSubstr("ends in one of .obj, .ply, .stl, .off, .3ds, .gltf, .glb")));
+}
+
+TEST_F(MeshImport, ContentThatIsNoMesh) {
+  for (const std::string extension : {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"})
+    for (const std::string& content :
+         {std::string("Dear diary,\nnothing happened.\n"), std::string(1, '\0'), std::string(1000, '\xff')}) {
+      const std::string name = "bad." + extension;
+      EXPECT_THAT(errorOf(name, content), HasSubstr("/" + name + ": "));
+    }
+}
+
+TEST_F(MeshImport, TruncatedFiles) {
+  Bytes stl{std::string(80, ' ')};
+  stl.add(std::uint32_t{1000}).add(0.0f);
+  EXPECT_THAT(errorOf("cut.stl", stl.data), HasSubstr("/cut.stl: cannot be read as a mesh"));
+  EXPECT_THAT(errorOf("huge.ply",
+                      "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n"
+                      "property float y\nproperty float z\nend_header\n"),
+              HasSubstr("/huge.ply: its header promises more vertices or faces than the file has bytes"));
+  EXPECT_THAT(errorOf("huge.off", "OFF # by hand\n# counts\n4000000000 1 0\n0 0 0\n"),
+              HasSubstr("/huge.off: its header promises more"));
+  EXPECT_THAT(errorOf("huge.off", "COFF 1 4000000000 0\n0 0 0\n"), HasSubstr("/huge.off: its header promises more"));
+  EXPECT_THAT(errorOf("few.off", "OFF\n4 4 0\n0 0 0\n"), HasSubstr("/few.off: "));
+  EXPECT_THAT(errorOf("alone.gltf", gltfScene(R"({"mesh":0})", "0", "missing.bin")), HasSubstr("/alone.gltf: "));
+}
+
+TEST_F(MeshImport, NoFaces) {
+  EXPECT_THAT(errorOf("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), HasSubstr("/points.obj: "));
+  EXPECT_THAT(errorOf("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), HasSubstr("/lines.obj: no faces"));
+  write("t.bin", gltfBuffer().data);
+  EXPECT_THAT(errorOf("points.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin", 0)), HasSubstr("/points.gltf: no faces"));
+  EXPECT_THAT(errorOf("hidden.gltf", gltfScene(R"({"name":"nothing"})", "0", "t.bin")),
+              HasSubstr("/hidden.gltf: no faces"));
+  EXPECT_THAT(errorOf("flat.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\nf 1 1 2\n"),
+              HasSubstr("/flat.obj: no face with an area (2 faces are degenerate)"));
+}
+
+TEST_F(MeshImport, FlattenedByItsNode) {
+  write("t.bin", gltfBuffer().data);
+  EXPECT_THAT(errorOf("t.gltf", gltfScene(R"({"mesh":0,"scale":[1,0,0]})", "0", "t.bin")),
+              HasSubstr("/t.gltf: no face with an area (4 faces are degenerate)"));
+}
+
+TEST_F(MeshImport, IndicesOutOfRangeWhereTheyShow) {
+  EXPECT_THAT(errorOf("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), HasSubstr("/far.obj: "));
+}
+
+// What assimp 5.2 makes of such indices elsewhere, where nothing can be seen of it any more.
+TEST_F(MeshImport, IndicesOutOfRangeThatAssimpMends) {
+  Bytes buffer = gltfBuffer();
+  buffer.data[buffer.data.size() - 2] = 9;
+  write("t.bin", buffer.data);
+  EXPECT_EQ(import("far.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")).report.boundaryEdges, 3u);  // leaves it out
+  EXPECT_EQ(import("far.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 77\n").report.faces, 1u);
+}
+
+TEST_F(MeshImport, NonFiniteCoordinates) {
+  for (const std::string bad : {"nan", "inf", "-inf"}) {
+    EXPECT_THAT(errorOf("bad.obj", "v 0 0 0\nv 1 0 " + bad + "\nv 0 1 0\nf 1 2 3\n"),
+                HasSubstr("/bad.obj: vertex 2 has a coordinate that is not a finite number"));
+    EXPECT_THAT(
+        errorOf("bad.ply",
+                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 " +
+                    bad + "\n0 1 0\n3 0 1 2\n"),
+        HasSubstr("/bad.ply: vertex 2 has a coordinate that is not a finite number"));
+  }
+}
+
+TEST_F(MeshImport, IsSilent) {
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  errorOf("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\nfoo\n");
+  errorOf("bad.gltf", "{");
+  import("odd.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 77\n");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+
+TEST_F(MeshImport, LoadMeshTakesFilesAndShapes) {
+  const fs::path file = write("t.obj", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  EXPECT_EQ(loadMesh(file.string()).triangles.size(), 4u);
+  EXPECT_EQ(loadMesh("builtin:box,width=3").name, "builtin:box,width=3");
+  EXPECT_THROW(loadMesh("builtin:bax,width=3"), Error);
+  EXPECT_THROW(loadMesh("box"), Error);  // a file of that name is meant, and there is none
+  try {
+    loadMesh("analytic:torus,major=1");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("a mesh is expected here"), HasSubstr("builtin:torus,major=1")));
+  }
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Triangulation
+
+struct TriangulationArea {
+  double sum = 0;    ///< of areas signed by the polygon's orientation
+  double least = 0;  ///< smallest of them
+};
+
+TriangulationArea areaOf(const std::vector<Vector3>& polygon, const Vector3& normal) {
+  const auto triangles = triangulate(polygon);
+  EXPECT_EQ(triangles.size(), polygon.size() - 2);
+  TriangulationArea area{0, std::numeric_limits<double>::infinity()};
+  for (const auto& [a, b, c] : triangles) {
+    const double one = (polygon[b] - polygon[a]).cross(polygon[c] - polygon[a]).dot(normal) / 2;
+    area.sum += one;
+    area.least = std::min(area.least, one);
+  }
+  return area;
+}
+
+TEST(Triangulate, ConcavePolygonsInAnyPlane) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = 4 + trial % 40;
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(uniform(random), uniform(random) - 0.5, uniform(random) - 0.5, uniform(random) - 0.5)
+            .normalized();
+    const Vector3 offset = 10 * Vector3(uniform(random), uniform(random), uniform(random));
+    std::vector<Vector3> polygon;
+    double expected = 0;
+    std::vector<double> radii;
+    for (int i = 0; i < n; ++i) radii.push_back(0.2 + uniform(random));
+    const double step = 2 * std::numbers::pi / n;
+    for (int i = 0; i < n; ++i) {
+      const Vector3 flat = radii[i] * Vector3(std::cos(step * i), std::sin(step * i), 0);
+      polygon.push_back((turn * flat + offset).cast<float>().cast<double>());
+      expected += radii[i] * radii[(i + 1) % n] * std::sin(step) / 2;
+    }
+    const auto area = areaOf(polygon, turn * Vector3::UnitZ());
+    EXPECT_NEAR(area.sum, expected, 1e-5) << n;
+    EXPECT_GT(area.least, 0) << n;
+  }
+}
+
+TEST(Triangulate, CornersOnStraightSidesGetTrianglesWithAnArea) {
+  // A square with nine corners more on each side, in thirds of a unit: not straight once rounded to float.
+  std::vector<Vector3> polygon;
+  const Vector3 corners[4] = {{0, 0, 0}, {1, 0.3, 0}, {0.7, 1.3, 0}, {-0.3, 1, 0}};
+  for (int side = 0; side < 4; ++side)
+    for (int i = 0; i < 10; ++i)
+      polygon.push_back(
+          (corners[side] + (corners[(side + 1) % 4] - corners[side]) * i / 10).cast<float>().cast<double>());
+  const auto area = areaOf(polygon, Vector3::UnitZ());
+  EXPECT_NEAR(area.sum, 1.09, 1e-6);
+  EXPECT_GT(area.least, 1e-3);
+}
+
+TEST(Triangulate, ACombIsNotFilled) {
+  std::vector<Vector3> polygon;
+  for (int tooth = 0; tooth < 20; ++tooth)
+    for (const double y : {5.0, 1.0}) {
+      polygon.emplace_back(-2 * tooth - (y == 5 ? 0 : 1), y, 0);
+      polygon.emplace_back(-2 * tooth - (y == 5 ? 1 : 2), y, 0);
+    }
+  polygon.emplace_back(-40, 0, 0);
+  polygon.emplace_back(0, 0, 0);
+  const auto area = areaOf(polygon, Vector3::UnitZ());
+  EXPECT_NEAR(area.sum, 40 + 20 * 4, 1e-12);
+  EXPECT_GT(area.least, 0);
+}
+
+TEST(Triangulate, APolygonWithASlitToItsHole) {
+  const std::vector<Vector3> polygon = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0},
+                                        {1, 1, 0}, {1, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}};
+  const auto area = areaOf(polygon, Vector3::UnitZ());
+  EXPECT_DOUBLE_EQ(area.sum, 12);
+  EXPECT_GE(area.least, 0);
+}
+
+TEST(Triangulate, HopelessPolygonsStillGetTheirTriangles) {
+  areaOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {1.5, 0, 0}}, Vector3::UnitZ());
+  areaOf(std::vector<Vector3>(6, Vector3::Zero()), Vector3::UnitZ());
+  areaOf({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}, {1, 3, 0}}, Vector3::UnitZ());
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Real meshes
+
+/// A mesh of the test folder, with what is known of it independently: counts after welding, before faces are dropped.
+struct KnownMesh {
+  std::string file;
+  std::size_t vertices, faces;
+  bool closed;
+  std::size_t parts, boundaryEdges, nonManifoldEdges, degenerateFaces, flippedFaces, duplicateFaces;
+  bool turned;
+
+  friend void PrintTo(const KnownMesh& mesh, std::ostream* out) { *out << mesh.file; }
+};
+
+class KnownMeshes : public ::testing::TestWithParam<KnownMesh> {};
+
+TEST_P(KnownMeshes, HaveTheKnownCounts) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  const KnownMesh& known = GetParam();
+  const MeshReport report = importMesh(support::testMesh(known.file)).report;
+  EXPECT_EQ(report.vertices, known.vertices);
+  EXPECT_EQ(report.faces + report.degenerateFaces + report.duplicateFaces, known.faces);
+  EXPECT_EQ(report.closed(), known.closed);
+  EXPECT_EQ(report.parts, known.parts);
+  EXPECT_EQ(report.boundaryEdges, known.boundaryEdges);
+  EXPECT_EQ(report.nonManifoldEdges, known.nonManifoldEdges);
+  EXPECT_EQ(report.degenerateFaces, known.degenerateFaces);
+  EXPECT_EQ(report.flippedFaces, known.flippedFaces);
+  EXPECT_EQ(report.duplicateFaces, known.duplicateFaces);
+  EXPECT_EQ(report.turned, known.turned);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Closed, KnownMeshes,
+    ::testing::Values(KnownMesh{"paper/bunny_69k.obj", 34817, 69630, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"paper/dragon_80k.obj", 39994, 79988, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"paper/armadillo_100k.obj", 49990, 99976, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"paper/finger_skeletonhand_part.ply", 2046, 4088, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"cad/fandisk.obj", 6475, 12946, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"cad/rocker-arm.obj", 10044, 20088, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"cad/cube_12.obj", 8, 12, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"cad/wingnut.obj", 3047, 6090, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"cad/1002_tray_bottom.STL", 2216, 4520, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"large/bunny_1114k_loop2.ply", 557042, 1114080, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/hand_flesh_76k_inverted.obj", 38218, 76438, true, 1, 0, 0, 2, 0, 0, true},
+                      KnownMesh{"broken/self_intersectA.obj", 8582, 17160, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/Generic_Twin_7081_left.obj", 9874, 19704, true, 12, 0, 0, 0, 0, 0, false}));
+
+// Where faces are dropped, edges and vertices that only they used go or open. The teapot has three parts when those
+// that touch in a corner count as one.
+INSTANTIATE_TEST_SUITE_P(
+    Broken, KnownMeshes,
+    ::testing::Values(KnownMesh{"broken/bun_zipper.ply", 34834, 69451, false, 1, 223, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/teapot.obj", 3241, 6320, false, 4, 160, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/suzanne.obj", 505, 968, false, 3, 42, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/mp_bed.obj", 7113, 14042, false, 11, 187, 10, 2, 41, 0, false},
+                      KnownMesh{"broken/chair_model.obj", 3158, 12756, false, 3, 10, 51, 0, 0, 6382, true},
+                      KnownMesh{"broken/joined_tetrahedra.obj", 5, 8, false, 1, 0, 3, 0, 0, 1, false},
+                      KnownMesh{"broken/boxNotManifold.obj", 9, 12, false, 1, 4, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/featuretype.STL", 2010, 3476, false, 1, 576, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/wallhole.obj", 35, 66, true, 1, 0, 0, 0, 0, 0, false},
+                      KnownMesh{"broken/assimp_spider.obj", 722, 1368, false, 18, 72, 0, 56, 0, 0, false},
+                      KnownMesh{"broken/soup.stl", 300, 100, false, 100, 300, 0, 0, 0, 0, true}));
+
+TEST_F(MeshImport, RefusedMeshes) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  EXPECT_THAT(errorOf(support::testMesh("broken/assimp_pond.0.ply")), HasSubstr("not a finite number"));
+  EXPECT_THAT(errorOf(support::testMesh("broken/assimp_invalid.off")), HasSubstr("no face with an area"));
+}
+
+}  // namespace
+}  // namespace hpsdf
