@@ -87,7 +87,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   if (format == SliceFormat::png) {
     savePng(render::draw(renderer, field, picture), file);
   } else {
-    const render::SliceView view = render::sliceView(field, picture);
+    const render::SliceView view = render::sliceView(field, picture, picture.width, picture.height);
     const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
     OutputFile out(file);
     if (format == SliceFormat::pfm)

@@ -99,6 +99,7 @@ Json meshJson(const std::string& name, const MeshReport& report) {
           {"welded_vertices", report.weldedVertices},
           {"unreferenced_vertices", report.unreferencedVertices},
           {"degenerate_faces", report.degenerateFaces},
+          {"flipped_faces", report.flippedFaces},
           {"duplicate_faces", report.duplicateFaces},
           {"turned", report.turned},
           {"volume", report.volume},
@@ -113,10 +114,13 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   text += row("surface", report.closed() ? "closed" : "not closed: " + faultyEdges(report));
   text += row("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
   text += row("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
-  if (report.weldedVertices > 0) text += row("welded", grouped(report.weldedVertices) + " vertices of equal position");
+  if (report.weldedVertices > 0)
+    text += row("welded", grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
     text += row("unused", grouped(report.unreferencedVertices) + " vertices dropped");
   if (report.degenerateFaces > 0) text += row("degenerate", grouped(report.degenerateFaces) + " faces dropped");
+  if (report.flippedFaces > 0)
+    text += row("flipped", grouped(report.flippedFaces) + " edges of faces without area that hold their neighbours");
   if (report.duplicateFaces > 0) text += row("duplicate", grouped(report.duplicateFaces) + " faces dropped");
   if (report.turned) text += row("turned", "the whole mesh: its faces looked inward");
   return text;
