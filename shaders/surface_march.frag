@@ -10,16 +10,18 @@ layout(location = 1) out vec4 floats;
 
 const float kNudge = 1e-6;  // in domain diagonals: beyond a face; also the shortest step; as in trace.cpp
 
+const float kPastFace = 4e-7;  // of the grid; as in trace.cpp
+
 const float kInfinity = 1e30;
 
 bool excludes(Node node) { return node.lo > offset || node.hi < offset; }
 
-// World length from the point to where the ray leaves the node's box. `inverse`: of the absolute direction, infinite
-// for an axis along which the ray does not move.
+// World length from the point to where the ray has left the node's box, past a face by a little: see trace.cpp.
+// `inverse`: of the absolute direction, infinite for an axis along which the ray does not move.
 float lengthToExit(CellPoint at, vec3 direction, vec3 inverse) {
   vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(direction, vec3(0.0)));
-  vec3 exits = mix(ahead * inverse, vec3(kInfinity), equal(direction, vec3(0.0)));
-  return min(exits.x, min(exits.y, exits.z)) / at.scale;
+  vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * inverse, vec3(kInfinity), equal(direction, vec3(0.0)));
+  return min(exits.x, min(exits.y, exits.z));
 }
 
 // Slope of the leaf's linear part along a direction in local coordinates.

@@ -7,8 +7,9 @@
 namespace hpsdf::render {
 namespace {
 
-// All lengths in domain diagonals, the same as in shaders/surface.frag.
+// All lengths in domain diagonals, the same as in shaders/surface_march.frag.
 constexpr double kNudge = 1e-6;      // beyond a face; also the shortest step
+constexpr double kPastFace = 4e-7;   // of the grid: how far past a face of a node, at most, its neighbour is entered
 constexpr double kConverged = 1e-8;  // change of the root between two steps of its refinement
 constexpr int kMostSteps = 1 << 16;
 constexpr int kMostRefinements = 24;
@@ -67,13 +68,14 @@ double evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length from the point to where the ray leaves the node's box.
-double lengthToExit(const CellPoint& at, const Vector3& direction) {
+/// World length from the point to where the ray has left the node's box: past a face by a little, because a ray that
+/// runs along a face, on it up to rounding, would otherwise leave it again at every step.
+double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
     if (direction[axis] == 0) continue;
     const double ahead = direction[axis] > 0 ? 1 - at.fraction[axis] : at.fraction[axis];
-    exit = std::min(exit, ahead / std::abs(std::ldexp(direction[axis], at.depth)));
+    exit = std::min(exit, (std::ldexp(ahead, -at.depth) + kPastFace * grid[axis]) / std::abs(direction[axis]));
   }
   return exit;
 }
@@ -193,7 +195,7 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
   for (int step = 0; step < kMostSteps && t <= ray.length; ++step) {
     const CellPoint at = relevantNodeAt(ray.origin + t * ray.direction, offset);
     const NodeBounds& bounds = bounds_[at.node];
-    const double toExit = lengthToExit(at, ray.direction);
+    const double toExit = lengthToExit(at, ray.direction, space_.grid);
     if (excludes(at.node, offset)) {
       const double sideHere = bounds.lo > offset ? 1 : -1;
       if (side == 0) side = sideHere;
