@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace hpsdf::render {
@@ -66,6 +67,15 @@ std::vector<NodeBounds> nodeBounds(const FieldData& field) {
     }
   }
   return bounds;
+}
+
+std::uint32_t packOutwards(float lo, float hi) {
+  // dropping a float's lower half rounds towards zero; one more in the upper half is the next such number away from it
+  const auto half = [](float x, bool awayFromZero) {
+    const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
+    return (bits >> 16) + (awayFromZero && (bits & 0xffff) != 0 ? 1 : 0);
+  };
+  return half(hi, hi > 0) << 16 | half(lo, lo < 0);
 }
 
 }  // namespace hpsdf::render

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "hpsdf/field.h"
@@ -20,5 +21,8 @@ struct NodeBounds {
 
 /// One for every node. A little wider than the coefficients say, by what single precision may add.
 std::vector<NodeBounds> nodeBounds(const FieldData& field);
+
+/// The range [lo, hi] in 32 bits: the upper halves of the two floats, hi's in the high bits, lo rounded down and hi up.
+std::uint32_t packOutwards(float lo, float hi);
 
 }  // namespace hpsdf::render

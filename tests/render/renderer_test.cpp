@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <limits>
 #include <map>
 #include <random>
@@ -244,6 +245,55 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
   }
 }
 
+/// One cell of degree 2 in [−1, 1]³: the linear terms are 0, `c` in lexicographic order.
+Field quadratic(const std::vector<double>& c) {
+  return Field({.domain = Box(-Vector3::Ones(), Vector3::Ones()),
+                .nodes = {node::leaf(2, 0)},
+                .coefficients = c,
+                .metadata = {}});
+}
+
+struct Grazing {
+  Field field;
+  Vector3 direction;
+};
+
+/// Fields below zero between two planes close to each other in the middle, and directions across the planes: from
+/// either side a ray comes down from far above, and the longest step would carry it to where it has risen again.
+std::vector<Grazing> grazingFields(double dip) {
+  // f = 3/2 u² − dip, and the same in v and in w
+  std::vector<Grazing> result;
+  const int places[] = {9, 5, 2};  // of c_200, c_020, c_002
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> c(10, 0.0);
+    c[0] = 0.5 - dip;
+    c[places[axis]] = 1;
+    result.push_back({quadratic(c), Vector3::Unit(axis)});
+  }
+  // f = −u·v − dip: u = −v = s gives s² − dip
+  std::vector<double> c(10, 0.0);
+  c[0] = -dip;
+  c[8] = -1;
+  result.push_back({quadratic(c), Vector3(1, -1, 0).normalized()});
+  return result;
+}
+
+void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(const Field&)>& make) {
+  for (const double dip : {1e-5, 1e-3, 0.02, 0.05, 0.1})
+    for (const Grazing& grazing : grazingFields(dip)) {
+      const Pinhole camera = lookingAt(-3 * grazing.direction, grazing.direction, 0.01);
+      const ViewBuffers buffers = make(grazing.field)->surface({camera, 0}, 16, 12);
+      EXPECT_EQ(hits(buffers), buffers.cell.size()) << "a dip of " << dip << " is passed";
+      for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+        const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, 16, 12, int(i % 16), int(i / 16));
+        EXPECT_NEAR(grazing.field.value(hit), 0, 1e-5);
+        EXPECT_LT(hit.dot(grazing.direction), 0) << "the first crossing is passed, dip " << dip;
+      }
+    }
+}
+
+TEST(CpuTrace, SeesASurfaceThatIsGrazedTwiceWithinAStep) { expectGrazedSurfaceIsSeen(makeCpuRenderer); }
+
 /// Never past the true surface by more than the field's own error there.
 TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
   for (const std::string& name : kShapes) {
@@ -456,6 +506,10 @@ TEST_F(Gl, SurfacesSeenAlongAnAxis) {
         EXPECT_EQ(gaps(actual), 0u) << where << ", width " << width;
       }
   }
+}
+
+TEST_F(Gl, SeesASurfaceThatIsGrazedTwiceWithinAStep) {
+  expectGrazedSurfaceIsSeen([](const Field& field) { return makeGlRenderer(field, GlChoice::software); });
 }
 
 TEST_F(Gl, SurfacesOfTheRudestFields) {

@@ -1,6 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. shaders/field.glsl and
-// shaders/surface.frag hold the same steps under the same names in single precision.
+// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. shaders/field.glsl,
+// shaders/surface.glsl and the two passes surface_march.frag and surface_hit.frag hold the same steps under the same
+// names in single precision. Lookup and evaluation repeat what core has, on purpose: this is the oracle, tested against
+// the field's own queries, and must not share their faults.
 
 #include <optional>
 #include <vector>

@@ -21,16 +21,6 @@ void checkFits(std::size_t texels, std::size_t largest, const char* what) {
                 std::to_string(largest) + ": render with --cpu, or build a coarser field");
 }
 
-/// The upper halves of two floats, lo rounded down and hi up. Dropping a float's lower half rounds towards zero; one
-/// more in the upper half is the next such number away from zero.
-std::uint32_t packOutwards(float lo, float hi) {
-  const auto half = [](float x, bool awayFromZero) {
-    const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
-    return (bits >> 16) + (awayFromZero && (bits & 0xffff) != 0 ? 1 : 0);
-  };
-  return half(hi, hi > 0) << 16 | half(lo, lo < 0);
-}
-
 std::vector<NodeTexel> nodeTexels(const FieldData& field) {
   const std::vector<NodeBounds> bounds = nodeBounds(field);
   std::vector<NodeTexel> texels(field.nodes.size());
