@@ -122,6 +122,18 @@ std::string formatScientific(double value, int digits) {
   return mantissa + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
 }
 
+// Rounded to this many digits, or to a whole number where that has more; no zeros behind the last digit that counts.
+std::string formatPlain(double value, int digits) {
+  const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", std::max(0, digits - beforePoint), value);
+  std::string shown = text;
+  if (shown.find('.') == std::string::npos) return shown;
+  shown.erase(shown.find_last_not_of('0') + 1);
+  if (shown.back() == '.') shown.pop_back();
+  return shown;
+}
+
 int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
 
 // Values at multiples of a step, all with the same number of decimals, or with an exponent where that is shorter.
@@ -132,6 +144,21 @@ std::string formatTick(double value, double step) {
   char text[64];
   std::snprintf(text, sizeof text, "%.*f", decimalsOf(step), std::abs(value));
   return sign + text;
+}
+
+// From (x, y) to the right or upwards, with a head.
+void addArrow(Furniture& furniture, double x, double y, double length, double thin, bool upwards) {
+  const auto box = [&](double from, double to, double half) {
+    const double middle = 0.5 * thin;
+    if (upwards)
+      furniture.boxes.push_back({x + middle - half, y - to, x + middle + half, y - from, kSoftInk});
+    else
+      furniture.boxes.push_back({x + from, y + middle - half, x + to, y + middle + half, kSoftInk});
+  };
+  const double head = 4.5 * thin;
+  box(0, length - head, 0.5 * thin);
+  for (double back = 0; back < head; back += 0.5 * thin)
+    box(length - back - 0.5 * thin, length - back, 0.45 * (back + 0.5 * thin));
 }
 
 void blendBox(Image& image, const BoxItem& box) {
@@ -154,7 +181,7 @@ Frame frame(int width, int height) {
   f.height = height;
   f.textSize = textSizeFor(width, height);
   f.roomy = std::min<double>(height, width * 9.0 / 16) >= 440;
-  const bool hasPanel = width >= 240 && height >= 140;
+  const bool hasPanel = width >= 200 && height >= 140;
   const bool hasCaption = width >= 160 && height >= 140;
   const int panel = hasPanel ? static_cast<int>(std::lround((f.roomy ? 13.5 : 8.4) * f.textSize)) : 0;
   const int caption = hasCaption ? static_cast<int>(std::lround(2.4 * f.textSize)) : 0;
@@ -224,6 +251,33 @@ void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScal
   }
 }
 
+void addAxes(Furniture& furniture, const Frame& frame, const PixelRect& section, char right, char up) {
+  const double em = frame.textSize, size = std::max(kSmallestText, 0.85 * em), thin = std::max(1.0, em / 15);
+  const double length = std::round(1.8 * em), gap = std::round(0.5 * em);
+  // from the tips of the arrows the letters reach as far again as they are large
+  const double reach = length + std::round(1.1 * size);
+  if (section.width() < 3 * reach || section.height() < 3 * reach) return;
+
+  double x = section.x0, y = section.y1;  // where the arrows start
+  if (section.x0 - frame.view.x0 >= reach + 2 * gap) {
+    x = section.x0 - gap - reach;
+    y = std::min<double>(section.y1, frame.view.y1 - gap);
+  } else if (frame.view.y1 - section.y1 >= reach + 2 * gap) {
+    y = section.y1 + gap + reach;
+  } else {
+    x += gap;
+    y -= gap;
+    furniture.boxes.push_back(
+        {x - 0.5 * gap, y - reach - 0.5 * gap, x + reach + 0.5 * gap, y + 0.5 * gap, paperColor()});
+  }
+  addArrow(furniture, x, y - thin, length, thin, false);
+  addArrow(furniture, x, y, length, thin, true);
+  const std::string across(1, right), upward(1, up);
+  // small letters, about half an em high: each in line with its arrow
+  addText(furniture, across, size, x + length + 0.3 * size, y - 0.5 * thin + 0.27 * size, kSoftInk);
+  addText(furniture, upward, size, x + 0.5 * (thin - advanceOf(upward, size)), y - length - 0.45 * size, kSoftInk);
+}
+
 void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
               std::span<const std::pair<std::string, std::string>> facts) {
   if (frame.panel.empty()) return;
@@ -270,10 +324,8 @@ std::string formatNumber(double value, int digits) {
   if (value == 0) return "0";
   const double size = std::abs(value);
   const std::string sign = value < 0 ? "−" : "";
-  if (size < 1e-3 || size >= 1e6) return sign + formatScientific(size, digits);
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*g", std::max(digits, size < 1e5 ? 0 : 6), size);
-  return sign + text;
+  if (size < 1e-3 || size >= 999999.5) return sign + formatScientific(size, digits);
+  return sign + formatPlain(size, digits);
 }
 
 std::string formatCount(std::size_t count) {

@@ -51,6 +51,11 @@ void addLevelLegend(Furniture& furniture, const Frame& frame, std::span<const st
 /// A vertical colour bar with the iso-lines of the picture and their values.
 void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScale& scale);
 
+/// Which axes lie to the right and upwards: a pair of arrows left of the lower left corner of the slice's section with
+/// the domain, or below it, where the view is free there, else on a plate in that corner. Nothing where the section is
+/// too small for it.
+void addAxes(Furniture& furniture, const Frame& frame, const PixelRect& section, char right, char up);
+
 /// Names and values, as many as fit.
 void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
               std::span<const std::pair<std::string, std::string>> facts);
@@ -61,7 +66,7 @@ void addCaption(Furniture& furniture, const Frame& frame, const std::string& nam
 
 void paint(Image& image, const Furniture& furniture);
 
-/// "−0.25", "1.5e-7": a true minus sign, the exponent as one types it.
+/// "−0.25", "15200", "1.5e-7": a true minus sign; plain up to 6 digits before the point, the exponent as one types it.
 std::string formatNumber(double value, int digits = 4);
 /// "54,935".
 std::string formatCount(std::size_t count);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,14 +44,22 @@ Frame frameOf(const SurfacePicture& picture) {
 
 double lineWidthOf(const Frame& frame) { return std::max(0.7, frame.textSize / 15); }
 
-// A legend beside the section itself: a square domain leaves much of a wide view empty.
-void moveBeside(Frame& frame, const ViewBuffers& buffers, int samples) {
-  int end = 0;  // of the section, in samples
+// Where a slice shows the domain, in pixels.
+PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
+  PixelRect samplesHit = {buffers.width, buffers.height, 0, 0};
   for (int y = 0; y < buffers.height; ++y)
-    for (int x = buffers.width; x > end; --x)
-      if (buffers.hit(std::size_t(y) * buffers.width + x - 1)) end = x;
-  const int space = frame.panel.x0 - static_cast<int>(std::ceil(double(end) / samples + 0.5 * frame.textSize));
-  if (frame.panel.empty() || end == 0 || space <= 0) return;
+    for (int x = 0; x < buffers.width; ++x) {
+      if (!buffers.hit(std::size_t(y) * buffers.width + x)) continue;
+      samplesHit = {std::min(samplesHit.x0, x), std::min(samplesHit.y0, y), std::max(samplesHit.x1, x + 1), y + 1};
+    }
+  const auto up = [&](int sample) { return (sample + samples - 1) / samples; };
+  return {samplesHit.x0 / samples, samplesHit.y0 / samples, up(samplesHit.x1), up(samplesHit.y1)};
+}
+
+// A legend beside the section itself: a square domain leaves much of a wide view empty.
+void moveBeside(Frame& frame, const PixelRect& section) {
+  const int space = frame.panel.x0 - section.x1 - static_cast<int>(std::ceil(0.5 * frame.textSize));
+  if (frame.panel.empty() || section.empty() || space <= 0) return;
   frame.panel.x0 -= space;
   frame.panel.x1 -= space;
 }
@@ -62,6 +71,19 @@ void place(Image& picture, const Image& view) {
 
 std::string formatVector(const Vector3& v) {
   return "(" + formatNumber(v.x()) + ", " + formatNumber(v.y()) + ", " + formatNumber(v.z()) + ")";
+}
+
+// The axis that a direction runs along, if it is one.
+std::optional<char> axisAlong(const Vector3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (direction[axis] > 0 && direction[(axis + 1) % 3] == 0 && direction[(axis + 2) % 3] == 0) return "xyz"[axis];
+  return std::nullopt;
+}
+
+// None on an oblique plane: its directions have no names.
+void addAxesOf(Furniture& furniture, const Frame& frame, const SliceView& view, const PixelRect& section) {
+  const auto right = axisAlong(view.right), up = axisAlong(view.up);
+  if (right && up && !section.empty()) addAxes(furniture, frame, section, *right, *up);
 }
 
 std::string describePlane(const SlicePicture& picture) {
@@ -158,7 +180,8 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) 
   const SliceView view = sliceView(field, picture);
   const int samples = picture.samples;
   const ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
-  moveBeside(frame, buffers, samples);
+  const PixelRect section = sectionOf(buffers, samples);
+  moveBeside(frame, section);
   const double sampleSize = view.right.norm() / buffers.width;
   const Sampling sampling{samples, lineWidthOf(frame), sampleSize};
   const FieldStatistics figures = statistics(field);
@@ -178,6 +201,7 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) 
     place(image, colorLevelSlice(buffers, map, picture.color, sampling));
     details = {degree ? "degree" : "depth", describePlane(picture)};
   }
+  addAxesOf(furniture, frame, view, section);
   details.push_back(formatCount(figures.leaves) + " cells");
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
@@ -186,6 +210,10 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) 
 }
 
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture) {
+  return drawSurface(renderer, field, picture).image;
+}
+
+DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture) {
   const Frame frame = frameOf(picture);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset};
@@ -211,7 +239,28 @@ Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture
                                             formatCount(figures.leaves) + " cells", describeTarget(field)};
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
-  return image;
+  const bool seen = std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; });
+  return {std::move(image), seen};
+}
+
+bool meetsWalls(const Field& field, double offset) {
+  constexpr int kPoints = 40;  // along a wall's side
+  const Box& domain = field.domain();
+  bool below = false, above = false;
+  for (int wall = 0; wall < 6; ++wall) {
+    const int axis = wall / 2;
+    for (int i = 0; i < kPoints; ++i)
+      for (int j = 0; j < kPoints; ++j) {
+        Vector3 share;  // of the way from the domain's lower corner to its upper one
+        share[axis] = wall % 2;
+        share[(axis + 1) % 3] = (i + 0.5) / kPoints;
+        share[(axis + 2) % 3] = (j + 0.5) / kPoints;
+        const double value = field.value(domain.min() + share.cwiseProduct(domain.sizes()));
+        below |= value < offset;
+        above |= value > offset;
+      }
+  }
+  return below && above;
 }
 
 }  // namespace hpsdf::render

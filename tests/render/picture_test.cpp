@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <set>
+#include <tuple>
 
 #include "color_view.h"
 #include "hpsdf/error.h"
@@ -330,6 +332,8 @@ TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
       {"cells", "1,234,567"}, {"degrees", "2–30"}, {"coefficients", "1,123,456,789"}, {"RMS estimate", "3.05e-4"}};
   for (const auto& [width, height] : {std::pair{64, 64},
                                       {160, 140},
+                                      {200, 140},
+                                      {200, 1000},
                                       {240, 140},
                                       {240, 2000},
                                       {320, 240},
@@ -382,6 +386,205 @@ TEST(Layout, LegendAndCaptionAreThereAt320x240) {
   EXPECT_EQ(frame(64, 64).view, (PixelRect{0, 0, 64, 64}));
 }
 
+TEST(Layout, NarrowPicturesKeepALegend) {
+  EXPECT_FALSE(frame(200, 1000).panel.empty());
+  EXPECT_TRUE(frame(199, 1000).panel.empty());
+}
+
+constexpr Color kBlank = {250, 250, 248};
+
+Image painted(const Furniture& furniture, const Frame& f) {
+  Image image(f.width, f.height, kBlank);
+  paint(image, furniture);
+  return image;
+}
+
+std::optional<double> numberOf(std::string text) {
+  const std::string minus = "−";
+  if (text.starts_with(minus)) text = "-" + text.substr(minus.size());
+  std::size_t end = 0;
+  try {
+    const double number = std::stod(text, &end);
+    if (end == text.size()) return number;
+  } catch (const std::exception&) {
+  }
+  return std::nullopt;
+}
+
+double middleOf(const TextItem& item) { return item.baseline - capHeight(item.size) / 2; }
+
+TEST(Layout, EachLevelsNumberStandsAtItsColor) {
+  static const std::string titles[] = {"polynomial degree", "degree"};
+  // at 320 × 240, 31 levels leave no room for shares: the swatches touch
+  for (const auto& [width, height, count] :
+       {std::tuple(1280, 720, 5), {1280, 720, 31}, {320, 240, 5}, {320, 240, 31}, {200, 1000, 9}}) {
+    const Frame f = frame(width, height);
+    std::map<int, double> shares;
+    std::vector<int> levels;
+    for (int level = 0; level < count; ++level) shares[level] = 1.0 / count, levels.push_back(level);
+    const LevelMap map(levels);
+    Furniture furniture;
+    addLevelLegend(furniture, f, titles, shares, map);
+    const Image image = painted(furniture, f);
+    const int swatch = static_cast<int>(furniture.boxes.front().x0) + 1;
+    std::set<int> seen;
+    for (const TextItem& item : furniture.texts) {
+      const auto level = numberOf(item.text);
+      if (!level) continue;
+      EXPECT_EQ(image.at(swatch, int(middleOf(item))), encodeSrgb(map(int(*level)))) << item.text << " of " << count;
+      seen.insert(int(*level));
+    }
+    EXPECT_GE(seen.size(), std::min<std::size_t>(count, 8)) << width << "x" << height;
+    EXPECT_LE(seen.size(), std::size_t(count));
+  }
+}
+
+TEST(Layout, EachDistancesNumberStandsAtItsColor) {
+  for (const auto& [width, height] : {std::pair{1280, 720}, {320, 240}, {200, 1000}})
+    for (const DistanceScale& scale : {distanceScale(-0.4, 1.1), distanceScale(-3e4, 1e3), distanceScale(1e-6, 2e-5)}) {
+      const Frame f = frame(width, height);
+      Furniture furniture;
+      addDistanceBar(furniture, f, scale);
+      const Image image = painted(furniture, f);
+      std::vector<std::pair<double, double>> labels;  // value and row
+      for (const TextItem& item : furniture.texts)
+        if (const auto value = numberOf(item.text)) labels.emplace_back(*value, middleOf(item));
+      ASSERT_GE(labels.size(), 3U);
+      std::ranges::sort(labels);
+      const auto [lowest, bottom] = labels.front();
+      const auto [highest, top] = labels.back();
+      EXPECT_GT(bottom, top) << "outside is above";
+      const int bar = static_cast<int>(furniture.boxes.front().x0) + 2;
+      for (const auto& [value, row] : labels)
+        for (int beside : {-3, 3}) {  // the line itself covers the label's own row
+          const int y = static_cast<int>(std::floor(row)) + beside;
+          const double here = value - (y + 0.5 - row) * (highest - lowest) / (bottom - top);
+          if (std::abs(here) >= scale.range) continue;
+          const LinearColor expected = divergingColor(here / scale.range);
+          EXPECT_LT(colorDifference(toOklab(decodeSrgb(image.at(bar, y))), toOklab(expected)), 0.03)
+              << value << " at " << width << "x" << height;
+        }
+    }
+}
+
+TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
+  for (const auto& [width, height] : {std::pair{480, 270}, {640, 360}, {1280, 720}, {4096, 2160}, {300, 1000}}) {
+    const Frame f = frame(width, height);
+    const int w = f.view.width(), h = f.view.height(), side = static_cast<int>(0.94 * std::min(w, h));
+    const PixelRect middle = {(w - side) / 2, (h - side) / 2, (w + side) / 2, (h + side) / 2};
+    const PixelRect flat = {w / 40, h / 4, w - w / 40, 3 * h / 4}, full = {w / 40, h / 40, w - w / 40, h - h / 40};
+    for (const PixelRect& section : {middle, flat, full, f.view}) {
+      Furniture furniture;
+      addAxes(furniture, f, section, 'x', 'z');
+      ASSERT_EQ(furniture.texts.size(), 2U) << width << "x" << height;
+      const bool plate = furniture.boxes.front().color == kBlank;
+      EXPECT_EQ(plate, section == full || section == f.view) << width << "x" << height;
+      const BoxItem& ground = furniture.boxes.front();
+      for (const TextItem& item : furniture.texts) {
+        const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
+        EXPECT_TRUE(f.view.contains(ink));
+        EXPECT_GE(item.size, 7.9);
+        EXPECT_GT(lightnessOf(kBlank) - lightnessOf(item.color), 0.4) << "hard to read";
+        if (plate)
+          EXPECT_TRUE(ink.x0 >= ground.x0 && ink.x1 <= ground.x1 && ink.y0 >= ground.y0 && ink.y1 <= ground.y1);
+        else
+          EXPECT_FALSE(section.overlaps(ink)) << "covers the slice";
+      }
+      for (const BoxItem& box : furniture.boxes) {
+        EXPECT_TRUE(box.x0 >= 0 && box.y0 >= 0 && box.x1 <= w && box.y1 <= h);
+        const PixelRect pixels = {int(box.x0), int(box.y0), int(std::ceil(box.x1)), int(std::ceil(box.y1))};
+        EXPECT_TRUE(plate || !section.overlaps(pixels)) << "covers the slice";
+      }
+      const TextItem &right = furniture.texts[0], &up = furniture.texts[1];
+      EXPECT_EQ(right.text, "x");
+      EXPECT_EQ(up.text, "z");
+      EXPECT_GT(right.x, up.x + up.size);
+      EXPECT_GT(right.baseline, up.baseline + up.size);
+    }
+  }
+  Furniture none;
+  addAxes(none, frame(64, 64), {2, 2, 62, 62}, 'x', 'y');
+  EXPECT_TRUE(none.boxes.empty() && none.texts.empty());
+}
+
+TEST(Picture, SlicesAlongAnAxisNameTheAxesAcross) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  const char* const names[] = {"yz", "xz", "xy"};
+  const auto leftOf = [](const Image& image, int column) {
+    std::vector<Color> pixels;
+    for (int y = 0; y < viewSize(640, 360).height; ++y)
+      for (int x = 0; x < column; ++x) pixels.push_back(image.at(x, y));
+    return pixels;
+  };
+  const Frame f = frame(640, 360);
+  const auto expectAxes = [&](const SlicePicture& picture, const char* axes) {
+    const ViewBuffers buffers =
+        renderer.slice(sliceView(field, picture), viewSize(640, 360).width, viewSize(640, 360).height);
+    PixelRect section = {buffers.width, buffers.height, 0, 0};
+    for (int y = 0; y < buffers.height; ++y)
+      for (int x = 0; x < buffers.width; ++x)
+        if (buffers.hit(std::size_t(y) * buffers.width + x))
+          section = {std::min(section.x0, x), std::min(section.y0, y), std::max(section.x1, x + 1), y + 1};
+    Furniture furniture;
+    if (axes != nullptr) addAxes(furniture, f, section, axes[0], axes[1]);
+    EXPECT_EQ(leftOf(draw(renderer, field, picture), section.x0), leftOf(painted(furniture, f), section.x0))
+        << (axes == nullptr ? "none" : axes);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    SlicePicture picture = slice(SliceColor::degree);
+    picture.plane = AxisPlane{axis, 0.5};
+    expectAxes(picture, names[axis]);
+    picture.color = SliceColor::distance;
+    picture.plane = FreePlane{Vector3(0.1, 0.2, 0.3), Vector3::Unit(axis)};
+    expectAxes(picture, names[axis]);
+  }
+  SlicePicture oblique = slice(SliceColor::degree);
+  oblique.plane = FreePlane{Vector3::Zero(), Vector3(1, 1, 1)};
+  expectAxes(oblique, nullptr);
+}
+
+// f = |x − center|² − radius² in [−1, 1]³.
+Field ball(double radius, const Vector3& center = Vector3::Zero()) {
+  std::vector<double> c(10, 0.0);
+  c[0] = 1 + center.squaredNorm() - radius * radius;
+  c[1] = -2 * center.z();
+  c[3] = -2 * center.y();
+  c[6] = -2 * center.x();
+  c[2] = c[5] = c[9] = 2.0 / 3;
+  return Field({.domain = Box(-Vector3::Ones(), Vector3::Ones()),
+                .nodes = {node::leaf(2, 0)},
+                .coefficients = c,
+                .metadata = {}});
+}
+
+TEST(Surface, SaysWhetherItIsSeen) {
+  const Field field = ball(0.8);
+  const auto renderer = makeCpuRenderer(field);
+  SurfacePicture picture;
+  picture.width = picture.height = 64;
+  const DrawnSurface drawn = drawSurface(*renderer, field, picture);
+  EXPECT_TRUE(drawn.seen);
+  EXPECT_EQ(drawn.image.pixels, draw(*renderer, field, picture).pixels);
+  picture.offset = 5;
+  EXPECT_FALSE(drawSurface(*renderer, field, picture).seen);
+  picture.offset = -0.7;
+  EXPECT_FALSE(drawSurface(*renderer, field, picture).seen);
+}
+
+TEST(Surface, SaysWhetherTheWallsCutIt) {
+  EXPECT_FALSE(meetsWalls(ball(0.8), 0));
+  EXPECT_FALSE(meetsWalls(ball(0.8), 0.35));
+  EXPECT_TRUE(meetsWalls(ball(0.8), 0.37)) << "a cap of a tenth of the wall";
+  EXPECT_TRUE(meetsWalls(ball(0.8), 2));
+  EXPECT_FALSE(meetsWalls(ball(0.8), 2.4)) << "no point of the domain is as far";
+  EXPECT_TRUE(meetsWalls(planeField(), 0));
+  EXPECT_FALSE(meetsWalls(planeField(), 0.9));
+  EXPECT_FALSE(meetsWalls(planeField(), -1.2));
+  for (int axis = 0; axis < 3; ++axis)
+    for (double toOneWall : {-0.3, 0.3}) EXPECT_TRUE(meetsWalls(ball(0.8, toOneWall * Vector3::Unit(axis)), 0));
+}
+
 TEST(Layout, CaptionsKeepWhatFits) {
   const std::vector<std::string> details = {"distance", std::string(200, 'x'), "7 cells"};
   Furniture furniture;
@@ -398,7 +601,15 @@ TEST(Layout, NumbersAreWrittenAsReadersExpect) {
   EXPECT_EQ(formatNumber(1e-6, 3), "1e-6");
   EXPECT_EQ(formatNumber(-1.5e-7), "−1.5e-7");
   EXPECT_EQ(formatNumber(355), "355");
+  EXPECT_EQ(formatNumber(15200), "15200");
+  EXPECT_EQ(formatNumber(-15234.6), "−15235");
   EXPECT_EQ(formatNumber(123456), "123456");
+  EXPECT_EQ(formatNumber(9999.7), "10000");
+  EXPECT_EQ(formatNumber(999999.4), "999999");
+  EXPECT_EQ(formatNumber(999999.7), "1e6");
+  EXPECT_EQ(formatNumber(1234567), "1.235e6");
+  EXPECT_EQ(formatNumber(0.00123449), "0.001234");
+  EXPECT_EQ(formatNumber(100.04, 4), "100");
   EXPECT_EQ(formatNumber(2e9), "2e9");
   EXPECT_EQ(formatCount(7), "7");
   EXPECT_EQ(formatCount(54935), "54,935");

@@ -48,6 +48,17 @@ struct SurfacePicture {
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture);
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture);
 
+/// The same picture, and whether any of its pixels shows the surface.
+struct DrawnSurface {
+  Image image;
+  bool seen = false;
+};
+DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture);
+
+/// Whether the surface f = offset meets the walls of the domain, where tracing cuts it off. Judged by the sign at
+/// 40 × 40 points of each wall: a piece that is smaller than their distance may pass for none.
+bool meetsWalls(const Field& field, double offset);
+
 /// Size in pixels of the view within a picture of this size, without legend and caption. `draw` asks the renderer for
 /// `samples` times as much, so that buffers can be compared with those behind a picture.
 struct ViewSize {
