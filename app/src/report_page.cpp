@@ -35,13 +35,17 @@ footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--line)
          font-size: .9rem; }
 )";
 
+std::string shareText(double share) {
+  return share > 0 && share < 0.5e-4 ? "<0.01 %" : fmt::format("{:.2f} %", 100 * share);
+}
+
 std::string levels(const std::string& title, const std::vector<ReportBar>& bars) {
   std::string rows;
   for (const ReportBar& bar : bars)
     rows += fmt::format(
-        "<tr><th>{}</th><td class=\"share\">{:.2f} %</td><td class=\"bar\"><span "
+        "<tr><th>{}</th><td class=\"share\">{}</td><td class=\"bar\"><span "
         "style=\"width:{:.2f}%\"></span></td></tr>\n",
-        bar.level, 100 * bar.share, 100 * bar.share);
+        bar.level, htmlEscaped(shareText(bar.share)), 100 * bar.share);
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 
