@@ -80,9 +80,10 @@ void runSlice(Session& session, const Arguments& arguments) {
   const render::SlicePicture picture = slicePicture(arguments);
   if (format != SliceFormat::png && picture.samples != 1)
     throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
+  const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  render::Renderer& renderer = session.renderer(backend(arguments));
+  render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   if (format == SliceFormat::png) {
     savePng(render::draw(renderer, field, picture), file);
@@ -99,14 +100,28 @@ void runSlice(Session& session, const Arguments& arguments) {
   report(session, arguments, picture.width, picture.height, renderer);
 }
 
+/// What explains an empty picture, or an open shell.
+void noteOddSurface(const Console& console, const Field& field, double offset, bool seen) {
+  if (!seen)
+    console.err << "hpsdf: note: no surface in view: move the camera, or give an offset nearer to 0" << std::endl;
+  if (render::meetsWalls(field, offset))
+    console.err << "hpsdf: note: the surface meets the walls of the domain and is cut off there: "
+                << (offset == 0 ? "build" : "give an offset nearer to 0, or build") << " a field with a larger margin"
+                << std::endl;
+}
+
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   if (extension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   const render::SurfacePicture picture = surfacePicture(arguments);
+  const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  render::Renderer& renderer = session.renderer(backend(arguments));
-  savePng(render::draw(renderer, session.current().field, picture), file);
+  render::Renderer& renderer = session.renderer(chosen);
+  const Field& field = session.current().field;
+  const render::DrawnSurface drawn = render::drawSurface(renderer, field, picture);
+  savePng(drawn.image, file);
+  noteOddSurface(session.console(), field, picture.offset, drawn.seen);
   report(session, arguments, picture.width, picture.height, renderer);
 }
 
@@ -156,7 +171,11 @@ render::GlChoice glChoice(const Arguments& arguments) {
                             : render::GlChoice::automatic;
 }
 
-Backend backend(const Arguments& arguments) { return {arguments.flag("cpu"), glChoice(arguments)}; }
+Backend backend(const Arguments& arguments) {
+  if (arguments.flag("cpu") && arguments.given("gl"))
+    throw Error(fmt::format("cpu excludes gl ({}): give one or the other", arguments.text("gl")));
+  return {arguments.flag("cpu"), glChoice(arguments)};
+}
 
 render::SlicePicture slicePicture(const Arguments& arguments) {
   render::SlicePicture picture;

@@ -10,6 +10,7 @@ namespace hpsdf::app {
 /// Of --gl alone.
 render::GlChoice glChoice(const Arguments& arguments);
 
+/// Throws `Error` when --cpu and --gl are both given.
 Backend backend(const Arguments& arguments);
 
 /// Throws `Error` when plane and axis are both given.
