@@ -18,25 +18,14 @@ namespace {
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
 
-/// A uniform scale and a shift: y = scale·(x − centre).
-struct Normalization {
-  Vector3 centre;
-  double scale;
-};
-
-Normalization normalizationOf(const Box& box) {
-  const double longest = box.isEmpty() ? 0 : box.sizes().maxCoeff();
-  if (!(longest > 0)) throw Error("the shape has no extent to normalize");
-  return {box.center(), 2 / longest};
-}
-
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
-  const Normalization to = normalizationOf(distance.source().box);
+  const Normalization to = normalizing(distance.source().box);
   Source source = distance.source();
-  source.box = Box(to.scale * (source.box.min() - to.centre), to.scale * (source.box.max() - to.centre));
+  source.box = Box(to.scale * (source.box.min() - to.center), to.scale * (source.box.max() - to.center));
+  source.normalization = to;
   auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
     std::vector<Vector3> original(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.centre;
+    for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.center;
     distance(original, out);
     for (double& value : out) value *= to.scale;
   };
@@ -70,14 +59,23 @@ ImportedMesh importSurface(const std::string& surface) {
   return {std::move(mesh), report};
 }
 
+/// A field that misses part of its surface is seldom meant.
+void warnOfCutSurface(const Console& console, const Box& surface, const Box& domain) {
+  if (!surface.isEmpty() && !domain.contains(surface))
+    console.err << "hpsdf: warning: the domain leaves out "
+                << (domain.intersects(surface) ? "part of the surface" : "the whole surface") << std::endl;
+}
+
 Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments) {
+  const Box domain = domainOf(arguments, distance.source().box);
+  warnOfCutSurface(console, distance.source().box, domain);
   const InterruptGuard guard;
   ProgressLine line(console.err, console.redrawsProgress);
   const Progress progress{
       .report = [&line](std::string_view task, double fraction) { line.report(task, fraction); },
       .cancelled = &InterruptGuard::interrupted,
   };
-  Field field = build(distance, domainOf(arguments, distance.source().box), buildOptions(arguments), progress);
+  Field field = build(distance, domain, buildOptions(arguments), progress);
   if (InterruptGuard::interrupted()) throw Cancelled();  // asked for in the very last moment
   return field;
 }
@@ -92,7 +90,6 @@ Field construct(const Console& console, const DistanceFunction& distance, const 
 }  // namespace
 
 std::vector<Parameter> buildParameters() {
-  constexpr double kMostWhole = std::numeric_limits<int>::max();
   return {
       {.name = "target-error",
        .type = ParameterType::number,
@@ -109,7 +106,7 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "6",
        .valueName = "N|NX,NY,NZ",
        .minimum = 1,
-       .maximum = kMostWhole,
+       .maximum = std::numeric_limits<int>::max(),
        .whole = true,
        .counts = {1, 3}},
       {.name = "nearness",
@@ -230,10 +227,14 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     ImportedMesh imported = importSurface(surface);
     if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
       console.err << "hpsdf: warning: " << warning << std::endl;
+    const Normalization normalization =
+        wantsNormalized(arguments) ? normalizing(boundingBox(imported.mesh)) : Normalization{};
     if (wantsNormalized(arguments)) imported.mesh = normalized(imported.mesh);
     const auto start = std::chrono::steady_clock::now();
     const ExactDistance distance(imported.mesh);
-    Field field = construct(console, distance, arguments);
+    Source source = distance.source();
+    source.normalization = normalization;
+    Field field = construct(console, DistanceFunction(distance, std::move(source)), arguments);
     return {std::move(field), imported.report,
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
   } catch (const Error& error) {

@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/output_file.h"
+#include "interrupt.h"
 #include "point_query.h"
 #include "session.h"
 #include "summaries.h"
@@ -23,6 +24,7 @@ void runBuild(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
   const bool saves = arguments.has("output");
   if (saves) checkWritable(arguments.text("output"));
+  const InterruptGuard guard;  // until the file is whole
   BuiltField built = buildField(console, surface, arguments);
   session.setField({std::move(built.field), saves ? arguments.text("output") : surface});
   if (saves) saveCurrent(session, arguments.text("output"));
@@ -35,9 +37,9 @@ void runBuild(Session& session, const Arguments& arguments) {
   }
   if (built.mesh) console.out << meshText(surface, *built.mesh);
   const Field& field = session.current().field;
-  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {} (mesh units)\n",
+  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {}{}\n",
                              saves ? arguments.text("output") + ": " : "", fieldLine(field), built.seconds,
-                             shortNumber(field.metadata().rmsEstimate(field.domain())));
+                             shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -73,7 +75,8 @@ void runQuery(Session& session, const Arguments& arguments) {
     std::ostream& out = session.console().out;
     queryPoints(field, in, name, format, [&out](std::string_view text) {
       out.write(text.data(), static_cast<std::streamsize>(text.size()));
-      if (!out) throw Error("cannot write to standard output");
+      out.flush();
+      if (!out) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
     });
     return;
   }

@@ -1,10 +1,12 @@
 #pragma once
 
-#include <csignal>
-
 namespace hpsdf::app {
 
-/// While it lives, the first Ctrl-C only sets a flag; a second one ends the process, as Ctrl-C always does otherwise.
+/// From now on Ctrl-C, a hang-up or a request to terminate ends the process with no file half-written; within an
+/// `InterruptGuard` the first of them only sets a flag. Signals that the caller chose to ignore stay ignored.
+void installInterruptHandlers();
+
+/// While one lives (they may be nested), work goes on after the first interruption, so that it can end by itself.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -14,9 +16,6 @@ class InterruptGuard {
 
   /// From any thread.
   static bool interrupted();
-
- private:
-  struct sigaction before_;
 };
 
 }  // namespace hpsdf::app

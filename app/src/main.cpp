@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "interrupt.h"
 #include "program.h"
 
 namespace {
@@ -23,6 +24,7 @@ void occupyClosedStreams() {
 
 int main(int argc, char** argv) {
   occupyClosedStreams();
+  hpsdf::app::installInterruptHandlers();
   std::signal(SIGPIPE, SIG_IGN);  // a reader that went away is reported like any other failed write
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);

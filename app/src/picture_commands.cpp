@@ -34,25 +34,28 @@ SliceFormat sliceFormat(const std::string& file) {
                           file, kind));
 }
 
-float valueOrNan(const render::ViewBuffers& buffers, std::size_t pixel) {
-  return buffers.hit(pixel) ? buffers.value[pixel] : std::numeric_limits<float>::quiet_NaN();
+float valueOrNan(const render::ViewBuffers& buffers, render::SliceColor what, std::size_t pixel) {
+  if (!buffers.hit(pixel)) return std::numeric_limits<float>::quiet_NaN();
+  return what == render::SliceColor::degree  ? buffers.degree[pixel]
+         : what == render::SliceColor::depth ? buffers.depth[pixel]
+                                             : buffers.value[pixel];
 }
 
 /// Portable float map: one channel, little-endian (the negative scale says so), rows bottom to top; NaN outside the
 /// domain.
-void writePfm(const render::ViewBuffers& buffers, OutputFile& out) {
+void writePfm(const render::ViewBuffers& buffers, render::SliceColor what, OutputFile& out) {
   static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
   out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
   std::vector<float> row(static_cast<std::size_t>(buffers.width));
   for (int y = buffers.height; y-- > 0;) {
-    for (std::size_t x = 0; x < row.size(); ++x) row[x] = valueOrNan(buffers, std::size_t(y) * row.size() + x);
+    for (std::size_t x = 0; x < row.size(); ++x) row[x] = valueOrNan(buffers, what, std::size_t(y) * row.size() + x);
     out.write(std::as_bytes(std::span(row)));
   }
 }
 
-/// A row a pixel inside the domain: its point in world units and the value there.
+/// A row a pixel inside the domain: its point in world units, the value there, degree and depth of its cell.
 void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers, OutputFile& out) {
-  out.write("x,y,z,value\n");
+  out.write("x,y,z,value,degree,depth\n");
   for (int y = 0; y < buffers.height; ++y) {
     std::string rows;
     for (int x = 0; x < buffers.width; ++x) {
@@ -60,7 +63,8 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
       if (!buffers.hit(pixel)) continue;
       const Vector3 p =
           view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
-      rows += fmt::format("{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel]);
+      rows += fmt::format("{},{},{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel], buffers.degree[pixel],
+                          buffers.depth[pixel]);
     }
     out.write(rows);
   }
@@ -74,10 +78,15 @@ void report(Session& session, const Arguments& arguments, int width, int height,
   session.console().out << fmt::format("{}: {}x{}, {}\n", file, width, height, renderer.description());
 }
 
+/// 0, or where the domain does not hold that, its middle.
+double defaultOffset(const Box& domain, int axis) {
+  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
+}
+
 void runSlice(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const SliceFormat format = sliceFormat(file);
-  const render::SlicePicture picture = slicePicture(arguments);
+  render::SlicePicture picture = slicePicture(arguments);
   if (format != SliceFormat::png && picture.samples != 1)
     throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
   const Backend chosen = backend(arguments);
@@ -85,6 +94,8 @@ void runSlice(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
+  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
+    plane->offset = defaultOffset(field.domain(), plane->axis);
   if (format == SliceFormat::png) {
     savePng(render::draw(renderer, field, picture), file);
   } else {
@@ -92,7 +103,7 @@ void runSlice(Session& session, const Arguments& arguments) {
     const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
     OutputFile out(file);
     if (format == SliceFormat::pfm)
-      writePfm(buffers, out);
+      writePfm(buffers, arguments.given("color") ? picture.color : render::SliceColor::distance, out);
     else
       writeCsv(view, buffers, out);
     out.commit();
@@ -185,7 +196,8 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
     const auto n = arguments.numbers("plane");
     picture.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
   } else {
-    picture.plane = render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.number("offset")};
+    picture.plane =
+        render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
   }
   const std::string color = arguments.text("color");
   picture.color = color == "depth"      ? render::SliceColor::depth
@@ -225,8 +237,9 @@ void addPictureCommands(Registry& registry) {
            "The plane is axis = offset, or any plane given by a point and a normal. degree and depth show the cells "
            "with their outlines; distance shows iso-lines, the surface as a heavy line.\n"
            "\n"
-           "The output's ending decides: .png is a picture with legend and caption; .pfm (32-bit floats, NaN outside "
-           "the domain) and .csv (x,y,z,value, a row a pixel inside) hold the raw values of size pixels.",
+           "The output's ending decides: .png is a picture with legend and caption; .csv (x,y,z,value,degree,depth, a "
+           "row a pixel inside) and .pfm (32-bit floats, NaN outside the domain) hold the raw values of size pixels: "
+           "distances, or in a .pfm what color names.",
        .examples = {"hpsdf slice bunny.hpsdf -o degree.png",
                     "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
                     "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",
@@ -244,8 +257,8 @@ void addPictureCommands(Registry& registry) {
                        .choices = {"x", "y", "z"}},
                       {.name = "offset",
                        .type = ParameterType::number,
-                       .help = "Where the plane crosses that axis.",
-                       .defaultText = "0",
+                       .help = "Where the plane crosses that axis; when left out, at 0, or in the domain's middle where 0 "
+                               "lies outside.",
                        .unit = "world units"},
                       {.name = "plane",
                        .type = ParameterType::numbers,

@@ -57,7 +57,12 @@ class Query {
   std::size_t run(std::istream& in) {
     text_ = format_ == PointFormat::csv ? "x,y,z,distance,gx,gy,gz\n" : "[";
     std::string line;
-    for (std::size_t number = 1; std::getline(in, line); ++number) take(trimmed(line), number);
+    for (std::size_t number = 1; std::getline(in, line); ++number) {
+      std::string_view text = line;
+      if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
+      take(trimmed(text), number);
+      if (in.rdbuf()->in_avail() <= 0) flush();  // who writes a point and waits gets its answer
+    }
     if (in.bad()) throw Error(name_ + ": cannot be read");
     flush();
     if (format_ == PointFormat::json) write_(count_ == 0 ? "]\n" : "\n]\n");
@@ -77,6 +82,9 @@ class Query {
     if (points_.size() == kBatch) flush();
   }
 
+  /// JSON knows no infinity.
+  static std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
+
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
     constexpr std::size_t kShown = 60;
     const std::string shown(line.substr(0, kShown));
@@ -95,7 +103,8 @@ class Query {
         fmt::format_to(out, "{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), value, g.x(), g.y(), g.z());
       else
         fmt::format_to(out, R"({}{{"x":{},"y":{},"z":{},"distance":{},"gx":{},"gy":{},"gz":{}}})",
-                       count_ + i == 0 ? "\n" : ",\n", x.x(), x.y(), x.z(), value, g.x(), g.y(), g.z());
+                       count_ + i == 0 ? "\n" : ",\n", x.x(), x.y(), x.z(), number(value), number(g.x()), number(g.y()),
+                       number(g.z()));
     }
     count_ += points_.size();
     points_.clear();

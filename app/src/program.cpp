@@ -36,7 +36,7 @@ void execute(std::span<const std::string> words, const Registry& registry, const
   std::vector<Word> arguments;
   for (const std::string& word : words.subspan(1)) arguments.push_back({.text = word});
   Session session(registry, console);
-  command.action(session, parseArguments(command, arguments, Origin::commandLine));
+  perform(command, session, parseArguments(command, arguments, Origin::commandLine));
 }
 
 /// Output to a closed pipe or a full disk fails late, inside the stream's buffer.

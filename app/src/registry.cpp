@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 #include "hpsdf/nearest_name.h"
@@ -342,6 +343,25 @@ std::vector<std::string> Arguments::texts(std::string_view name) const {
   std::vector<std::string> result;
   for (const Value& value : entry(name).values) result.push_back(value.text);
   return result;
+}
+
+void perform(const Command& command, Session& session, const Arguments& arguments) {
+  const auto filesOf = [&](bool outputs) {
+    std::vector<std::string> files;
+    for (const Parameter& parameter : command.parameters) {
+      const bool isInput = parameter.type == ParameterType::path || parameter.type == ParameterType::text;
+      if (outputs ? parameter.type != ParameterType::outputPath : !isInput) continue;
+      if (arguments.given(parameter.name) && !parameter.repeatable) files.push_back(arguments.text(parameter.name));
+    }
+    return files;
+  };
+  for (const std::string& output : filesOf(true))
+    for (const std::string& input : filesOf(false)) {
+      std::error_code missing;
+      if (std::filesystem::equivalent(output, input, missing))
+        throw Error(fmt::format("{}: is read by the same command; give the output another name", output));
+    }
+  command.action(session, arguments);
 }
 
 }  // namespace hpsdf::app

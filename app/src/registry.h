@@ -135,6 +135,9 @@ class ArgumentError : public Error {
 /// in a script, `name=value`. Throws `ArgumentError`.
 Arguments parseArguments(const Command& command, std::span<const Word> words, Origin origin);
 
+/// Runs the command. Throws `Error` for an output that is one of its inputs, before anything is done.
+void perform(const Command& command, Session& session, const Arguments& arguments);
+
 /// What a parameter takes, e.g. "a whole number from 1 to 30".
 std::string expectedValue(const Parameter& parameter);
 

@@ -201,7 +201,7 @@ std::vector<Call> parseScript(const Registry& registry, std::string_view name, s
 void runScript(Session& session, const std::vector<Call>& calls) {
   for (const Call& call : calls) {
     try {
-      call.command->action(session, call.arguments);
+      perform(*call.command, session, call.arguments);
     } catch (const Error& error) {
       throw Error(call.where + ": " + error.what());
     }

@@ -115,7 +115,8 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   text += row("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
   text += row("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
   if (report.weldedVertices > 0)
-    text += row("welded", grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
+    text +=
+        row("welded", grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
     text += row("unused", grouped(report.unreferencedVertices) + " vertices dropped");
   if (report.degenerateFaces > 0) text += row("degenerate", grouped(report.degenerateFaces) + " faces dropped");
@@ -128,42 +129,56 @@ std::string meshText(const std::string& name, const MeshReport& report) {
 
 std::string meshWarning(const std::string& name, const MeshReport& report) {
   if (report.closed()) return {};
-  return fmt::format("{}: the surface is not closed ({}): signs may be wrong", name, faultyEdges(report));
+  return fmt::format(
+      "{}: the surface is not closed ({}): signs may be wrong, and refinement may chase their jumps without end; a "
+      "lower "
+      "max-depth bounds that",
+      name, faultyEdges(report));
 }
 
 Json fieldJson(const CurrentField& current) {
   const Field& field = current.field;
   const FieldMetadata& metadata = field.metadata();
   const FieldStatistics figures = statistics(field);
-  return {{"leaves", figures.leaves},
-          {"nodes", figures.nodes},
-          {"coefficients", figures.coefficients},
-          {"precision", field.singlePrecision() ? "float" : "double"},
-          {"bytes", figures.bytes},
-          {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
-          {"total_error", metadata.totalError},
-          {"target_error", metadata.targetError},
-          {"rms_estimate", metadata.rmsEstimate(field.domain())},
-          {"rounding_rms", metadata.roundingRms},
-          {"exact_evaluations", metadata.exactEvaluations},
-          {"domain", boxJson(field.domain())},
-          {"grid", field.grid()},
-          {"strategy", strategyName(metadata.strategy)},
-          {"nearness", metadata.nearness},
-          {"max_degree", metadata.maxDegree},
-          {"max_depth", metadata.maxDepth},
-          {"quadrature", metadata.quadrature},
-          {"band", metadata.band},
-          {"reference_length", metadata.referenceLength},
-          {"mesh",
-           {{"name", metadata.source.name},
-            {"fingerprint", fingerprintText(metadata.source.fingerprint)},
-            {"vertices", metadata.source.vertices},
-            {"faces", metadata.source.faces}}},
-          {"degree_volume", levelsJson(figures.degreeVolume)},
-          {"depth_volume", levelsJson(figures.depthVolume)},
-          {"degree_leaves", levelsJson(figures.degreeLeaves)},
-          {"depth_leaves", levelsJson(figures.depthLeaves)}};
+  return {
+      {"leaves", figures.leaves},
+      {"nodes", figures.nodes},
+      {"coefficients", figures.coefficients},
+      {"precision", field.singlePrecision() ? "float" : "double"},
+      {"bytes", figures.bytes},
+      {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
+      {"total_error", metadata.totalError},
+      {"target_error", metadata.targetError},
+      {"rms_estimate", metadata.rmsEstimate(field.domain())},
+      {"rounding_rms", metadata.roundingRms},
+      {"exact_evaluations", metadata.exactEvaluations},
+      {"domain", boxJson(field.domain())},
+      {"grid", field.grid()},
+      {"strategy", strategyName(metadata.strategy)},
+      {"nearness", metadata.nearness},
+      {"max_degree", metadata.maxDegree},
+      {"max_depth", metadata.maxDepth},
+      {"quadrature", metadata.quadrature},
+      {"band", metadata.band},
+      {"reference_length", metadata.referenceLength},
+      {"normalization",
+       {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
+      {"mesh",
+       {{"name", metadata.source.name},
+        {"fingerprint", fingerprintText(metadata.source.fingerprint)},
+        {"vertices", metadata.source.vertices},
+        {"faces", metadata.source.faces}}},
+      {"degree_volume", levelsJson(figures.degreeVolume)},
+      {"depth_volume", levelsJson(figures.depthVolume)},
+      {"degree_leaves", levelsJson(figures.degreeLeaves)},
+      {"depth_leaves", levelsJson(figures.depthLeaves)}};
+}
+
+std::string unitText(const Field& field) {
+  const double scale = field.metadata().source.normalization.scale;
+  if (scale == 1) return " (mesh units)";
+  return fmt::format(" (normalized; {} in mesh units)",
+                     shortNumber(field.metadata().rmsEstimate(field.domain()) / scale));
 }
 
 std::string fieldLine(const Field& field) {
@@ -185,6 +200,8 @@ std::string fieldText(const CurrentField& current) {
                 fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
     text += row("fingerprint", fingerprintText(metadata.source.fingerprint));
   }
+  if (const Normalization& n = metadata.source.normalization; n.scale != 1 || !n.center.isZero(0))
+    text += row("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
   text += row("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
   text += row("leaves", grouped(figures.leaves));
   text += row("coefficients",
@@ -193,7 +210,7 @@ std::string fieldText(const CurrentField& current) {
   if (current.fileBytes) text += row("file", bytesText(double(*current.fileBytes)));
   text += row("error, target", fmt::format("{}, {} (at the scale where the longest side is 2)",
                                            shortNumber(metadata.totalError), shortNumber(metadata.targetError)));
-  text += row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + " (mesh units)");
+  text += row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
   if (field.singlePrecision()) text += row("change by float", shortNumber(metadata.roundingRms) + " RMS");
   text += row("exact distances", grouped(metadata.exactEvaluations));
   text += row("settings", fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",

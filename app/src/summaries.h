@@ -25,6 +25,9 @@ std::string meshWarning(const std::string& name, const MeshReport& report);
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);
 
+/// In what units the estimated RMS error of `fieldLine` and `fieldText` is, in parentheses.
+std::string unitText(const Field& field);
+
 /// "54,935 leaves, 460,210 coefficients (float32), 2.3 MB"
 std::string fieldLine(const Field& field);
 

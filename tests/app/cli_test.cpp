@@ -56,9 +56,12 @@ struct Call {
   std::vector<std::string> words;
   std::string input = {};
   std::map<std::string, std::string> environment = {};
-  fs::path folder = {};       ///< to run in; the caller's when empty
-  bool stdoutClosed = false;  ///< the reader of standard output has gone away
+  fs::path folder = {};        ///< to run in; the caller's when empty
+  bool stdoutClosed = false;   ///< the reader of standard output has gone away
+  bool keepInputOpen = false;  ///< standard input is not at its end: see `Process::type`
 };
+
+std::size_t lineCount(const std::string& text) { return static_cast<std::size_t>(std::ranges::count(text, '\n')); }
 
 /// The program at work. Its output is read while it runs, so that it never waits for us.
 class Process {
@@ -93,7 +96,11 @@ class Process {
     out_ = call.stdoutClosed ? -1 : out[0];
     err_ = err[0];
     if (error != 0) throw std::runtime_error(std::string(HPSDF_PROGRAM ": ") + std::strerror(error));
-    feed(in[1], call.input);
+    in_ = in[1];
+    if (!call.keepInputOpen) {
+      type(call.input);
+      closeInput();
+    }
   }
 
   ~Process() {
@@ -101,6 +108,7 @@ class Process {
       kill(id_, SIGKILL);
       waitpid(id_, nullptr, 0);
     }
+    if (in_ >= 0) close(in_);
     if (out_ >= 0) close(out_);
     if (err_ >= 0) close(err_);
   }
@@ -111,6 +119,25 @@ class Process {
   void waitForErrorLine() {
     while (outcome_.err.find('\n') == std::string::npos && readSome()) {
     }
+  }
+
+  /// Until so many lines have come out, or it has ended.
+  void waitForLines(std::size_t count) {
+    while (lineCount(outcome_.out) < count && readSome()) {
+    }
+  }
+
+  /// Inputs of these tests fit into a pipe, so that this does not wait. A program that refuses its files first may
+  /// be gone before it reads any.
+  void type(const std::string& input) {
+    std::signal(SIGPIPE, SIG_IGN);
+    if (!input.empty() && write(in_, input.data(), input.size()) < 0 && errno != EPIPE)
+      ADD_FAILURE() << "writing the input: " << std::strerror(errno);
+  }
+
+  void closeInput() {
+    close(in_);
+    in_ = -1;
   }
 
   void send(int signal) { kill(id_, signal); }
@@ -142,15 +169,6 @@ class Process {
     return posix_spawn(&id_, HPSDF_PROGRAM, &actions, &attributes, pointers(words).data(), pointers(variables).data());
   }
 
-  /// Inputs of these tests fit into a pipe, so that this does not wait. A program that refuses its files first may
-  /// be gone before it reads any.
-  static void feed(int pipe, const std::string& input) {
-    std::signal(SIGPIPE, SIG_IGN);
-    if (!input.empty() && write(pipe, input.data(), input.size()) < 0 && errno != EPIPE)
-      ADD_FAILURE() << "writing the input: " << std::strerror(errno);
-    close(pipe);
-  }
-
   /// Reads what is there; false once both streams have ended.
   bool readSome() {
     pollfd streams[] = {{out_, POLLIN, 0}, {err_, POLLIN, 0}};
@@ -174,6 +192,7 @@ class Process {
 
   pid_t id_ = 0;
   bool running_ = true;
+  int in_ = -1;
   int out_ = -1;
   int err_ = -1;
   Outcome outcome_;
@@ -200,8 +219,6 @@ std::set<std::string> namesIn(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
   return names;
 }
-
-std::size_t lineCount(const std::string& text) { return static_cast<std::size_t>(std::ranges::count(text, '\n')); }
 
 constexpr std::string_view kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
@@ -461,19 +478,30 @@ TEST_F(Cli, rawSlicesHoldTheFieldsValues) {
   std::istringstream rows(readFile(at("s.csv")));
   std::string row;
   std::getline(rows, row);
-  EXPECT_EQ(row, "x,y,z,value");
+  EXPECT_EQ(row, "x,y,z,value,degree,depth");
   std::size_t count = 0;
   std::vector<float> values;
+  std::vector<Vector3> points;
+  std::set<long> across, down;  // steps from pixel to pixel
   while (std::getline(rows, row)) {
     Vector3 x;
     double value = 0;
-    ASSERT_EQ(std::sscanf(row.c_str(), "%lf,%lf,%lf,%lf", &x[0], &x[1], &x[2], &value), 4) << row;
+    int degree = 0, depth = 0;
+    ASSERT_EQ(std::sscanf(row.c_str(), "%lf,%lf,%lf,%lf,%d,%d", &x[0], &x[1], &x[2], &value, &degree, &depth), 6)
+        << row;
     EXPECT_EQ(x.z(), 0);
     EXPECT_NEAR(value, torus.value(x), 1e-6);
+    EXPECT_EQ(degree, torus.cellAt(x).degree);
+    EXPECT_EQ(depth, torus.cellAt(x).depth);
+    if (!points.empty() && points.back().y() == x.y()) across.insert(std::lround((x.x() - points.back().x()) * 1e9));
+    if (!points.empty() && points.back().y() != x.y()) down.insert(std::lround((points.back().y() - x.y()) * 1e9));
+    points.push_back(x);
     values.push_back(static_cast<float>(value));
     ++count;
   }
   EXPECT_GT(count, 100u);
+  ASSERT_EQ(across.size(), 1u);
+  EXPECT_EQ(across, down) << "pixels are square";
 
   ASSERT_EQ(run({{"slice", field(), "-o", at("s.pfm"), "--size", "40x20", "--cpu"}}).status, 0);
   const std::string pfm = readFile(at("s.pfm"));
@@ -705,6 +733,76 @@ TEST_F(Cli, interruptStopsTheConstruction) {
     EXPECT_LT(seconds, 5) << "the promise is one second; this machine may be busy";
     EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
   }
+}
+
+TEST_F(Cli, outputsAreNotTheirInputs) {
+  fs::copy_file(field(), at("f.hpsdf"));
+  writeFile(at("mesh.obj"), kTetrahedron);
+  writeFile(at("points"), "0 0 0\n");
+  fs::create_symlink(at("f.hpsdf"), at("link.csv"));
+  const auto before = namesIn(folder_.path());
+  expectRefused({{"build", at("mesh.obj"), "-o", at("mesh.obj")}}, "mesh.obj", before);
+  expectRefused({{"query", at("f.hpsdf"), at("points"), "-o", at("f.hpsdf")}}, "f.hpsdf", before);
+  expectRefused({{"query", at("f.hpsdf"), at("points"), "-o", at("points")}}, "points", before);
+  expectRefused({{"slice", at("f.hpsdf"), "-o", at("link.csv"), "--cpu"}}, "link.csv", before);
+  expectRefused({{"run", "-e", "query " + at("f.hpsdf") + " " + at("points") + " output=" + at("points")}}, "points",
+                before);
+  EXPECT_EQ(readFile(at("f.hpsdf")), readFile(field()));
+  EXPECT_EQ(readFile(at("points")), "0 0 0\n");
+  EXPECT_EQ(readFile(at("mesh.obj")), kTetrahedron);
+}
+
+TEST_F(Cli, slicesOfFieldsAwayFromTheOriginCutTheirMiddle) {
+  ASSERT_EQ(run({{"build", "analytic:sphere", "-o", at("far.hpsdf"), "--domain", "10,10,10,11,12,13", "--target-error",
+                  "1e-2"}})
+                .status,
+            0);
+  const Outcome outcome = run({{"slice", at("far.hpsdf"), "-o", at("s.csv"), "--cpu", "--size", "16x16"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(readFile(at("s.csv")), HasSubstr(",11.5,"));
+}
+
+TEST_F(Cli, aDomainBesideTheSurfaceIsWarnedAbout) {
+  const auto build = [&](const std::string& domain) {
+    return run({{"build", "analytic:sphere", "-o", at("f.hpsdf"), "--domain", domain, "--target-error", "1e-2"}}).err;
+  };
+  EXPECT_THAT(build("5,5,5,6,6,6"), HasSubstr("warning: the domain leaves out the whole surface"));
+  EXPECT_THAT(build("0,-2,-2,2,2,2"), HasSubstr("warning: the domain leaves out part of the surface"));
+  EXPECT_THAT(build("-2,-2,-2,2,2,2"), Not(HasSubstr("warning")));
+}
+
+TEST_F(Cli, normalizationIsRemembered) {
+  writeFile(at("mesh.off"), "OFF\n4 4 0\n10 0 0\n14 0 0\n10 2 0\n10 0 2\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n");
+  ASSERT_EQ(run({{"build", at("mesh.off"), "-o", at("f.hpsdf"), "--normalize", "--target-error", "1e-3"}}).status, 0);
+  const auto json = nlohmann::json::parse(run({{"info", at("f.hpsdf"), "--json"}}).out);
+  EXPECT_EQ(json["normalization"]["scale"], 0.5);
+  EXPECT_EQ(json["normalization"]["center"], nlohmann::json({12.0, 1.0, 1.0}));
+  EXPECT_THAT(run({{"info", at("f.hpsdf")}}).out, HasSubstr("field = 0.5 · (mesh − (12, 1, 1))"));
+}
+
+/// The process waits in the middle of its output's temporary file: what a full pipe does to it.
+TEST_F(Cli, anInterruptOutsideOfAConstructionLeavesNothingEither) {
+  Process process({.words = {"query", field(), "-o", at("q.csv")}, .keepInputOpen = true});
+  for (int i = 0; i < 1000 && namesIn(folder_.path()).empty(); ++i) usleep(10000);
+  ASSERT_EQ(namesIn(folder_.path()).size(), 1u) << "the temporary file";
+  process.send(SIGTERM);
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 143);
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing was written\n"));
+  EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+}
+
+/// A program that asks point by point gets its answers point by point.
+TEST_F(Cli, queriesOnAPipeAreAnsweredAtOnce) {
+  Process process({.words = {"query", field()}, .keepInputOpen = true});
+  process.type("0 0 0\n");
+  process.waitForLines(2);
+  process.type("1 1 1\n");
+  process.waitForLines(3);
+  process.closeInput();
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(lineCount(outcome.out), 3u);
 }
 
 TEST_F(Cli, anOlderFileSurvivesAnInterrupt) {

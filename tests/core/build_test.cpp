@@ -13,6 +13,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/shapes.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -64,6 +65,39 @@ TEST(Build, SphereAndTorusAreAccurate) {
 
 /// The paper's variants (figs. 3 and 4): own trial samples at order 4p, and octree alone. The shell of degree 1 is the
 /// whole slope, so that h1 counts far more error than is there: a coarser target keeps it small.
+/// The decisions of the construction as counts, by the default settings and by the paper's, on a box, whose kinks want
+/// depth and whose faces want degree.
+TEST(Build, CountsOfAKnownBox) {
+  struct Known {
+    BuildOptions options;
+    double leaves, coefficients, evaluations;
+  };
+  BuildOptions paper = paperOptions();
+  paper.targetError = 1e-6;
+  for (const Known& known :
+       {Known{{.targetError = 1e-6}, 23813, 280978, 2946560}, Known{paper, 16456, 207568, 6772552}}) {
+    const Field field = build(shapes::analytic("analytic:box"), cube(), known.options);
+    const FieldStatistics figures = statistics(field);
+    EXPECT_NEAR(double(figures.leaves), known.leaves, 0.002 * known.leaves);
+    EXPECT_NEAR(double(figures.coefficients), known.coefficients, 0.002 * known.coefficients);
+    EXPECT_NEAR(double(field.metadata().exactEvaluations), known.evaluations, 0.002 * known.evaluations);
+  }
+}
+
+/// Smooth enough for degree 30 to reach the end of double precision: the running total of the error must not.
+TEST(Build, RoundingEndsNoConstructionLate) {
+  const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()) + 5; };
+  const auto coefficients = [&](double target) {
+    const Field field = build(smooth, cube(), {.targetError = target, .grid = {1, 1, 1}, .nearness = 0, .maxDepth = 1});
+    double sum = 0;
+    field.forEachCell([&](const Cell& cell) { sum += cell.error; });
+    EXPECT_NEAR(field.metadata().totalError, sum, 1e-6 * sum);
+    EXPECT_LE(sum, target);
+    return statistics(field).coefficients;
+  };
+  EXPECT_LT(coefficients(1e-17), 2 * coefficients(1e-15));
+}
+
 TEST(Build, OctreeAloneNeedsMoreCoefficients) {
   const auto coefficients = [](Strategy strategy, double targetError) {
     BuildOptions options = paperOptions();
@@ -146,6 +180,24 @@ TEST(Build, AutomaticPrecisionFollowsTheTarget) {
   EXPECT_FALSE(build(smooth, cube(), {.targetError = 1e-17, .nearness = 0}).singlePrecision());
 }
 
+/// Float where its rounding stays below a hundredth of the estimate, double from there on.
+TEST(Build, AutomaticPrecisionComparesRoundingWithTheEstimate) {
+  const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()); };
+  int floats = 0, doubles = 0;
+  for (double target = 1e-6; target > 1e-17; target /= 10) {
+    BuildOptions options{.targetError = target, .grid = {2, 2, 2}, .coefficients = CoefficientType::float32};
+    const Field rounded = build(smooth, cube(), options);
+    options.coefficients = CoefficientType::automatic;
+    const Field chosen = build(smooth, cube(), options);
+    const double share = rounded.metadata().roundingRms / rounded.metadata().rmsEstimate(rounded.domain());
+    EXPECT_EQ(chosen.singlePrecision(), share < 0.01) << share;
+    floats += share < 0.01;
+    doubles += share >= 0.01 && share < 0.5;
+  }
+  EXPECT_GT(floats, 0);
+  EXPECT_GT(doubles, 0);
+}
+
 TEST(Build, LimitsHold) {
   const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
   const FieldStatistics s = statistics(shallow);
@@ -154,6 +206,9 @@ TEST(Build, LimitsHold) {
   EXPECT_GT(shallow.metadata().totalError, 1e-9);  // and it ended because nothing was left to refine
   const Field flat = build(torus, cube(), {.targetError = 1e-6, .maxDegree = 2});
   EXPECT_EQ(statistics(flat).degreeLeaves.size(), 1u);
+  const Field linear = build(torus, cube(), {.targetError = 1e-4, .strategy = Strategy::h1});
+  EXPECT_EQ(statistics(linear).degreeLeaves.rbegin()->first, 1);
+  EXPECT_EQ(linear.metadata().maxDegree, 1u);
   const Field base = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 2, .maxDepth = 0});
   EXPECT_EQ(statistics(base).leaves, 216u);
 }
@@ -253,6 +308,21 @@ TEST(Build, ProgressRisesAndCancelStops) {
   EXPECT_THROW(build(torus, cube(), {.targetError = 1e-9}, progress), Cancelled);
 }
 
+/// One cell of a high degree has many batches of samples: cancelling does not wait for the last.
+TEST(Build, CancelStopsWithinACell) {
+  std::atomic<std::size_t> taken = 0, takenLate = 0;
+  std::atomic<bool> cancel = false;
+  const auto phi = [&](std::span<const Vector3> points, std::span<double> out) {
+    if (cancel) takenLate += points.size();
+    for (std::size_t i = 0; i < points.size(); ++i) out[i] = torus(points[i]);
+    if ((taken += points.size()) > 60000) cancel = true;
+  };
+  const Progress progress{.report = {}, .cancelled = [&] { return cancel.load(); }};
+  EXPECT_THROW(build(phi, cube(), {.targetError = 1e-12, .grid = {1, 1, 1}, .maxDepth = 0, .threads = 1}, progress),
+               Cancelled);
+  EXPECT_EQ(takenLate, 0u);
+}
+
 TEST(Build, RefusesBadOptions) {
   const auto refuses = [](const BuildOptions& options, const std::string& word, const Box& domain = cube()) {
     try {
@@ -275,6 +345,9 @@ TEST(Build, RefusesBadOptions) {
   refuses({.quadrature = 1}, "quadrature");
   refuses({.band = -1}, "band");
   refuses({.threads = -1}, "threads");
+  refuses({.grid = {16384, 1, 1}, .maxDepth = 20}, "2^32 cells an axis");
+  refuses({.targetError = 1e-300}, "beyond double precision", cube(1e-5));
+  refuses({.targetError = 1e300}, "beyond double precision", cube(1e5));
   refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, 1, 0)));
   refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, nan, 1)));
 }

@@ -399,6 +399,24 @@ TEST(ExactDistance, TrianglesShrinkingByAFactorEach) {
 
 // --- signs
 
+/// Many triangles whose centres differ by less than single precision can divide by.
+TEST(ExactDistance, ClustersTooSmallForAnyBin) {
+  for (const double size : {1e-37, 1e-38, 1e-39, 1e-41, 1e-44}) {
+    TriangleMesh mesh;
+    const auto add = [&](const Vector3& a, double length) {
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (const Vector3& corner : {Vector3(0, 0, 0), Vector3(1, 0, 0), Vector3(0, 1, 0)})
+        mesh.vertices.push_back(a + length * corner);
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    };
+    add({-1, -1, -1}, 0.5);
+    add({0.5, 0.5, 1}, 0.5);
+    for (int i = 0; i < 20; ++i) add(Vector3(i, 2 * i, 0) * size, size);
+    const ExactDistance distance(mesh);
+    EXPECT_NEAR(std::abs(distance({0, 0, 0.25})), 0.25, 1e-12);
+  }
+}
+
 TEST(ExactDistance, SignedDistanceOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const ExactDistance distance(box(half));

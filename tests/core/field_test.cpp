@@ -158,6 +158,8 @@ TEST(Field, NotANumberAndInfinityAreAnswered) {
   EXPECT_TRUE(std::isnan(field.valueAndGradient({0, nan, 0}).value));
   EXPECT_EQ(field.value({infinity, 0, 0}), infinity);
   EXPECT_EQ(field.value({0, -infinity, 0}), infinity);
+  EXPECT_NEAR(field.valueAndGradient({1e200, 0, 0}).gradient.x(), 1, 1e-12);
+  EXPECT_TRUE(field.valueAndGradient({std::nextafter(field.domain().max().x(), 9), 0, 0}).gradient.allFinite());
 }
 
 TEST(Field, BatchesAndThreadsGiveTheSameBits) {

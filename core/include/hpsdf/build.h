@@ -16,7 +16,9 @@ enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
 /// Where the p-trial takes its samples.
 enum class TrialSamples : std::uint8_t {
   children,  ///< the children's samples, a finer quadrature of the same cell: refits all coefficients, costs no Φ
-  own,       ///< a quadrature of its own, appending the new degree only (the paper)
+  /// A quadrature of its own, appending the new degree only (the paper). What the first fit got wrong stays: with
+  /// `quadrature` below 4 the error may exceed the estimate by far.
+  own,
 };
 
 /// Settings of the construction (paper, Algorithm 1). The defaults are ours; `paperOptions` are the paper's.
@@ -48,8 +50,8 @@ Box domainAround(const TriangleMesh& mesh, DomainShape shape = DomainShape::cube
 
 /// Builds the field of Φ over `domain`. What Φ says of its source goes into the metadata; a box there gives L.
 ///
-/// Throws `Error` for options or a domain out of range, a base grid whose cells would not fit into memory, or a Φ that
-/// returns a non-finite value; `Cancelled` when asked to stop.
+/// Throws `Error` for options or a domain out of range, a tree that would not fit into memory, or a Φ that returns a
+/// non-finite value; `Cancelled` when asked to stop.
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options = {},
             const Progress& progress = {});
 

@@ -21,27 +21,27 @@ struct Source {
   std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 where there is none
   std::uint64_t vertices = 0;
   std::uint64_t faces = 0;
-  Box box = {};  ///< smallest box of the surface in world units; empty where it is not known
+  Box box = {};                      ///< smallest box of the surface in world units; empty where it is not known
+  Normalization normalization = {};  ///< that took the mesh's own units to these
 };
 
 /// Any signed distance Φ, evaluated in batches; negative inside. Converts from anything callable, single
 /// (`double(const Vector3&)`) or batched (`void(std::span<const Vector3>, std::span<double>)`). It is called from
 /// several threads at once. Points of one batch lie close together, in a deterministic order.
 ///
-/// A callable with a `Source source() const` hands that on; a source can also be given.
+/// A callable with a `Source source() const` hands that on, unless another source is given.
 /// Lvalues are referred to, not copied (an `ExactDistance` is large): they must outlive this object. Temporaries are
 /// kept.
 class DistanceFunction {
  public:
   template <typename F>
   requires(!std::same_as<std::remove_cvref_t<F>, DistanceFunction>)
-      DistanceFunction(F&& f, Source source = {})  // NOLINT: implicit on purpose
-      : source_(std::move(source)) {
+      DistanceFunction(F&& f)  // NOLINT: implicit on purpose
+      : DistanceFunction(std::forward<F>(f), sourceOf(f)) {}
+
+  template <typename F>
+  DistanceFunction(F&& f, Source source) : source_(std::move(source)) {
     using Callable = std::remove_cvref_t<F>;
-    if constexpr (requires {
-                    { f.source() } -> std::convertible_to<Source>;
-                  })
-      source_ = f.source();
     if constexpr (std::is_lvalue_reference_v<F>)
       evaluate_ = adapt<Callable>([&f]() -> const Callable& { return f; });
     else
@@ -58,6 +58,16 @@ class DistanceFunction {
   const Source& source() const { return source_; }
 
  private:
+  template <typename F>
+  static Source sourceOf(const F& f) {
+    if constexpr (requires {
+                    { f.source() } -> std::convertible_to<Source>;
+                  })
+      return f.source();
+    else
+      return {};
+  }
+
   using Batch = std::function<void(std::span<const Vector3>, std::span<double>)>;
 
   template <typename Callable, typename Get>

@@ -87,8 +87,9 @@ struct ValueAndGradient {
 ///
 /// Inside the domain the value is the polynomial of the leaf that holds the point; leaves are half-open, so that every
 /// point has exactly one. The field jumps slightly from leaf to leaf. Outside the domain it is f(q) + |x - q| with q
-/// the closest point of the domain: continuous, with the matching gradient, and never below what a 1-Lipschitz field
-/// allows.
+/// the closest point of the domain, with the matching gradient: continuous across the domain's boundary, though jumps
+/// between two leaves there go on outwards. It is an upper bound of a 1-Lipschitz field, so that outside a value is no
+/// safe length for a step of sphere tracing.
 class Field {
  public:
   /// Takes finished arrays; throws `Error` when they do not make a field (see `FieldData`).

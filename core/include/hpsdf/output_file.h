@@ -26,6 +26,10 @@ class OutputFile {
   /// Flushes to the disk and renames; throws `Error` as `write` does. Nothing can be written afterwards.
   void commit();
 
+  /// Removes the temporary files of all that are not yet committed: for a signal handler that is about to end the
+  /// process. Does only what a signal handler may do.
+  static void removeUnfinished() noexcept;
+
  private:
   [[noreturn]] void fail();
 

@@ -29,6 +29,9 @@ double surfaceArea(const TriangleMesh& mesh);
 /// 64-bit hash of vertices and triangles, the same on every machine. The name does not count.
 std::uint64_t fingerprint(const TriangleMesh& mesh);
 
+/// What takes a surface with this box into [-1, 1]³. Throws `Error` for one without finite extent.
+Normalization normalizing(const Box& surface);
+
 /// The mesh scaled uniformly and centred so that the longest side of its box spans exactly [-1, 1], as the paper does.
 /// Throws `Error` for a mesh without extent.
 TriangleMesh normalized(const TriangleMesh& mesh);

@@ -143,9 +143,10 @@ class Hierarchy::Builder {
     const Eigen::Array4f extent = centers.upper - centers.lower;
     int widest = 0;
     extent.head<3>().maxCoeff(&widest);
-    if (level >= kMaxLevel || !(extent[widest] > 0)) return splitByCount(range, widest);
+    // so close together that a bin would have no width
+    if (level >= kMaxLevel || !(extent[widest] > 1e-30f)) return splitByCount(range, widest);
 
-    const Bins bins{centers.lower, (extent > 0).select(kBins / extent, 0)};
+    const Bins bins{centers.lower, (extent > 1e-30f).select(kBins / extent, 0)};
     const auto [axis, cut] = bestCut(range, bins);
     if (cut == 0) return splitByCount(range, widest);
     const auto middle = std::partition(items_.begin() + range.begin, items_.begin() + range.end,

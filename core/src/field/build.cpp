@@ -53,7 +53,7 @@ class Construction {
       : options_(options),
         progress_(progress),
         length_(referenceLength(distance.source(), domain)),
-        target_(options.targetError * std::pow(length_ / 2, 5)),
+        target_(scaledTarget(options, length_)),
         fitter_(distance, options, domain.diagonal().norm(), progress) {
     tree_.domain = domain;
     tree_.grid = options.grid;
@@ -63,8 +63,10 @@ class Construction {
     fitBaseCells();
     while (!(totalError_ <= target_) && !queue_.empty()) {
       refineRound();
-      if (totalError_ <= target_) sumTotalError();  // rounding in the running total must not end the construction early
+      // rounding in the running total must end the construction neither early nor never
+      if (totalError_ <= target_ || totalError_ < 1e-6 * lastSum_) sumTotalError();
     }
+    sumTotalError();
     FieldMetadata metadata;
     metadata.source = source;
     metadata.targetError = options_.targetError;
@@ -107,6 +109,7 @@ class Construction {
       tbb::parallel_for(begin, std::min(begin + kBaseChunk, count),
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
     }
+    coefficients_ = count * std::size_t(coefficientCount(degree));
     sumTotalError();
     for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
   }
@@ -127,6 +130,7 @@ class Construction {
   }
 
   void refineRound() {
+    checkFitsMemory(tree_.nodes.size(), coefficients_);
     report("refining", estimate_.update(double(fitter_.evaluations()), totalError_, target_));
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
@@ -155,13 +159,16 @@ class Construction {
     if (tree_.nodes.size() > 0xffffffffu - 8)
       throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
     totalError_ -= tree_.nodes[node].fit.error;
+    const std::size_t before = tree_.nodes[node].fit.coefficients.size();
     if (trial.raised && (!trial.children || prefersDegree(tree_.nodes[node].fit, trial))) {
       tree_.nodes[node].fit = std::move(*trial.raised);
       totalError_ += tree_.nodes[node].fit.error;
+      coefficients_ += tree_.nodes[node].fit.coefficients.size() - before;
       enqueue(node);
       return;
     }
     tree_.split(node, std::move(*trial.children));
+    coefficients_ += 7 * before;
     const std::uint32_t first = tree_.nodes[node].firstChild;
     for (std::uint32_t child = first; child < first + 8; ++child) {
       totalError_ += tree_.nodes[child].fit.error;
@@ -183,6 +190,7 @@ class Construction {
     totalError_ = 0;
     for (const BuildNode& node : tree_.nodes)
       if (node.firstChild == 0) totalError_ += node.fit.error;
+    lastSum_ = totalError_;
   }
 
   void report(std::string_view task, double fraction) const {
@@ -197,7 +205,9 @@ class Construction {
   CellFitter fitter_;
   BuildTree tree_;
   std::priority_queue<Entry> queue_;
-  double totalError_ = 0;
+  double totalError_ = 0;         ///< kept up step by step
+  double lastSum_ = 0;            ///< what it was when it was last summed anew
+  std::size_t coefficients_ = 0;  ///< of all leaves
   std::size_t steps_ = 0;
   ProgressEstimate estimate_;
 };

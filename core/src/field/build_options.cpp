@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "hpsdf/error.h"
@@ -21,10 +22,13 @@ template <typename... Parts>
 /// Memory of the machine in bytes.
 double physicalMemory() { return double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)); }
 
+// of the construction: a leaf's node, its queue entry, the vector of its fit, the final arrays
+constexpr double kBytesPerNode = 250;
+constexpr double kBytesPerCoefficient = 8;
+
 void checkGridFitsMemory(const BuildOptions& options) {
   const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
-  const double bytesPerCell =
-      250 + 8.0 * coefficientCount(startDegree(options));  // node, queue entry, fit, final arrays
+  const double bytesPerCell = kBytesPerNode + kBytesPerCoefficient * coefficientCount(startDegree(options));
   const double most =
       std::min(0.75 * physicalMemory() / bytesPerCell, 0xffffffff / double(coefficientCount(startDegree(options))));
   if (cells > most)
@@ -66,7 +70,26 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))
     refuse("the domain is empty, flat or not finite: expected lower < upper on every axis");
+  const double across = double(*std::ranges::max_element(options.grid)) * std::ldexp(1.0, options.maxDepth);
+  if (across > 0x1p32)
+    refuse("a grid of ", *std::ranges::max_element(options.grid), " cells halved ", options.maxDepth,
+           " times is finer than 2^32 cells an axis: take a coarser grid or a lower maximum depth");
   checkGridFitsMemory(options);
+}
+
+void checkFitsMemory(std::size_t nodes, std::size_t coefficients) {
+  const double bytes = kBytesPerNode * double(nodes) + kBytesPerCoefficient * double(coefficients);
+  if (bytes > 0.75 * physicalMemory())
+    refuse("the field has grown to ", nodes, " cells and ", std::ceil(bytes / 1e9),
+           " GB, more than this machine holds: take a larger target error or a lower maximum depth");
+}
+
+double scaledTarget(const BuildOptions& options, double referenceLength) {
+  const double target = options.targetError * std::pow(referenceLength / 2, 5);
+  if (!(target >= std::numeric_limits<double>::min()) || !std::isfinite(target))
+    refuse("target error ", options.targetError, " for a surface of size ", referenceLength,
+           " is beyond double precision: scale the mesh, or normalize it");
+  return target;
 }
 
 double referenceLength(const Source& source, const Box& domain) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "hpsdf/build.h"
 
 namespace hpsdf {
@@ -12,5 +14,11 @@ int startDegree(const BuildOptions& options);
 
 /// L, by which τ is scaled (see `BuildOptions::targetError`). Throws `Error` for a surface without extent.
 double referenceLength(const Source& source, const Box& domain);
+
+/// τ in the field's own units^5. Throws `Error` where that is no number that a double holds.
+double scaledTarget(const BuildOptions& options, double referenceLength);
+
+/// Throws `Error` where a tree of so many nodes and coefficients would not fit into the machine's memory.
+void checkFitsMemory(std::size_t nodes, std::size_t coefficients);
 
 }  // namespace hpsdf

@@ -61,13 +61,17 @@ std::array<double, 3> localFrom(const Location& at) {
 /// The closest point of the domain; NaN stays NaN.
 Vector3 clampedTo(const Box& domain, const Vector3& x) { return x.cwiseMax(domain.min()).cwiseMin(domain.max()); }
 
+/// Without squares, which overflow or vanish far from the domain or very close to it. (The hypot of three arguments
+/// of GCC 12 loses NaN and infinity.)
+double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
+
 template <typename T>
 double valueIn(const FieldData& field, const T* coefficients, const Vector3& x) {
   const Location at = locate(field, x);
   const std::uint64_t leaf = field.nodes[at.node];
   const double inside = evaluate(coefficients + node::offset(leaf), node::degree(leaf), localFrom(at));
   if (field.domain.contains(x)) return inside;
-  return inside + (x - clampedTo(field.domain, x)).norm();
+  return inside + length(x - clampedTo(field.domain, x));
 }
 
 template <typename T>
@@ -79,7 +83,7 @@ ValueAndGradient valueAndGradientIn(const FieldData& field, const T* coefficient
   if (field.domain.contains(x)) return result;
   // f(q) + |x - q|: along an axis on which x is clamped, f(q) does not change
   const Vector3 beyond = x - clampedTo(field.domain, x);
-  const double distance = beyond.norm();
+  const double distance = length(beyond);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
     if (beyond[axis] != 0) result.gradient[axis] = 0;

@@ -90,9 +90,11 @@ class Reader {
     const auto status = std::filesystem::status(file, problem);
     if (!std::filesystem::exists(status)) throw Error(file.string() + ": no such file; check the path");
     if (std::filesystem::is_directory(status)) throw Error(file.string() + ": is a folder; give a .hpsdf file");
+    if (!std::filesystem::is_regular_file(status))
+      throw Error(file.string() + ": is not a regular file; give a .hpsdf file");
     stream_.open(file, std::ios::binary);
     if (!stream_) throw Error(file.string() + ": cannot be opened; check its permissions");
-    size_ = std::filesystem::is_regular_file(status) ? std::filesystem::file_size(file, problem) : 0;
+    size_ = std::filesystem::file_size(file, problem);
     if (problem) size_ = 0;
   }
 
@@ -172,6 +174,8 @@ void header(Stream& stream, Data& data, SizesRef& sizes) {
   stream.item(m.source.faces);
   corner(m.source.box.min());
   corner(m.source.box.max());
+  corner(m.source.normalization.center);
+  stream.item(m.source.normalization.scale);
   stream.item(m.targetError);
   stream.item(m.totalError);
   stream.item(m.referenceLength);

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -31,7 +32,30 @@ std::filesystem::path resolved(const std::filesystem::path& file) {
   return target.empty() ? file : target;
 }
 
+/// Names of the temporary files in existence, for `removeUnfinished`. More than these at once are not remembered.
+std::array<std::atomic<const char*>, 16> unfinished{};
+static_assert(std::atomic<const char*>::is_always_lock_free, "a signal handler reads these");
+
+void remember(const char* name) {
+  for (auto& slot : unfinished) {
+    const char* none = nullptr;
+    if (slot.compare_exchange_strong(none, name)) return;
+  }
+}
+
+void forget(const char* name) {
+  for (auto& slot : unfinished) {
+    const char* expected = name;
+    if (slot.compare_exchange_strong(expected, nullptr)) return;
+  }
+}
+
 }  // namespace
+
+void OutputFile::removeUnfinished() noexcept {
+  for (const auto& slot : unfinished)
+    if (const char* name = slot.load()) unlink(name);
+}
 
 OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)) {
   if (file_.empty()) throw Error("the output file's name is empty; give a file name");
@@ -44,6 +68,7 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   temporary_ = temporaryBeside(file_);
   stream_ = std::fopen(temporary_.c_str(), "wbx");
   if (stream_ == nullptr) throw Error(file.string() + ": cannot be written (" + reason(errno) + "); check the folder");
+  remember(temporary_.c_str());
 }
 
 OutputFile::~OutputFile() {
@@ -51,6 +76,7 @@ OutputFile::~OutputFile() {
   std::fclose(stream_);
   std::error_code ignored;
   std::filesystem::remove(temporary_, ignored);
+  forget(temporary_.c_str());
 }
 
 void OutputFile::fail() {
@@ -66,6 +92,7 @@ void OutputFile::write(std::string_view text) { write(std::as_bytes(std::span(te
 void OutputFile::commit() {
   if (std::fflush(stream_) != 0 || fsync(fileno(stream_)) != 0) fail();
   if (std::rename(temporary_.c_str(), file_.c_str()) != 0) fail();
+  forget(temporary_.c_str());
   std::fclose(stream_);
   stream_ = nullptr;
 }

@@ -64,7 +64,8 @@ std::size_t dropWithoutArea(TriangleMesh& mesh) {
   return std::erase_if(mesh.triangles, [&](const Triangle& t) { return hasNoArea(mesh, t); });
 }
 
-/// Two faces over the same corners bound nothing, whichever way they look: the first stays.
+/// Of faces over the same corners the first stays, whichever way they look: of a sheet with two sides one remains. (The
+/// wall between two bodies that share a face remains too, and makes the mesh one that is not closed.)
 std::size_t dropDuplicates(TriangleMesh& mesh) {
   std::unordered_set<Triangle, HashBytes<std::uint32_t>> seen;
   seen.reserve(mesh.triangles.size());

@@ -95,12 +95,22 @@ std::uint64_t fingerprint(const TriangleMesh& mesh) {
   return hasher.digest();
 }
 
+Normalization normalizing(const Box& surface) {
+  const double longest = surface.isEmpty() ? 0 : surface.sizes().maxCoeff();
+  if (!(longest > 0) || !std::isfinite(longest))
+    throw Error("the surface cannot be normalized, for it has no finite extent; check its vertices");
+  return {surface.center(), 2 / longest};
+}
+
 TriangleMesh normalized(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
   const Box box = boundingBox(mesh);
-  const double longest = box.isEmpty() ? 0 : box.sizes().maxCoeff();
-  if (!(longest > 0) || !std::isfinite(longest))
-    throw Error(messagePrefix(mesh) + "cannot be normalized, for it has no finite extent; check its vertices");
+  try {
+    (void)normalizing(box);
+  } catch (const Error& error) {
+    throw Error(messagePrefix(mesh) + error.what());
+  }
+  const double longest = box.sizes().maxCoeff();
   TriangleMesh result = mesh;
   // (x - min) - (max - x) is 2(x - centre) without rounding the centre: on the longest side it is -longest at min and
   // longest at max in floating point too, and it never decreases with x, so that nothing leaves [-1, 1].
