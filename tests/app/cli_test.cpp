@@ -290,6 +290,7 @@ TEST_F(Cli, usageMistakesAreRefused) {
   expectRefused({{"slice", field(), "-o", at("x.gif")}}, "expected .png for a picture, .pfm or .csv");
   expectRefused({{"render", field(), "-o", at("x.csv")}}, "written as .png");
   expectRefused({{"slice", field(), "-o", at("x.pfm"), "--samples", "2"}}, "one sample a pixel");
+  expectRefused({{"render", field(), "-o", at("x.png"), "--cpu", "--gl", "software"}}, "cpu excludes gl");
 }
 
 TEST_F(Cli, buildWritesAFieldThatLoads) {
@@ -517,6 +518,18 @@ TEST_F(Cli, rawSlicesHoldTheFieldsValues) {
       if (!std::isnan(value)) inside.push_back(value);
     }
   EXPECT_EQ(inside, values);
+}
+
+TEST_F(Cli, viewsThatShowLittleAreNoted) {
+  const auto render = [&](const std::string& offset) {
+    const Outcome outcome =
+        run({{"render", field(), "-o", at("r.png"), "--size", "160x90", "--cpu", "--offset", offset}});
+    EXPECT_EQ(outcome.status, 0);
+    return outcome.err;
+  };
+  EXPECT_THAT(render("0"), IsEmpty());
+  EXPECT_THAT(render("5"), HasSubstr("no surface in view"));
+  EXPECT_THAT(render("0.9"), HasSubstr("domain"));
 }
 
 TEST_F(Cli, drawsWithOpenGl) {

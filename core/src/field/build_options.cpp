@@ -70,11 +70,11 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))
     refuse("the domain is empty, flat or not finite: expected lower < upper on every axis");
+  checkGridFitsMemory(options);
   const double across = double(*std::ranges::max_element(options.grid)) * std::ldexp(1.0, options.maxDepth);
   if (across > 0x1p32)
     refuse("a grid of ", *std::ranges::max_element(options.grid), " cells halved ", options.maxDepth,
            " times is finer than 2^32 cells an axis: take a coarser grid or a lower maximum depth");
-  checkGridFitsMemory(options);
 }
 
 void checkFitsMemory(std::size_t nodes, std::size_t coefficients) {
