@@ -120,12 +120,15 @@ double ExactDistance::operator()(const Vector3& x) const { return closestPoint(x
 
 void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  std::uint32_t slot = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    // the neighbour's nearest triangle is a tight bound from the outset
-    const auto& hierarchy = data_->hierarchy;
-    slot = (i == 0 ? hierarchy.nearest(points[i]) : hierarchy.nearest(points[i], slot)).slot;
-    out[i] = data_->resolve(points[i], slot).signedDistance;
+  using distance::kPacket;
+  std::array<distance::Nearest, kPacket> nearest{};  // of the packet before: a tight bound from the outset
+  for (std::size_t first = 0; first < points.size(); first += kPacket) {
+    const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
+    std::array<Vector3, kPacket> packet;
+    for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
+    data_->hierarchy.nearest(packet, nearest);
+    for (std::size_t i = 0; i < count; ++i)
+      out[first + i] = data_->resolve(packet[i], nearest[i].slot).signedDistance;
   }
 }
 

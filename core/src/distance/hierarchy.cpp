@@ -1,8 +1,12 @@
 #include "distance/hierarchy.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "distance/search.h"
 
 namespace hpsdf::distance {
 namespace {
@@ -13,15 +17,6 @@ constexpr int kBins = 16;
 /// Below this level nodes are halved by count, so that no input makes the tree deeper than kMaxLevel + 32 levels
 /// (2^32 triangles, each level at least halves a range).
 constexpr int kMaxLevel = 32;
-/// A level leaves at most three children waiting.
-constexpr std::size_t kStackSize = 3 * (kMaxLevel + 32) + 1;
-
-/// A child is an empty lane, a node's index, or a leaf: bit 31, count - 1 in bits 28 to 30, first slot in the rest.
-constexpr std::uint32_t kEmpty = 0x7fffffff;
-constexpr std::uint32_t kLeafBit = 0x80000000;
-constexpr std::uint32_t kSlotMask = 0x0fffffff;
-static_assert(kLeafSize <= 8);
-
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
@@ -62,13 +57,12 @@ std::array<Vector3, 3> cornersOf(const TriangleFrame& f) {
   return {f.origin, f.origin + f.along * f.length, f.origin + f.along * f.apexAlong + f.across * f.apexAcross};
 }
 
-}  // namespace
-
 /// Top-down: a node's range is split where the surface-area heuristic is least, then the child of largest area again,
 /// until there are four.
-class Hierarchy::Builder {
+class Builder {
  public:
-  Builder(Hierarchy& hierarchy, std::vector<Item> items) : nodes_(hierarchy.nodes_), items_(std::move(items)) {}
+  Builder(std::vector<Node>& nodes, std::vector<Block>& blocks, std::vector<Item> items)
+      : nodes_(nodes), blocks_(blocks), items_(std::move(items)) {}
 
   void build() {
     nodes_.reserve(items_.size() / 3 + 1);
@@ -76,6 +70,9 @@ class Hierarchy::Builder {
   }
 
   const std::vector<Item>& items() const { return items_; }
+
+  /// The slots, and the box along the axes, of each child of each node.
+  const std::vector<std::array<Range, kWidth>>& ranges() const { return ranges_; }
 
  private:
   Range makeRange(std::uint32_t begin, std::uint32_t end) const {
@@ -87,15 +84,12 @@ class Hierarchy::Builder {
   std::uint32_t buildNode(const Range& whole, int level) {
     const auto self = static_cast<std::uint32_t>(nodes_.size());
     nodes_.emplace_back();
-    std::array<Range, 4> parts;
+    ranges_.emplace_back();
+    std::array<Range, kWidth> parts;
     parts[0] = whole;
     const int count = divide(parts, level);
-    for (int lane = 0; lane < 4; ++lane) {
-      const FloatBox box = lane < count ? parts[lane].box : FloatBox{};
-      for (int axis = 0; axis < 3; ++axis) {
-        nodes_[self].lower[axis][lane] = box.lower[axis];
-        nodes_[self].upper[axis][lane] = box.upper[axis];
-      }
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (lane < count) ranges_[self][lane] = parts[lane];
       const std::uint32_t child = lane < count ? buildChild(parts[lane], level + 1) : kEmpty;
       nodes_[self].child[lane] = child;
     }
@@ -103,13 +97,14 @@ class Hierarchy::Builder {
   }
 
   std::uint32_t buildChild(const Range& range, int level) {
-    if (range.size() <= kLeafSize) return kLeafBit | (range.size() - 1) << 28 | range.begin;
-    return buildNode(range, level);
+    if (range.size() > kLeafSize) return buildNode(range, level);
+    blocks_.push_back({{}, range.begin, range.size()});
+    return kBlockBit | static_cast<std::uint32_t>(blocks_.size() - 1);
   }
 
-  int divide(std::array<Range, 4>& parts, int level) {
+  int divide(std::array<Range, kWidth>& parts, int level) {
     int count = 1;
-    while (count < 4) {
+    while (count < kWidth) {
       int largest = -1;
       for (int i = 0; i < count; ++i)
         if (parts[i].size() > kLeafSize && (largest < 0 || parts[i].box.area() > parts[largest].box.area()))
@@ -198,8 +193,111 @@ class Hierarchy::Builder {
   }
 
   std::vector<Node>& nodes_;
+  std::vector<Block>& blocks_;
   std::vector<Item> items_;
+  std::vector<std::array<Range, kWidth>> ranges_;
 };
+
+/// A box whose axes are `axes`' columns, as float, around the corners that `visit` shows.
+struct OrientedBox {
+  Eigen::Vector3f center, half;
+  Eigen::Matrix3f axes;
+
+  float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
+};
+
+template <typename Visit>
+OrientedBox boxAround(const Eigen::Matrix3d& directions, const Visit& visit) {
+  OrientedBox box;
+  box.axes = directions.cast<float>();
+  const Eigen::Matrix3d axes = box.axes.cast<double>();  // as rounded: what the extents are measured along
+  Vector3 low = Vector3::Constant(std::numeric_limits<double>::infinity());
+  Vector3 high = -low;
+  visit([&](const Vector3& corner) {
+    const Vector3 along = axes.transpose() * corner;
+    low = low.cwiseMin(along);
+    high = high.cwiseMax(along);
+  });
+  box.center = (axes * ((low + high) / 2)).cast<float>();
+  const Vector3 middle = axes.transpose() * box.center.cast<double>();
+  const Vector3 half = (high - middle).cwiseMax(middle - low);
+  for (int i = 0; i < 3; ++i) box.half[i] = roundedUp(half[i]);
+  return box;
+}
+
+/// Fits the boxes of the nodes, and the blocks' numbers, to triangles that lie in their final order.
+class Fitter {
+ public:
+  Fitter(const Hierarchy& hierarchy, const std::vector<TriangleFrame>& triangles)
+      : hierarchy_(hierarchy), triangles_(triangles) {}
+
+  void fit(Node& node, const std::array<Range, kWidth>& ranges) const {
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const OrientedBox box = ranges[lane].size() > 0 ? tightBox(ranges[lane]) : OrientedBox{};
+      for (int i = 0; i < 3; ++i) {
+        node.field[Node::center + i][lane] = box.center[i];
+        node.field[Node::half + i][lane] = box.half[i];
+        for (int k = 0; k < 3; ++k) node.field[Node::axes + 3 * i + k][lane] = box.axes(k, i);
+      }
+    }
+  }
+
+  void fit(Block& block) const {
+    for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+      const TriangleFrame& frame = triangles_[block.firstSlot + std::min(lane, block.count - 1)];
+      const double scale = hierarchy_.scale();
+      const Vector3 origin = hierarchy_.local(frame.origin);
+      const auto set = [&](int field, double value) { block.field[field][lane] = static_cast<float>(value); };
+      for (int i = 0; i < 3; ++i) {
+        set(Block::origin + i, origin[i]);
+        set(Block::along + i, frame.along[i]);
+        set(Block::across + i, frame.across[i]);
+      }
+      set(Block::length, frame.length * scale);
+      set(Block::apexAlong, frame.apexAlong * scale);
+      set(Block::apexAcross, frame.apexAcross * scale);
+      set(Block::inverseLeft, frame.inverseSquaredLeft / (scale * scale));
+      set(Block::inverseRight, frame.inverseSquaredRight / (scale * scale));
+    }
+  }
+
+ private:
+  OrientedBox tightBox(const Range& range) const {
+    const auto visitCorners = [&](const auto& visit) {
+      for (std::uint32_t slot = range.begin; slot < range.end; ++slot)
+        for (const Vector3& corner : cornersOf(triangles_[slot])) visit(hierarchy_.local(corner));
+    };
+    const OrientedBox upright = boxAround(Eigen::Matrix3d::Identity(), visitCorners);
+    const OrientedBox leaning = boxAround(axesOf(range, upright.center.cast<double>(), visitCorners), visitCorners);
+    return leaning.area() < upright.area() ? leaning : upright;
+  }
+
+  /// The mean normal, the widest direction across it, and the third.
+  template <typename Visit>
+  Eigen::Matrix3d axesOf(const Range& range, const Vector3& center, const Visit& visitCorners) const {
+    Vector3 normal = Vector3::Zero();
+    for (std::uint32_t slot = range.begin; slot < range.end; ++slot)
+      normal += triangles_[slot].normal * (triangles_[slot].length * triangles_[slot].apexAcross);
+    normal = normal.squaredNorm() > 0 ? Vector3(normal.normalized()) : Vector3(Vector3::UnitZ());
+    const Vector3 u = normal.unitOrthogonal();
+    const Vector3 v = normal.cross(u);
+    double uu = 0, uv = 0, vv = 0;
+    visitCorners([&](const Vector3& corner) {
+      const double a = u.dot(corner - center), b = v.dot(corner - center);
+      uu += a * a, uv += a * b, vv += b * b;
+    });
+    const double angle = std::atan2(2 * uv, uu - vv) / 2;
+    const Vector3 widest = std::cos(angle) * u + std::sin(angle) * v;
+    Eigen::Matrix3d axes;
+    axes << normal, widest, normal.cross(widest);
+    return axes;
+  }
+
+  const Hierarchy& hierarchy_;
+  const std::vector<TriangleFrame>& triangles_;
+};
+
+}  // namespace
 
 Hierarchy::Hierarchy(std::vector<TriangleFrame> triangles) {
   Box box;
@@ -222,69 +320,54 @@ Hierarchy::Hierarchy(std::vector<TriangleFrame> triangles) {
       items[i].box.extend(point);
     }
   }
-  Builder builder(*this, std::move(items));
+  Builder builder(nodes_, blocks_, std::move(items));
   builder.build();
   triangles_.reserve(triangles.size());
   for (const Item& item : builder.items()) triangles_.push_back(triangles[item.index]);
+  const Fitter fitter(*this, triangles_);
+  tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) { fitter.fit(nodes_[n], builder.ranges()[n]); });
+  tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { fitter.fit(blocks_[b]); });
 }
 
-Nearest Hierarchy::search(const Vector3& x, Nearest best) const {
-  const Eigen::Vector3f local = ((x - center_) * scale_).cast<float>();
-  const Eigen::Array4f px = Eigen::Array4f::Constant(local[0]);
-  const Eigen::Array4f py = Eigen::Array4f::Constant(local[1]);
-  const Eigen::Array4f pz = Eigen::Array4f::Constant(local[2]);
+namespace {
 
-  // A box counts as out of reach when its distance b exceeds that of the best triangle, d, by more than δ, which covers
-  // the roundings of x to float, of the box's corners and of d itself (relative ones: the factor below). Without a
-  // root: (d + δ)² ≤ (1 + s) d² + (1 + 1/s) δ², here with s = 1/1000 and some to spare.
-  const float reach = std::max(local.cwiseAbs().maxCoeff(), 1.0f);
-  const float delta = 4 * std::numeric_limits<float>::epsilon() * reach;
-  const float slack = 1100 * delta * delta;
-  const double relative = 1.002 * scale_ * scale_;
-  const auto limitOf = [&](double squared) { return static_cast<float>(squared * relative) + slack; };
-  float limit = limitOf(best.squaredDistance);
-
-  struct Waiting {
-    float squaredDistance;
-    std::uint32_t child;
-  };
-  std::array<Waiting, kStackSize> stack;
-  std::size_t top = 0;
-  std::uint32_t current = 0;
-  while (true) {
-    if (current & kLeafBit) {
-      const std::uint32_t first = current & kSlotMask;
-      const std::uint32_t last = first + ((current >> 28) & 7);
-      for (std::uint32_t slot = first; slot <= last; ++slot) {
-        const TriangleFrame& frame = triangles_[slot];
-        const double squared = squaredDistance(frame, x);
-        if (!(squared <= best.squaredDistance)) continue;  // also leaves out the NaN of an infinite x
-        if (squared == best.squaredDistance && frame.triangle >= best.triangle) continue;
-        best = {slot, squared, frame.triangle};
-        limit = limitOf(squared);
-      }
-    } else {
-      const Node& node = nodes_[current];
-      const Eigen::Array4f dx = (node.lower[0] - px).max(px - node.upper[0]).max(0.0f);
-      const Eigen::Array4f dy = (node.lower[1] - py).max(py - node.upper[1]).max(0.0f);
-      const Eigen::Array4f dz = (node.lower[2] - pz).max(pz - node.upper[2]).max(0.0f);
-      const Eigen::Array4f squared = dx * dx + dy * dy + dz * dz;
-      // farthest first onto the stack, so that the nearest comes off next
-      const std::size_t bottom = top;
-      for (int lane = 0; lane < 4; ++lane) {
-        if (!(squared[lane] <= limit) || node.child[lane] == kEmpty) continue;
-        std::size_t place = top++;
-        for (; place > bottom && stack[place - 1].squaredDistance < squared[lane]; --place)
-          stack[place] = stack[place - 1];
-        stack[place] = {squared[lane], node.child[lane]};
-      }
-    }
-    do {
-      if (top == 0) return best;
-      --top;
-    } while (!(stack[top].squaredDistance <= limit));
-    current = stack[top].child;
+/// Without a start the first triangle serves: the search needs some bound for the roundings it allows for.
+template <int Lanes>
+Search<Lanes> begin(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points,
+                    const std::array<std::uint32_t, Lanes>& starts) {
+  Search<Lanes> search(hierarchy);
+  search.exactPoint = points;
+  float reach = 1;
+  for (int lane = 0; lane < Lanes; ++lane) {
+    const Eigen::Vector3f local = hierarchy.local(points[lane]).template cast<float>();
+    for (int axis = 0; axis < 3; ++axis) search.point[axis][lane] = local[axis];
+    reach = std::max(reach, local.cwiseAbs().maxCoeff());
   }
+  search.delta = 32 * std::numeric_limits<float>::epsilon() * reach;
+  for (int lane = 0; lane < Lanes; ++lane) {
+    const TriangleFrame& frame = hierarchy.triangles()[starts[lane]];
+    search.best[lane] = {starts[lane], squaredDistance(frame, points[lane]), frame.triangle};
+    const float distance =
+        static_cast<float>(std::sqrt(search.best[lane].squaredDistance) * hierarchy.scale()) + search.delta;
+    search.limit[lane] = distance * distance * 1.000001f;
+  }
+  return search;
+}
+
+}  // namespace
+
+Nearest Hierarchy::nearest(const Vector3& x, std::uint32_t start) const {
+  Search<1> search = begin<1>(*this, {x}, {start});
+  walk(search);
+  return search.best[0];
+}
+
+void Hierarchy::nearest(const std::array<Vector3, kPacket>& points, std::array<Nearest, kPacket>& nearest) const {
+  std::array<std::uint32_t, kPacket> starts;
+  for (int lane = 0; lane < kPacket; ++lane) starts[lane] = nearest[lane].slot;
+  Search<kPacket> search = begin<kPacket>(*this, points, starts);
+  walk(search);
+  nearest = search.best;
 }
 
 }  // namespace hpsdf::distance

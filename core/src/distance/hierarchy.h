@@ -18,12 +18,34 @@ struct Nearest {
   std::uint32_t triangle = std::numeric_limits<std::uint32_t>::max();
 };
 
-/// Four-wide hierarchy of axis-aligned boxes over triangles.
+constexpr int kWidth = 4;   ///< children of a node, triangles of a block
+constexpr int kPacket = 8;  ///< points that search together
+
+/// Four oriented boxes as float, in coordinates that put the mesh into [-1, 1]³: 256 bytes.
+struct alignas(64) Node {
+  enum Field { center = 0, axes = 3, half = 12, fields = 15 };
+  float field[fields][kWidth];
+  /// Another node, or a block of triangles (kBlockBit), or nothing (kEmpty; its box is out of any reach).
+  std::uint32_t child[kWidth];
+};
+constexpr std::uint32_t kBlockBit = 0x80000000;
+constexpr std::uint32_t kEmpty = 0x7fffffff;
+
+/// Up to four triangles as float, in the same coordinates: a `TriangleFrame` without its normal. Unused lanes repeat
+/// the last triangle.
+struct alignas(32) Block {
+  enum Field { origin = 0, along = 3, across = 6, length = 9, apexAlong, apexAcross, inverseLeft, inverseRight, fields };
+  float field[fields][kWidth];
+  std::uint32_t firstSlot;
+  std::uint32_t count;
+};
+
+/// Hierarchy of oriented boxes over triangles, four to a node.
 ///
-/// Boxes only decide what to skip: they are kept as float, rounded outwards, in coordinates that put the mesh into
-/// [-1, 1]³, so that one node is two cache lines and its four boxes are one vector a plane. Distances to triangles are
-/// double. The answer is the minimum by (computed squared distance, mesh index) over *all* triangles: skipping allows
-/// for every rounding, hence the answer depends neither on the tree nor on where a search started.
+/// Nodes and blocks only decide what to skip: they are float, and every bound allows for the rounding, so that all
+/// triangles are left over that can be the nearest to rounding. Among those the answer is the minimum by (squared
+/// distance in double, mesh index): it depends neither on the tree nor on where a search started nor on the
+/// instruction set.
 class Hierarchy {
  public:
   /// At least one triangle, all coordinates finite; at most `kMaxTriangles`.
@@ -31,31 +53,30 @@ class Hierarchy {
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// Nearest triangle of x. `start`, if it is one of ours, bounds the search from the outset.
-  Nearest nearest(const Vector3& x) const { return search(x, Nearest{}); }
-  Nearest nearest(const Vector3& x, std::uint32_t start) const {
-    const TriangleFrame& frame = triangles_[start];
-    return search(x, {start, squaredDistance(frame, x), frame.triangle});
-  }
+  /// Nearest triangle of x. `start`, one of our slots, bounds the search from the outset.
+  Nearest nearest(const Vector3& x, std::uint32_t start = 0) const;
+
+  /// The same for `kPacket` points that lie close together, by one search. `nearest[i].slot` on entry: where to start.
+  void nearest(const std::array<Vector3, kPacket>& points, std::array<Nearest, kPacket>& nearest) const;
 
   /// In hierarchy order: `slot` counts these.
   const std::vector<TriangleFrame>& triangles() const { return triangles_; }
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const std::vector<Block>& blocks() const { return blocks_; }
 
-  std::size_t bytes() const { return triangles_.size() * sizeof(TriangleFrame) + nodes_.size() * sizeof(Node); }
+  std::size_t bytes() const {
+    return triangles_.size() * sizeof(TriangleFrame) + nodes_.size() * sizeof(Node) + blocks_.size() * sizeof(Block);
+  }
+
+  /// x in the boxes' coordinates.
+  Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
+  double scale() const { return scale_; }
 
  private:
-  struct Node {
-    std::array<Eigen::Array4f, 3> lower;  ///< an axis: that bound of the four children
-    std::array<Eigen::Array4f, 3> upper;
-    std::array<std::uint32_t, 4> child;
-  };
-  class Builder;
-
-  Nearest search(const Vector3& x, Nearest best) const;
-
   std::vector<TriangleFrame> triangles_;
   std::vector<Node> nodes_;
-  Vector3 center_;    ///< box coordinates = (x - center_)·scale_
+  std::vector<Block> blocks_;
+  Vector3 center_;    ///< local coordinates = (x - center_)·scale_
   double scale_ = 1;  ///< 1/half of the longest side of the mesh's box
 };
 
