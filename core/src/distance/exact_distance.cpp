@@ -61,11 +61,10 @@ double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
 struct ExactDistance::Data {
   explicit Data(const TriangleMesh& mesh) : Data(mesh, makeFrames(mesh)) {}
 
-  /// What x is to the triangle at `slot`, which is nearest: from the mesh's own corners, so that a point on a vertex is
-  /// at distance 0.
-  ClosestPoint resolve(const Vector3& x, std::uint32_t slot) const {
-    const TriangleFrame& frame = hierarchy.triangles()[slot];
-    const FramePoint point = distance::locate(frame, x);
+  /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0.
+  ClosestPoint resolve(const Vector3& x, const distance::Nearest& nearest) const {
+    const TriangleFrame& frame = hierarchy.frameAt(nearest.place);
+    const FramePoint& point = nearest.point;
     std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
     if (point.side[2] < point.side[side]) side = 2;
     // within the roundings of a place in the plane, a point on a side is no point of the face
@@ -128,12 +127,12 @@ void ExactDistance::operator()(std::span<const Vector3> points, std::span<double
     for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
     data_->hierarchy.nearest(packet, nearest);
     for (std::size_t i = 0; i < count; ++i)
-      out[first + i] = data_->resolve(packet[i], nearest[i].slot).signedDistance;
+      out[first + i] = data_->resolve(packet[i], nearest[i]).signedDistance;
   }
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  return data_->resolve(x, data_->hierarchy.nearest(x).slot);
+  return data_->resolve(x, data_->hierarchy.nearest(x));
 }
 
 const Source& ExactDistance::source() const { return data_->source; }

@@ -244,7 +244,7 @@ class Fitter {
 
   void fit(Block& block) const {
     for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-      const TriangleFrame& frame = triangles_[block.firstSlot + std::min(lane, block.count - 1)];
+      const TriangleFrame& frame = triangles_[block.first + std::min(lane, block.count - 1)];
       const double scale = hierarchy_.scale();
       const Vector3 origin = hierarchy_.local(frame.origin);
       const auto set = [&](int field, double value) { block.field[field][lane] = static_cast<float>(value); };
@@ -329,45 +329,17 @@ Hierarchy::Hierarchy(std::vector<TriangleFrame> triangles) {
   tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { fitter.fit(blocks_[b]); });
 }
 
-namespace {
-
-/// Without a start the first triangle serves: the search needs some bound for the roundings it allows for.
-template <int Lanes>
-Search<Lanes> begin(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points,
-                    const std::array<std::uint32_t, Lanes>& starts) {
-  Search<Lanes> search(hierarchy);
-  search.exactPoint = points;
-  float reach = 1;
-  for (int lane = 0; lane < Lanes; ++lane) {
-    const Eigen::Vector3f local = hierarchy.local(points[lane]).template cast<float>();
-    for (int axis = 0; axis < 3; ++axis) search.point[axis][lane] = local[axis];
-    reach = std::max(reach, local.cwiseAbs().maxCoeff());
-  }
-  search.delta = 32 * std::numeric_limits<float>::epsilon() * reach;
-  for (int lane = 0; lane < Lanes; ++lane) {
-    const TriangleFrame& frame = hierarchy.triangles()[starts[lane]];
-    search.best[lane] = {starts[lane], squaredDistance(frame, points[lane]), frame.triangle};
-    const float distance =
-        static_cast<float>(std::sqrt(search.best[lane].squaredDistance) * hierarchy.scale()) + search.delta;
-    search.limit[lane] = distance * distance * 1.000001f;
-  }
-  return search;
-}
-
-}  // namespace
-
-Nearest Hierarchy::nearest(const Vector3& x, std::uint32_t start) const {
-  Search<1> search = begin<1>(*this, {x}, {start});
-  walk(search);
-  return search.best[0];
+Nearest Hierarchy::nearest(const Vector3& x) const {
+  Search<1> search(*this, {x});
+  run(search);
+  return search.result(0);
 }
 
 void Hierarchy::nearest(const std::array<Vector3, kPacket>& points, std::array<Nearest, kPacket>& nearest) const {
-  std::array<std::uint32_t, kPacket> starts;
-  for (int lane = 0; lane < kPacket; ++lane) starts[lane] = nearest[lane].slot;
-  Search<kPacket> search = begin<kPacket>(*this, points, starts);
-  walk(search);
-  nearest = search.best;
+  Search<kPacket> search(*this, points);
+  for (const Nearest& start : nearest) search.addSeed(start.place);
+  run(search);
+  for (int lane = 0; lane < kPacket; ++lane) nearest[lane] = search.result(lane);
 }
 
 }  // namespace hpsdf::distance

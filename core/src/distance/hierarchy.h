@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "distance/triangle_frame.h"
@@ -11,11 +10,10 @@
 
 namespace hpsdf::distance {
 
-/// The nearest triangle so far: its place in hierarchy order, its squared distance, its index in the mesh.
+/// The nearest triangle of a point.
 struct Nearest {
-  std::uint32_t slot = 0;
-  double squaredDistance = std::numeric_limits<double>::infinity();
-  std::uint32_t triangle = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t place = 0;  ///< see `Hierarchy::frameAt`; to start a neighbour's search from
+  FramePoint point;         ///< the point in that triangle's frame
 };
 
 constexpr int kWidth = 4;   ///< children of a node, triangles of a block
@@ -36,7 +34,7 @@ constexpr std::uint32_t kEmpty = 0x7fffffff;
 struct alignas(32) Block {
   enum Field { origin = 0, along = 3, across = 6, length = 9, apexAlong, apexAcross, inverseLeft, inverseRight, fields };
   float field[fields][kWidth];
-  std::uint32_t firstSlot;
+  std::uint32_t first;  ///< its first triangle's frame; the others follow
   std::uint32_t count;
 };
 
@@ -53,14 +51,17 @@ class Hierarchy {
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// Nearest triangle of x. `start`, one of our slots, bounds the search from the outset.
-  Nearest nearest(const Vector3& x, std::uint32_t start = 0) const;
+  Nearest nearest(const Vector3& x) const;
 
-  /// The same for `kPacket` points that lie close together, by one search. `nearest[i].slot` on entry: where to start.
+  /// The same for `kPacket` points that lie close together, by one search. `nearest` on entry: places to start from,
+  /// such as the result for points nearby.
   void nearest(const std::array<Vector3, kPacket>& points, std::array<Nearest, kPacket>& nearest) const;
 
-  /// In hierarchy order: `slot` counts these.
-  const std::vector<TriangleFrame>& triangles() const { return triangles_; }
+  /// The triangle at a place: number `place % kWidth` of block `place / kWidth`.
+  const TriangleFrame& frameAt(std::uint32_t place) const {
+    return triangles_[blocks_[place / kWidth].first + place % kWidth];
+  }
+
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Block>& blocks() const { return blocks_; }
 
@@ -73,7 +74,7 @@ class Hierarchy {
   double scale() const { return scale_; }
 
  private:
-  std::vector<TriangleFrame> triangles_;
+  std::vector<TriangleFrame> triangles_;  ///< a block's one after another
   std::vector<Node> nodes_;
   std::vector<Block> blocks_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "distance/search.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -86,12 +90,107 @@ HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
+/// A point in a triangle's frame, as `locate` of triangle_frame.h has it: the same operations in the same order, none of
+/// them fused, so that the results are the same to the bit on every instruction set.
+template <class D>
+struct Located {
+  hn::Vec<D> squared, height, side[3], inside;
+};
+
+template <class D>
+HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::Vec<D>>& point) {
+  const auto number = [&](double value) HWY_ATTR { return hn::Set(d, value); };
+  const auto zero = hn::Zero(d), one = number(1.0);
+  const auto unit = [&](auto t) HWY_ATTR { return hn::Min(hn::Max(t, zero), one); };
+  const auto wx = point.x - number(f.origin[0]), wy = point.y - number(f.origin[1]), wz = point.z - number(f.origin[2]);
+  const auto dot = [&](const Vector3& v) HWY_ATTR { return wx * number(v[0]) + wy * number(v[1]) + wz * number(v[2]); };
+  const auto p = dot(f.along), q = dot(f.across), height = dot(f.normal);
+  const auto length = number(f.length), apexAlong = number(f.apexAlong), apexAcross = number(f.apexAcross);
+
+  const auto base = p - hn::Min(hn::Max(p, zero), length);
+  const auto left = unit((p * apexAlong + q * apexAcross) * number(f.inverseSquaredLeft));
+  const auto leftP = p - left * apexAlong, leftQ = q - left * apexAcross;
+  const auto fromB = p - length, rightAlong = apexAlong - length;
+  const auto right = unit((fromB * rightAlong + q * apexAcross) * number(f.inverseSquaredRight));
+  const auto rightP = fromB - right * rightAlong, rightQ = q - right * apexAcross;
+  const auto inside =
+      hn::And(q > zero, hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
+  Located<D> at{zero, height, {base * base + q * q, rightP * rightP + rightQ * rightQ, leftP * leftP + leftQ * leftQ},
+                hn::IfThenElseZero(inside, one)};
+  at.squared =
+      height * height + hn::IfThenZeroElse(inside, hn::Min(hn::Min(at.side[0], at.side[1]), at.side[2]));
+  return at;
+}
+
+/// Computes the distances to the candidates in double, keeps what is nearer, and empties the list.
+template <int Lanes>
+HWY_INLINE void settle(Search<Lanes>& s) {
+  const hn::CappedTag<double, Lanes> d;
+  constexpr std::size_t kStep = hn::MaxLanes(d);
+  for (int c = 0; c < s.count; ++c) {
+    bool inReach = false;
+    for (int lane = 0; lane < Lanes; ++lane) inReach |= s.lower[c][lane] <= s.limit[lane];
+    if (!inReach) continue;
+    const TriangleFrame& frame = s.hierarchy.frameAt(s.candidates[c]);
+    const auto triangle = hn::Set(d, static_cast<double>(frame.triangle));
+    const auto placed = hn::Set(d, static_cast<double>(s.candidates[c]));
+    for (std::size_t at = 0; at < Lanes; at += kStep) {
+      const auto found = locateLanes(d, frame,
+                                     Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
+                                                                 hn::Load(d, s.exact[2] + at)});
+      const auto best = hn::Load(d, s.squared + at);
+      const auto better = hn::Or(found.squared < best,
+                                 hn::And(found.squared == best, triangle < hn::Load(d, s.triangle + at)));
+      if (hn::AllFalse(d, better)) continue;
+      const auto keep = [&](double* kept, auto value) HWY_ATTR {
+        hn::Store(hn::IfThenElse(better, value, hn::Load(d, kept + at)), d, kept + at);
+      };
+      keep(s.squared, found.squared);
+      keep(s.triangle, triangle);
+      keep(s.place, placed);
+      keep(s.height, found.height);
+      for (int side = 0; side < 3; ++side) keep(s.side[side], found.side[side]);
+      keep(s.inside, found.inside);
+    }
+  }
+  s.count = 0;
+}
+
+/// For points too far for float: every triangle is a candidate.
+template <int Lanes>
+void tryAll(Search<Lanes>& s) {
+  const auto& blocks = s.hierarchy.blocks();
+  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+    if (s.count + kWidth > s.kCapacity) settle(s);
+    for (std::uint32_t i = 0; i < blocks[b].count; ++i) {
+      std::fill_n(s.lower[s.count], Lanes, 0.0f);
+      s.candidates[s.count++] = b * kWidth + i;
+    }
+  }
+  settle(s);
+}
+
+template <int Lanes>
+HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
+  for (int i = 0; i < s.seeds; ++i)
+    if (s.seed[i] == block) return true;
+  return false;
+}
+
+/// Brings what waits next into the cache while other work goes on.
+HWY_INLINE void fetch(const Node* nodes, const Block* blocks, std::uint32_t child) {
+  const char* from = child & kBlockBit ? reinterpret_cast<const char*>(blocks + (child & ~kBlockBit))
+                                       : reinterpret_cast<const char*>(nodes + child);
+  for (std::size_t line = 0; line < sizeof(Node); line += 64) hwy::Prefetch(from + line);
+}
+
 struct Waiting {
   float key;
   std::uint32_t child;
 };
 
-void walkOne(Search<1>& s) {
+void runOne(Search<1>& s) {
+  if (s.tooFar) return tryAll(s);
   const hn::CappedTag<float, kWidth> d;
   constexpr std::size_t kStep = hn::MaxLanes(d);
   const Node* nodes = s.hierarchy.nodes().data();
@@ -100,41 +199,44 @@ void walkOne(Search<1>& s) {
                                           hn::Set(d, s.point[2][0])};
   std::array<Waiting, kStackSize> stack;
   std::size_t top = 0;
+  HWY_ALIGN float lower[kWidth];
+  const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
+    const Block& block = blocks[place];
+    HWY_ALIGN float limit[kWidth];
+    for (std::size_t at = 0; at < kWidth; at += kStep) {
+      const auto bounds = triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, block.field[f] + at); });
+      hn::Store(bounds.lower, d, lower + at);
+      hn::Store(limitFrom(d, bounds.upper, s.delta), d, limit + at);
+    }
+    if (s.count + kWidth > s.kCapacity) settle(s);
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      if (!(lower[i] <= s.limit[0])) continue;
+      s.limit[0] = std::min(s.limit[0], limit[i]);
+      s.lower[s.count][0] = lower[i];
+      s.candidates[s.count++] = place * kWidth + i;
+    }
+  };
+  const auto visitNode = [&](const Node& node) HWY_ATTR {
+    for (std::size_t at = 0; at < kWidth; at += kStep)
+      hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, node.field[f] + at); }), d, lower + at);
+    // farthest first onto the stack, so that the nearest comes off next
+    const std::size_t bottom = top;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (!(lower[lane] <= s.limit[0]) || node.child[lane] == kEmpty) continue;
+      std::size_t place = top++;
+      for (; place > bottom && stack[place - 1].key < lower[lane]; --place) stack[place] = stack[place - 1];
+      stack[place] = {lower[lane], node.child[lane]};
+    }
+  };
+  for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
   std::uint32_t current = 0;
   while (true) {
-    HWY_ALIGN float lower[kWidth];
-    if (current & kBlockBit) {
-      const Block& block = blocks[current & ~kBlockBit];
-      HWY_ALIGN float limit[kWidth];
-      for (std::size_t at = 0; at < kWidth; at += kStep) {
-        const auto bounds =
-            triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, block.field[f] + at); });
-        hn::Store(bounds.lower, d, lower + at);
-        hn::Store(limitFrom(d, bounds.upper, s.delta), d, limit + at);
-      }
-      if (s.count + kWidth > s.kCapacity) s.settle();
-      for (std::uint32_t i = 0; i < block.count; ++i) {
-        if (!(lower[i] <= s.limit[0])) continue;
-        s.limit[0] = std::min(s.limit[0], limit[i]);
-        s.lower[s.count][0] = lower[i];
-        s.candidates[s.count++] = block.firstSlot + i;
-      }
-    } else {
-      const Node& node = nodes[current];
-      for (std::size_t at = 0; at < kWidth; at += kStep)
-        hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, node.field[f] + at); }), d,
-                  lower + at);
-      // farthest first onto the stack, so that the nearest comes off next
-      const std::size_t bottom = top;
-      for (int lane = 0; lane < kWidth; ++lane) {
-        if (!(lower[lane] <= s.limit[0]) || node.child[lane] == kEmpty) continue;
-        std::size_t place = top++;
-        for (; place > bottom && stack[place - 1].key < lower[lane]; --place) stack[place] = stack[place - 1];
-        stack[place] = {lower[lane], node.child[lane]};
-      }
-    }
+    if (!(current & kBlockBit))
+      visitNode(nodes[current]);
+    else if (!isSeed(s, current & ~kBlockBit))
+      visitBlock(current & ~kBlockBit);
     do {
-      if (top == 0) return;
+      if (top == 0) return settle(s);
       --top;
     } while (!(stack[top].key <= s.limit[0]));
     current = stack[top].child;
@@ -143,7 +245,6 @@ void walkOne(Search<1>& s) {
 
 using PacketTag = hn::CappedTag<float, kPacket>;
 constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
-constexpr std::size_t kParts = kPacket / kLanes;
 
 struct PacketWaiting {
   alignas(32) float lower[kPacket];
@@ -151,71 +252,82 @@ struct PacketWaiting {
   std::uint32_t child;
 };
 
-void walkPacket(Search<kPacket>& s) {
+HWY_INLINE bool anyInReach(PacketTag d, const float* lower, const float* limit) {
+  auto within = hn::Load(d, lower) <= hn::Load(d, limit);
+  for (std::size_t at = kLanes; at < kPacket; at += kLanes)
+    within = hn::Or(within, hn::Load(d, lower + at) <= hn::Load(d, limit + at));
+  return !hn::AllFalse(d, within);
+}
+
+HWY_INLINE float least(PacketTag d, const float* lower) {
+  auto all = hn::Load(d, lower);
+  for (std::size_t at = kLanes; at < kPacket; at += kLanes) all = hn::Min(all, hn::Load(d, lower + at));
+  return hn::GetLane(hn::MinOfLanes(d, all));
+}
+
+void runPacket(Search<kPacket>& s) {
+  if (s.tooFar) return tryAll(s);
   const PacketTag d;
   using V = hn::Vec<PacketTag>;
   const Node* nodes = s.hierarchy.nodes().data();
   const Block* blocks = s.hierarchy.blocks().data();
   std::array<PacketWaiting, kStackSize> stack;
   std::size_t top = 0;
+  const auto pointAt = [&](std::size_t at) HWY_ATTR {
+    return Point<V>{hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
+  };
+  // Both loops compute all first and branch after: what comes out is hard to predict.
+  const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
+    const Block& block = blocks[place];
+    if (s.count + kWidth > s.kCapacity) settle(s);
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      float* lower = s.lower[s.count];
+      for (std::size_t at = 0; at < kPacket; at += kLanes) {
+        const auto bounds =
+            triangleDistance(d, pointAt(at), [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
+        hn::Store(bounds.lower, d, lower + at);
+        hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, bounds.upper, s.delta)), d, s.limit + at);
+      }
+      s.candidates[s.count] = place * kWidth + i;
+      s.count += anyInReach(d, lower, s.limit);
+    }
+  };
+  const auto visitNode = [&](const Node& node) HWY_ATTR {
+    alignas(64) float lower[kWidth][kPacket];
+    for (std::size_t at = 0; at < kPacket; at += kLanes) {
+      const Point<V> point = pointAt(at);
+      HWY_UNROLL(4)
+      for (int child = 0; child < kWidth; ++child)
+        hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); }), d,
+                  lower[child] + at);
+    }
+    unsigned hits = 0;
+    for (int child = 0; child < kWidth; ++child)
+      hits |= unsigned{anyInReach(d, lower[child], s.limit) && node.child[child] != kEmpty} << child;
+    // farthest first onto the stack, so that the nearest comes off next
+    const std::size_t bottom = top;
+    for (; hits != 0; hits &= hits - 1) {
+      const int child = std::countr_zero(hits);
+      const float key = least(d, lower[child]);
+      std::size_t place = top++;
+      for (; place > bottom && stack[place - 1].key < key; --place) stack[place] = stack[place - 1];
+      std::copy_n(lower[child], kPacket, stack[place].lower);
+      stack[place].key = key;
+      stack[place].child = node.child[child];
+      fetch(nodes, blocks, node.child[child]);
+    }
+  };
+  for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
   std::uint32_t current = 0;
-  const auto pointOf = [&](std::size_t part) HWY_ATTR {
-    return Point<V>{hn::Load(d, s.point[0] + part * kLanes), hn::Load(d, s.point[1] + part * kLanes),
-                    hn::Load(d, s.point[2] + part * kLanes)};
-  };
-  const auto inReach = [&](const float* lower) HWY_ATTR {
-    for (std::size_t part = 0; part < kParts; ++part) {
-      const std::size_t at = part * kLanes;
-      if (!hn::AllFalse(d, hn::Load(d, lower + at) <= hn::Load(d, s.limit + at))) return true;
-    }
-    return false;
-  };
   while (true) {
-    if (current & kBlockBit) {
-      const Block& block = blocks[current & ~kBlockBit];
-      for (std::uint32_t i = 0; i < block.count; ++i) {
-        if (s.count == s.kCapacity) s.settle();
-        bool any = false;
-        for (std::size_t part = 0; part < kParts; ++part) {
-          const std::size_t at = part * kLanes;
-          const auto bounds = triangleDistance(d, pointOf(part),
-                                               [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
-          const auto limit = hn::Load(d, s.limit + at);
-          hn::Store(bounds.lower, d, s.lower[s.count] + at);
-          if (hn::AllFalse(d, bounds.lower <= limit)) continue;
-          any = true;
-          hn::Store(hn::Min(limit, limitFrom(d, bounds.upper, s.delta)), d, s.limit + at);
-        }
-        if (any) s.candidates[s.count++] = block.firstSlot + i;
-      }
-    } else {
-      const Node& node = nodes[current];
-      const std::size_t bottom = top;
-      for (int child = 0; child < kWidth; ++child) {
-        if (node.child[child] == kEmpty) break;
-        PacketWaiting waiting;
-        auto least = hn::Set(d, 3e38f);
-        bool any = false;
-        for (std::size_t part = 0; part < kParts; ++part) {
-          const std::size_t at = part * kLanes;
-          const auto lower =
-              boxDistance(d, pointOf(part), [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); });
-          hn::Store(lower, d, waiting.lower + at);
-          any |= !hn::AllFalse(d, lower <= hn::Load(d, s.limit + at));
-          least = hn::Min(least, lower);
-        }
-        if (!any) continue;
-        waiting.key = hn::GetLane(hn::MinOfLanes(d, least));
-        waiting.child = node.child[child];
-        std::size_t place = top++;
-        for (; place > bottom && stack[place - 1].key < waiting.key; --place) stack[place] = stack[place - 1];
-        stack[place] = waiting;
-      }
-    }
+    if (!(current & kBlockBit))
+      visitNode(nodes[current]);
+    else if (!isSeed(s, current & ~kBlockBit))
+      visitBlock(current & ~kBlockBit);
     do {
-      if (top == 0) return;
+      if (top == 0) return settle(s);
       --top;
-    } while (!inReach(stack[top].lower));
+    } while (!anyInReach(d, stack[top].lower, s.limit));
     current = stack[top].child;
   }
 }
@@ -228,34 +340,45 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace hpsdf::distance {
 
-HWY_EXPORT(walkOne);
-HWY_EXPORT(walkPacket);
+HWY_EXPORT(runOne);
+HWY_EXPORT(runPacket);
 
-void walk(Search<1>& search) {
-  HWY_DYNAMIC_DISPATCH(walkOne)(search);
-  search.settle();
-}
+void run(Search<1>& search) { HWY_DYNAMIC_DISPATCH(runOne)(search); }
+void run(Search<kPacket>& search) { HWY_DYNAMIC_DISPATCH(runPacket)(search); }
 
-void walk(Search<kPacket>& search) {
-  HWY_DYNAMIC_DISPATCH(walkPacket)(search);
-  search.settle();
+template <int Lanes>
+Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& points) : hierarchy(tree) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double reach = 1;
+  for (int lane = 0; lane < Lanes; ++lane) {
+    const Vector3 local = hierarchy.local(points[lane]);
+    for (int axis = 0; axis < 3; ++axis) {
+      exact[axis][lane] = points[lane][axis];
+      point[axis][lane] = static_cast<float>(local[axis]);
+      if (!(std::abs(local[axis]) <= reach)) reach = std::abs(local[axis]);
+    }
+    limit[lane] = std::numeric_limits<float>::infinity();
+    squared[lane] = kInfinity;
+    triangle[lane] = kInfinity;
+  }
+  tooFar = !(reach < 1e15);
+  delta = 32 * std::numeric_limits<float>::epsilon() * static_cast<float>(reach);
 }
 
 template <int Lanes>
-void Search<Lanes>::settle() {
-  for (int c = 0; c < count; ++c) {
-    const std::uint32_t slot = candidates[c];
-    const TriangleFrame& frame = hierarchy.triangles()[slot];
-    for (int lane = 0; lane < Lanes; ++lane) {
-      if (!(lower[c][lane] <= limit[lane]) || best[lane].slot == slot) continue;
-      const double squared = squaredDistance(frame, exactPoint[lane]);
-      Nearest& nearest = best[lane];
-      if (!(squared <= nearest.squaredDistance)) continue;
-      if (squared == nearest.squaredDistance && frame.triangle >= nearest.triangle) continue;
-      nearest = {slot, squared, frame.triangle};
-    }
+void Search<Lanes>::addSeed(std::uint32_t place) {
+  const std::uint32_t block = place / kWidth;
+  if (std::find(seed.begin(), seed.begin() + seeds, block) == seed.begin() + seeds) seed[seeds++] = block;
+}
+
+template <int Lanes>
+Nearest Search<Lanes>::result(int lane) const {
+  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // a point that is not finite
+    const TriangleFrame& frame = hierarchy.frameAt(0);
+    return {0, locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane]))};
   }
-  count = 0;
+  return {static_cast<std::uint32_t>(place[lane]),
+          {height[lane], {side[0][lane], side[1][lane], side[2][lane]}, inside[lane] != 0}};
 }
 
 template struct Search<1>;

@@ -9,32 +9,47 @@
 
 namespace hpsdf::distance {
 
-/// `Lanes` points on their way through the hierarchy. Squares are of float distances in the hierarchy's coordinates.
+/// `Lanes` points on their way through the hierarchy. Squares of float are of distances in the hierarchy's coordinates.
 template <int Lanes>
 struct Search {
   static constexpr int kCapacity = 96;  ///< candidates between two settlements
 
-  explicit Search(const Hierarchy& tree) : hierarchy(tree) {}
+  /// Points whose float coordinates or their squares would overflow try all triangles.
+  Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
-  /// Computes the distances to the candidates in double, keeps what is nearer, and empties the list.
-  void settle();
+  void addSeed(std::uint32_t place);
+
+  /// Lane by lane: the nearest triangle.
+  Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
+  bool tooFar = false;  ///< for float
+
   alignas(64) float point[3][Lanes];
   alignas(64) float limit[Lanes];  ///< squares above are out of reach
-  float delta = 0;                 ///< bound of what rounding does to a distance
+  float delta;                     ///< bounds what rounding does to a distance
+  int seeds = 0;
+  std::array<std::uint32_t, Lanes> seed;  ///< blocks to visit first, once each
+
   int count = 0;
-  std::array<std::uint32_t, kCapacity> candidates;  ///< slots
-  alignas(64) float lower[kCapacity][Lanes];  ///< of each candidate: bound of its squared distance
-  std::array<Vector3, Lanes> exactPoint;
-  std::array<Nearest, Lanes> best;
+  std::array<std::uint32_t, kCapacity> candidates;  ///< places
+  alignas(64) float lower[kCapacity][Lanes];        ///< of each candidate: bound of its squared distance
+
+  // in double: the points, and what is best among the candidates settled so far
+  alignas(64) double exact[3][Lanes];
+  alignas(64) double squared[Lanes];
+  alignas(64) double triangle[Lanes];  ///< index in the mesh
+  alignas(64) double place[Lanes];
+  alignas(64) double height[Lanes];
+  alignas(64) double side[3][Lanes];
+  alignas(64) double inside[Lanes];  ///< 1 or 0
 };
 
 extern template struct Search<1>;
 extern template struct Search<kPacket>;
 
-/// Walks the hierarchy by the best instruction set at hand; `best` is settled at the end.
-void walk(Search<1>& search);
-void walk(Search<kPacket>& search);
+/// Runs the search by the best instruction set at hand.
+void run(Search<1>& search);
+void run(Search<kPacket>& search);
 
 }  // namespace hpsdf::distance

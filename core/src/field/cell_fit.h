@@ -45,7 +45,8 @@ class CellFitter {
  private:
   /// Quadrature of one degree p and the projections that use its points.
   struct Rules {
-    QuadratureRule points;
+    QuadratureRule points;             ///< an axis
+    std::vector<std::uint32_t> order;  ///< in which the samples are taken
     Projection own;     ///< onto degree p, from the cell's own points
     Projection raised;  ///< onto degree p+1, from the points of the eight children
   };
@@ -55,7 +56,7 @@ class CellFitter {
   };
 
   const Rules& rules(int degree) const;
-  Samples sample(const Box& cell, const QuadratureRule& rule) const;
+  Samples sample(const Box& cell, const Rules& rules) const;
   Fit project(const Projection& projection, const Box& cell, std::span<const double> samples, bool outsideBand) const;
   double nearnessWeight(const Fit& fit) const;
   double shellError(const Fit& fit, double volume) const;
