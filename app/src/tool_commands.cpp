@@ -8,6 +8,7 @@
 #include "building.h"
 #include "commands.h"
 #include "help.h"
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
 #include "machine.h"
 #include "pictures.h"
@@ -128,7 +129,7 @@ void runDoctor(Session& session, const Arguments& arguments) {
                                              {"renderer_problem", problem.empty() ? Json() : Json(problem)},
                                              {"processor", processorName()},
                                              {"simd", instructions},
-                                             {"simd_used", "baseline"},
+                                             {"simd_used", instructionSet()},
                                              {"threads", threads},
                                              {"assimp", assimpVersion()}});
   }
@@ -142,8 +143,9 @@ void runDoctor(Session& session, const Arguments& arguments) {
   row("compiler", compilerText());
   row("renderer", problem.empty() ? renderer : "none: " + problem);
   row("processor", processorName());
-  row("SIMD", fmt::format("has {}; the program uses the baseline of x86-64 only",
-                          present.empty() ? "none beyond it" : fmt::format("{}", fmt::join(present, ", "))));
+  row("SIMD",
+      fmt::format("{}; exact distances use {}",
+                  present.empty() ? "the baseline" : fmt::format("{}", fmt::join(present, ", ")), instructionSet()));
   row("threads", std::to_string(threads));
   row("assimp", assimpVersion());
 }

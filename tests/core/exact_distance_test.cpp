@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
@@ -13,7 +14,9 @@
 #include <numbers>
 #include <numeric>
 #include <random>
+#include <set>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -618,6 +621,31 @@ TEST(ExactDistance, SingleBatchedShuffledAndThreadedAgreeBitForBit) {
     distance(std::span(points).subspan(begin, end - begin), std::span(threaded).subspan(begin, end - begin));
   });
   expectSameBits(single, threaded);
+}
+
+/// Every instruction set that this processor has, down to none at all.
+TEST(ExactDistance, InstructionSetsAgreeBitForBit) {
+  const TriangleMesh mesh = sphere(4);
+  const ExactDistance distance(mesh);
+  std::vector<Vector3> points = probes(mesh, 3001, 31);
+  for (const double far : {1e3, 1e8, 1e14, 1e16, 1e30, 1e200}) points.push_back(Vector3(0.3, -1, 0.2) * far);
+  const auto answers = [&] {
+    std::vector<double> all(points.size());
+    distance(points, all);
+    for (const Vector3& x : points) all.push_back(distance(x));
+    return all;
+  };
+  const std::vector<double> best = answers();
+  std::set<std::string_view> names;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(target);
+    EXPECT_TRUE(names.insert(instructionSet()).second) << instructionSet();
+    expectSameBits(best, answers());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  EXPECT_GE(names.size(), 2u);
 }
 
 TEST(ExactDistance, TheOrderOfTrianglesDecidesTiesOnly) {

@@ -10,6 +10,7 @@
 
 #include "distance/hierarchy.h"
 #include "distance/pseudonormals.h"
+#include "distance/search.h"
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
 #include "mesh/mesh_checks.h"
@@ -126,14 +127,15 @@ void ExactDistance::operator()(std::span<const Vector3> points, std::span<double
     std::array<Vector3, kPacket> packet;
     for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
     data_->hierarchy.nearest(packet, nearest);
-    for (std::size_t i = 0; i < count; ++i)
-      out[first + i] = data_->resolve(packet[i], nearest[i]).signedDistance;
+    for (std::size_t i = 0; i < count; ++i) out[first + i] = data_->resolve(packet[i], nearest[i]).signedDistance;
   }
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
   return data_->resolve(x, data_->hierarchy.nearest(x));
 }
+
+std::string_view instructionSet() { return distance::instructionSet(); }
 
 const Source& ExactDistance::source() const { return data_->source; }
 

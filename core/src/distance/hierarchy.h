@@ -32,7 +32,17 @@ constexpr std::uint32_t kEmpty = 0x7fffffff;
 /// Up to four triangles as float, in the same coordinates: a `TriangleFrame` without its normal. Unused lanes repeat
 /// the last triangle.
 struct alignas(32) Block {
-  enum Field { origin = 0, along = 3, across = 6, length = 9, apexAlong, apexAcross, inverseLeft, inverseRight, fields };
+  enum Field {
+    origin = 0,
+    along = 3,
+    across = 6,
+    length = 9,
+    apexAlong,
+    apexAcross,
+    inverseLeft,
+    inverseRight,
+    fields
+  };
   float field[fields][kWidth];
   std::uint32_t first;  ///< its first triangle's frame; the others follow
   std::uint32_t count;

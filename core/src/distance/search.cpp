@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -58,9 +58,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   const auto unit = [&](auto t) HWY_ATTR { return hn::Min(hn::Max(t, zero), one); };
   const auto wx = point.x - field(Block::origin), wy = point.y - field(Block::origin + 1),
              wz = point.z - field(Block::origin + 2);
-  const auto dot = [&](int f) HWY_ATTR {
-    return hn::MulAdd(wz, field(f + 2), hn::MulAdd(wy, field(f + 1), wx * field(f)));
-  };
+  const auto dot = [&](int f)
+                       HWY_ATTR { return hn::MulAdd(wz, field(f + 2), hn::MulAdd(wy, field(f + 1), wx * field(f))); };
   const auto p = dot(Block::along), q = dot(Block::across);
   const auto length = field(Block::length), apexAlong = field(Block::apexAlong), apexAcross = field(Block::apexAcross);
 
@@ -90,8 +89,8 @@ HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
-/// A point in a triangle's frame, as `locate` of triangle_frame.h has it: the same operations in the same order, none of
-/// them fused, so that the results are the same to the bit on every instruction set.
+/// A point in a triangle's frame, as `locate` of triangle_frame.h has it: the same operations in the same order, none
+/// of them fused, so that the results are the same to the bit on every instruction set.
 template <class D>
 struct Located {
   hn::Vec<D> squared, height, side[3], inside;
@@ -113,13 +112,24 @@ HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::V
   const auto fromB = p - length, rightAlong = apexAlong - length;
   const auto right = unit((fromB * rightAlong + q * apexAcross) * number(f.inverseSquaredRight));
   const auto rightP = fromB - right * rightAlong, rightQ = q - right * apexAcross;
-  const auto inside =
-      hn::And(q > zero, hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
-  Located<D> at{zero, height, {base * base + q * q, rightP * rightP + rightQ * rightQ, leftP * leftP + leftQ * leftQ},
+  const auto inside = hn::And(q > zero, hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
+  Located<D> at{zero,
+                height,
+                {base * base + q * q, rightP * rightP + rightQ * rightQ, leftP * leftP + leftQ * leftQ},
                 hn::IfThenElseZero(inside, one)};
-  at.squared =
-      height * height + hn::IfThenZeroElse(inside, hn::Min(hn::Min(at.side[0], at.side[1]), at.side[2]));
+  at.squared = height * height + hn::IfThenZeroElse(inside, hn::Min(hn::Min(at.side[0], at.side[1]), at.side[2]));
   return at;
+}
+
+/// Whether a lower bound is within its limit for any of the points.
+template <int Lanes>
+HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
+  const hn::CappedTag<float, Lanes> d;
+  constexpr std::size_t kStep = hn::MaxLanes(d);
+  auto within = hn::Load(d, lower) <= hn::Load(d, limit);
+  for (std::size_t at = kStep; at < Lanes; at += kStep)
+    within = hn::Or(within, hn::Load(d, lower + at) <= hn::Load(d, limit + at));
+  return !hn::AllFalse(d, within);
 }
 
 /// Computes the distances to the candidates in double, keeps what is nearer, and empties the list.
@@ -128,19 +138,18 @@ HWY_INLINE void settle(Search<Lanes>& s) {
   const hn::CappedTag<double, Lanes> d;
   constexpr std::size_t kStep = hn::MaxLanes(d);
   for (int c = 0; c < s.count; ++c) {
-    bool inReach = false;
-    for (int lane = 0; lane < Lanes; ++lane) inReach |= s.lower[c][lane] <= s.limit[lane];
-    if (!inReach) continue;
+    if (!anyInReach<Lanes>(s.lower[c], s.limit)) continue;
     const TriangleFrame& frame = s.hierarchy.frameAt(s.candidates[c]);
     const auto triangle = hn::Set(d, static_cast<double>(frame.triangle));
     const auto placed = hn::Set(d, static_cast<double>(s.candidates[c]));
     for (std::size_t at = 0; at < Lanes; at += kStep) {
-      const auto found = locateLanes(d, frame,
-                                     Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
-                                                                 hn::Load(d, s.exact[2] + at)});
+      const auto found =
+          locateLanes(d, frame,
+                      Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
+                                                  hn::Load(d, s.exact[2] + at)});
       const auto best = hn::Load(d, s.squared + at);
-      const auto better = hn::Or(found.squared < best,
-                                 hn::And(found.squared == best, triangle < hn::Load(d, s.triangle + at)));
+      const auto better =
+          hn::Or(found.squared < best, hn::And(found.squared == best, triangle < hn::Load(d, s.triangle + at)));
       if (hn::AllFalse(d, better)) continue;
       const auto keep = [&](double* kept, auto value) HWY_ATTR {
         hn::Store(hn::IfThenElse(better, value, hn::Load(d, kept + at)), d, kept + at);
@@ -252,13 +261,6 @@ struct PacketWaiting {
   std::uint32_t child;
 };
 
-HWY_INLINE bool anyInReach(PacketTag d, const float* lower, const float* limit) {
-  auto within = hn::Load(d, lower) <= hn::Load(d, limit);
-  for (std::size_t at = kLanes; at < kPacket; at += kLanes)
-    within = hn::Or(within, hn::Load(d, lower + at) <= hn::Load(d, limit + at));
-  return !hn::AllFalse(d, within);
-}
-
 HWY_INLINE float least(PacketTag d, const float* lower) {
   auto all = hn::Load(d, lower);
   for (std::size_t at = kLanes; at < kPacket; at += kLanes) all = hn::Min(all, hn::Load(d, lower + at));
@@ -289,7 +291,7 @@ void runPacket(Search<kPacket>& s) {
         hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, bounds.upper, s.delta)), d, s.limit + at);
       }
       s.candidates[s.count] = place * kWidth + i;
-      s.count += anyInReach(d, lower, s.limit);
+      s.count += anyInReach<kPacket>(lower, s.limit);
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
@@ -303,7 +305,7 @@ void runPacket(Search<kPacket>& s) {
     }
     unsigned hits = 0;
     for (int child = 0; child < kWidth; ++child)
-      hits |= unsigned{anyInReach(d, lower[child], s.limit) && node.child[child] != kEmpty} << child;
+      hits |= unsigned{anyInReach<kPacket>(lower[child], s.limit) && node.child[child] != kEmpty} << child;
     // farthest first onto the stack, so that the nearest comes off next
     const std::size_t bottom = top;
     for (; hits != 0; hits &= hits - 1) {
@@ -327,7 +329,7 @@ void runPacket(Search<kPacket>& s) {
     do {
       if (top == 0) return settle(s);
       --top;
-    } while (!anyInReach(d, stack[top].lower, s.limit));
+    } while (!anyInReach<kPacket>(stack[top].lower, s.limit));
     current = stack[top].child;
   }
 }
@@ -342,6 +344,12 @@ namespace hpsdf::distance {
 
 HWY_EXPORT(runOne);
 HWY_EXPORT(runPacket);
+
+std::string_view instructionSet() {
+  // lower bits are better sets
+  return hwy::TargetName(static_cast<std::int64_t>(
+      std::uint64_t{1} << std::countr_zero(static_cast<std::uint64_t>(hwy::SupportedTargets() & HWY_TARGETS))));
+}
 
 void run(Search<1>& search) { HWY_DYNAMIC_DISPATCH(runOne)(search); }
 void run(Search<kPacket>& search) { HWY_DYNAMIC_DISPATCH(runPacket)(search); }
@@ -366,8 +374,8 @@ Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& p
 }
 
 template <int Lanes>
-void Search<Lanes>::addSeed(std::uint32_t place) {
-  const std::uint32_t block = place / kWidth;
+void Search<Lanes>::addSeed(std::uint32_t near) {
+  const std::uint32_t block = near / kWidth;
   if (std::find(seed.begin(), seed.begin() + seeds, block) == seed.begin() + seeds) seed[seeds++] = block;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "distance/hierarchy.h"
 
@@ -14,16 +15,16 @@ template <int Lanes>
 struct Search {
   static constexpr int kCapacity = 96;  ///< candidates between two settlements
 
-  /// Points whose float coordinates or their squares would overflow try all triangles.
   Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
-  void addSeed(std::uint32_t place);
+  /// A place whose block, probably near, is to be visited first.
+  void addSeed(std::uint32_t near);
 
   /// Lane by lane: the nearest triangle.
   Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
-  bool tooFar = false;  ///< for float
+  bool tooFar = false;  ///< float coordinates or their squares would overflow: all triangles are tried
 
   alignas(64) float point[3][Lanes];
   alignas(64) float limit[Lanes];  ///< squares above are out of reach
@@ -51,5 +52,8 @@ extern template struct Search<kPacket>;
 /// Runs the search by the best instruction set at hand.
 void run(Search<1>& search);
 void run(Search<kPacket>& search);
+
+/// The one in use, such as "AVX2".
+std::string_view instructionSet();
 
 }  // namespace hpsdf::distance

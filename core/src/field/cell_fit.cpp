@@ -17,8 +17,8 @@ int pointsPerAxis(int degree, int multiple) { return std::max((multiple * degree
 /// Points handed to Φ at once: long enough to amortise a call, short enough to notice a cancellation.
 constexpr std::size_t kBatch = 512;
 
-/// The points of a tensor product of n an axis as indices, along Morton's curve: neighbours in this order are neighbours
-/// in space, which exact distances are fastest with.
+/// The points of a tensor product of n an axis as indices, along Morton's curve: neighbours in this order are
+/// neighbours in space, which exact distances are fastest with.
 std::vector<std::uint32_t> mortonOrder(std::uint32_t n) {
   const auto spread = [](std::uint32_t index) {  // a bit in three
     std::uint32_t bits = 0;
@@ -103,8 +103,7 @@ CellFitter::Samples CellFitter::sample(const Box& cell, const Rules& rules) cons
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
     const std::span<const std::uint32_t> batch(&rules.order[first], std::min(kBatch, rules.order.size() - first));
     for (std::size_t i = 0; i < batch.size(); ++i)
-      points[i] =
-          centre + half.cwiseProduct(Vector3(at[batch[i] / (n * n)], at[batch[i] / n % n], at[batch[i] % n]));
+      points[i] = centre + half.cwiseProduct(Vector3(at[batch[i] / (n * n)], at[batch[i] / n % n], at[batch[i] % n]));
     distance_(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
     checkFinite(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
     for (std::size_t i = 0; i < batch.size(); ++i) {
