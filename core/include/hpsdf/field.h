@@ -83,6 +83,14 @@ struct ValueAndGradient {
   Vector3 gradient;
 };
 
+/// Where queries start their descent: the nodes of the octree at one depth, laid out as a grid, so that a point finds
+/// its own at once. Made from the nodes when a field is; not stored.
+struct Directory {
+  int depth = 0;
+  /// x fastest. A node's bits, bits 40 to 47 its depth: below `depth` for a leaf that covers several entries.
+  std::vector<std::uint64_t> entries;
+};
+
 /// A hierarchical hp-adaptive signed distance field: immutable; every query is const, thread-safe and allocation-free.
 ///
 /// Inside the domain the value is the polynomial of the leaf that holds the point; leaves are half-open, so that every
@@ -116,8 +124,12 @@ class Field {
   /// The arrays themselves: for files, uploads and tests.
   const FieldData& data() const { return data_; }
 
+  /// Bytes that queries need: nodes, coefficients and directory.
+  std::size_t bytes() const;
+
  private:
   FieldData data_;
+  Directory directory_;
 };
 
 /// Figures over a whole field.
@@ -125,7 +137,7 @@ struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;
   std::size_t coefficients = 0;
-  std::size_t bytes = 0;               ///< nodes and coefficients: what a query needs in memory
+  std::size_t bytes = 0;               ///< `Field::bytes`
   std::map<int, double> degreeVolume;  ///< degree → fraction of the domain's volume
   std::map<int, double> depthVolume;   ///< depth → fraction of the domain's volume
   std::map<int, std::size_t> degreeLeaves;

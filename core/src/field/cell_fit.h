@@ -47,8 +47,8 @@ class CellFitter {
   struct Rules {
     QuadratureRule points;             ///< an axis
     std::vector<std::uint32_t> order;  ///< in which the samples are taken
-    Projection own;     ///< onto degree p, from the cell's own points
-    Projection raised;  ///< onto degree p+1, from the points of the eight children
+    Projection own;                    ///< onto degree p, from the cell's own points
+    Projection raised;                 ///< onto degree p+1, from the points of the eight children
   };
   struct Samples {
     std::vector<double> values;

@@ -1,5 +1,7 @@
 #include "hpsdf/field.h"
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <string>
@@ -54,10 +56,6 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   }
 }
 
-std::array<double, 3> localFrom(const Location& at) {
-  return {2 * at.fraction[0] - 1, 2 * at.fraction[1] - 1, 2 * at.fraction[2] - 1};
-}
-
 /// The closest point of the domain; NaN stays NaN.
 Vector3 clampedTo(const Box& domain, const Vector3& x) { return x.cwiseMax(domain.min()).cwiseMin(domain.max()); }
 
@@ -65,30 +63,104 @@ Vector3 clampedTo(const Box& domain, const Vector3& x) { return x.cwiseMax(domai
 /// of GCC 12 loses NaN and infinity.)
 double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
-template <typename T>
-double valueIn(const FieldData& field, const T* coefficients, const Vector3& x) {
-  const Location at = locate(field, x);
-  const std::uint64_t leaf = field.nodes[at.node];
-  const double inside = evaluate(coefficients + node::offset(leaf), node::degree(leaf), localFrom(at));
-  if (field.domain.contains(x)) return inside;
-  return inside + length(x - clampedTo(field.domain, x));
+/// Adds what lies outside of the domain to the value at the closest point within.
+void extend(const Box& domain, const Vector3& x, double& value) {
+  if (!domain.contains(x)) value += length(x - clampedTo(domain, x));
 }
 
-template <typename T>
-ValueAndGradient valueAndGradientIn(const FieldData& field, const T* coefficients, const Vector3& x) {
-  const Location at = locate(field, x);
-  const std::uint64_t leaf = field.nodes[at.node];
-  ValueAndGradient result = evaluateWithGradient(coefficients + node::offset(leaf), node::degree(leaf), localFrom(at));
-  result.gradient.array() *= 2 / cellSize(field, at.depth).array();
-  if (field.domain.contains(x)) return result;
+void extend(const Box& domain, const Vector3& x, ValueAndGradient& result) {
+  if (domain.contains(x)) return;
   // f(q) + |x - q|: along an axis on which x is clamped, f(q) does not change
-  const Vector3 beyond = x - clampedTo(field.domain, x);
+  const Vector3 beyond = x - clampedTo(domain, x);
   const double distance = length(beyond);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
     if (beyond[axis] != 0) result.gradient[axis] = 0;
   result.gradient += beyond / distance;
+}
+
+template <typename T>
+void answer(const FieldData& field, const T* coefficients, const FoundLeaf& leaf, const Vector3& x, double& value) {
+  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  extend(field.domain, x, value);
+}
+
+template <typename T>
+void answer(const FieldData& field, const T* coefficients, const FoundLeaf& leaf, const Vector3& x,
+            ValueAndGradient& result) {
+  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  result.gradient.array() *= 2 / cellSize(field, leaf.depth).array();
+  extend(field.domain, x, result);
+}
+
+template <typename Answer>
+Answer answerOne(const FieldData& field, const Directory& directory, const Vector3& x) {
+  const FoundLeaf leaf = find(field, directory, x);
+  Answer result;
+  std::visit([&](const auto& c) { answer(field, c.data(), leaf, x, result); }, field.coefficients);
   return result;
+}
+
+/// Finds the leaves of many points, has their coefficients fetched meanwhile, and evaluates degree by degree: no point
+/// waits for memory, nor the processor for a branch that it could not foresee.
+template <typename Answer>
+void answerMany(const FieldData& field, const Directory& directory, std::span<const Vector3> points,
+                std::span<Answer> out) {
+  constexpr std::size_t kBatch = 64;
+  std::array<FoundLeaf, kBatch> leaves;
+  std::array<std::uint8_t, kBatch> order;
+  std::visit(
+      [&](const auto& c) {
+        for (std::size_t first = 0; first < points.size(); first += kBatch) {
+          const std::size_t count = std::min(kBatch, points.size() - first);
+          std::array<std::uint8_t, kMaxDegree + 2> place{};  // where each degree begins in `order`
+          for (std::size_t i = 0; i < count; ++i) {
+            leaves[i] = find(field, directory, points[first + i]);
+            const auto* begin = c.data() + node::offset(leaves[i].bits);
+            const int degree = node::degree(leaves[i].bits);
+            for (const auto* at = begin; at < begin + coefficientCount(degree); at += 64 / sizeof(*at))
+              __builtin_prefetch(at);
+            ++place[degree + 1];
+          }
+          for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) place[degree + 1] += place[degree];
+          for (std::size_t i = 0; i < count; ++i)
+            order[place[node::degree(leaves[i].bits)]++] = static_cast<std::uint8_t>(i);
+          for (std::size_t n = 0; n < count; ++n) {
+            const std::size_t i = order[n];
+            answer(field, c.data(), leaves[i], points[first + i], out[first + i]);
+          }
+        }
+      },
+      field.coefficients);
+}
+
+/// As deep as a sixteenth of the field's own size allows.
+Directory makeDirectory(const FieldData& field) {
+  Directory directory;
+  const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
+  const std::size_t bytes = std::visit([](const auto& c) { return c.size() * sizeof(c[0]); }, field.coefficients) +
+                            field.nodes.size() * sizeof(field.nodes[0]);
+  const std::size_t most = bytes / 16 / sizeof(directory.entries[0]);
+  while (directory.depth < kMaxDepth && base << (3 * (directory.depth + 1)) <= most) ++directory.depth;
+  directory.entries.resize(base << (3 * directory.depth));
+  const auto fill = [&](const auto& self, std::uint64_t bits, int depth, std::array<std::size_t, 3> place) -> void {
+    if (!node::isLeaf(bits) && depth < directory.depth) {
+      for (std::uint32_t child = 0; child < 8; ++child)
+        self(self, field.nodes[node::firstChild(bits) + child], depth + 1,
+             {2 * place[0] + (child & 1), 2 * place[1] + ((child >> 1) & 1), 2 * place[2] + (child >> 2)});
+      return;
+    }
+    const std::size_t width = std::size_t{1} << (directory.depth - depth);
+    const std::size_t nx = field.grid[0] << directory.depth, ny = field.grid[1] << directory.depth;
+    for (std::size_t z = place[2] * width; z < (place[2] + 1) * width; ++z)
+      for (std::size_t y = place[1] * width; y < (place[1] + 1) * width; ++y)
+        std::fill_n(&directory.entries[(z * ny + y) * nx + place[0] * width], width, bits | std::uint64_t(depth) << 40);
+  };
+  std::size_t root = 0;
+  for (std::size_t z = 0; z < field.grid[2]; ++z)
+    for (std::size_t y = 0; y < field.grid[1]; ++y)
+      for (std::size_t x = 0; x < field.grid[0]; ++x) fill(fill, field.nodes[root++], 0, {x, y, z});
+  return directory;
 }
 
 Cell makeCell(const FieldData& field, std::uint32_t id, int depth, const std::array<std::uint32_t, 3>& base,
@@ -130,32 +202,28 @@ Field::Field(FieldData data) : data_(std::move(data)) {
           if (!std::isfinite(c)) notAField("a coefficient is not finite");
       },
       data_.coefficients);
+  directory_ = makeDirectory(data_);
 }
 
-double Field::value(const Vector3& x) const {
-  return std::visit([&](const auto& c) { return valueIn(data_, c.data(), x); }, data_.coefficients);
+std::size_t Field::bytes() const {
+  const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  return sizeOf(data_.nodes) + sizeOf(directory_.entries) + std::visit(sizeOf, data_.coefficients);
 }
+
+double Field::value(const Vector3& x) const { return answerOne<double>(data_, directory_, x); }
 
 ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
-  return std::visit([&](const auto& c) { return valueAndGradientIn(data_, c.data(), x); }, data_.coefficients);
+  return answerOne<ValueAndGradient>(data_, directory_, x);
 }
 
 void Field::values(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  std::visit(
-      [&](const auto& c) {
-        for (std::size_t i = 0; i < points.size(); ++i) out[i] = valueIn(data_, c.data(), points[i]);
-      },
-      data_.coefficients);
+  answerMany(data_, directory_, points, out);
 }
 
 void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const {
   assert(points.size() == out.size());
-  std::visit(
-      [&](const auto& c) {
-        for (std::size_t i = 0; i < points.size(); ++i) out[i] = valueAndGradientIn(data_, c.data(), points[i]);
-      },
-      data_.coefficients);
+  answerMany(data_, directory_, points, out);
 }
 
 Cell Field::cellAt(const Vector3& x) const {

@@ -14,13 +14,8 @@ FieldStatistics statistics(const Field& field) {
     s.depthVolume[cell.depth] += share;
   });
   s.nodes = field.data().nodes.size();
-  s.bytes = s.nodes * sizeof(field.data().nodes[0]);
-  std::visit(
-      [&](const auto& c) {
-        s.coefficients = c.size();
-        s.bytes += c.size() * sizeof(c[0]);
-      },
-      field.data().coefficients);
+  s.bytes = field.bytes();
+  s.coefficients = std::visit([](const auto& c) { return c.size(); }, field.data().coefficients);
   return s;
 }
 
