@@ -231,7 +231,7 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
         wantsNormalized(arguments) ? normalizing(boundingBox(imported.mesh)) : Normalization{};
     if (wantsNormalized(arguments)) imported.mesh = normalized(imported.mesh);
     const auto start = std::chrono::steady_clock::now();
-    const ExactDistance distance(imported.mesh);
+    const ExactDistance distance(imported.mesh, arguments.whole("threads"));
     Source source = distance.source();
     source.normalization = normalization;
     Field field = construct(console, DistanceFunction(distance, std::move(source)), arguments);

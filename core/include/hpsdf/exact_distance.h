@@ -37,8 +37,9 @@ struct ClosestPoint {
 /// Const and thread-safe after construction. Keeps no reference to the mesh.
 class ExactDistance {
  public:
-  /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates.
-  explicit ExactDistance(const TriangleMesh& mesh);
+  /// Takes at most so many threads, 0 for all; the result does not depend on them. Throws `Error` for a mesh without
+  /// triangles, with indices out of range or with non-finite coordinates.
+  explicit ExactDistance(const TriangleMesh& mesh, int threads = 0);
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
   ExactDistance& operator=(ExactDistance&&) noexcept;

@@ -1,5 +1,7 @@
 #include "hpsdf/exact_distance.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -14,6 +16,7 @@
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
 #include "mesh/mesh_checks.h"
+#include "threads.h"
 
 namespace hpsdf {
 namespace {
@@ -34,11 +37,12 @@ void check(const TriangleMesh& mesh) {
 }
 
 std::vector<TriangleFrame> makeFrames(const TriangleMesh& mesh) {
-  std::vector<TriangleFrame> frames;
-  frames.reserve(mesh.triangles.size());
-  for (const auto& [a, b, c] : mesh.triangles)
-    frames.push_back(distance::makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]},
-                                         static_cast<std::uint32_t>(frames.size())));
+  std::vector<TriangleFrame> frames(mesh.triangles.size());
+  tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    frames[t] =
+        distance::makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, static_cast<std::uint32_t>(t));
+  });
   return frames;
 }
 
@@ -107,9 +111,9 @@ struct ExactDistance::Data {
   }
 };
 
-ExactDistance::ExactDistance(const TriangleMesh& mesh) {
+ExactDistance::ExactDistance(const TriangleMesh& mesh, int threads) {
   check(mesh);
-  data_ = std::make_unique<const Data>(mesh);
+  data_ = withThreads(threads, [&] { return std::make_unique<const Data>(mesh); });
 }
 
 ExactDistance::~ExactDistance() = default;

@@ -40,8 +40,8 @@ struct Item {
 };
 
 struct Range {
-  std::uint32_t begin, end;
-  FloatBox box;
+  std::uint32_t begin = 0, end = 0;
+  FloatBox box = {};
 
   std::uint32_t size() const { return end - begin; }
 };
@@ -61,45 +61,72 @@ std::array<Vector3, 3> cornersOf(const TriangleFrame& f) {
 /// until there are four.
 class Builder {
  public:
-  Builder(std::vector<Node>& nodes, std::vector<Block>& blocks, std::vector<Item> items)
-      : nodes_(nodes), blocks_(blocks), items_(std::move(items)) {}
+  /// A tree, or what hangs below one child of a node. Its first node or block is its root.
+  struct Tree {
+    std::vector<Node> nodes;  ///< boxes still to be fitted
+    std::vector<Block> blocks;
+    std::vector<std::array<Range, kWidth>> ranges;  ///< the items below each child of each node
+  };
 
-  void build() {
-    nodes_.reserve(items_.size() / 3 + 1);
-    buildNode(makeRange(0, static_cast<std::uint32_t>(items_.size())), 0);
+  explicit Builder(std::vector<Item> items) : items_(std::move(items)) {}
+
+  Tree build() {
+    Tree tree;
+    buildNode(tree, makeRange(0, static_cast<std::uint32_t>(items_.size())), 0);
+    return tree;
   }
 
+  /// In the order of the tree's blocks.
   const std::vector<Item>& items() const { return items_; }
 
-  /// The slots, and the box along the axes, of each child of each node.
-  const std::vector<std::array<Range, kWidth>>& ranges() const { return ranges_; }
-
  private:
+  static constexpr std::uint32_t kWorthATask = 8192;  // items
+
   Range makeRange(std::uint32_t begin, std::uint32_t end) const {
     Range range{begin, end, {}};
     for (std::uint32_t i = begin; i < end; ++i) range.box.extend(items_[i].box);
     return range;
   }
 
-  std::uint32_t buildNode(const Range& whole, int level) {
-    const auto self = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.emplace_back();
-    ranges_.emplace_back();
+  std::uint32_t buildNode(Tree& tree, const Range& whole, int level) {
+    const auto self = static_cast<std::uint32_t>(tree.nodes.size());
+    tree.nodes.emplace_back();
     std::array<Range, kWidth> parts;
     parts[0] = whole;
     const int count = divide(parts, level);
-    for (int lane = 0; lane < kWidth; ++lane) {
-      if (lane < count) ranges_[self][lane] = parts[lane];
-      const std::uint32_t child = lane < count ? buildChild(parts[lane], level + 1) : kEmpty;
-      nodes_[self].child[lane] = child;
+    tree.ranges.push_back(parts);
+    std::array<std::uint32_t, kWidth> children;
+    children.fill(kEmpty);
+    if (whole.size() > kWorthATask) {
+      // each into a tree of its own, put together in their order: the same tree as below, whoever is first
+      std::array<Tree, kWidth> trees;
+      tbb::parallel_for(0, count, [&](int lane) { buildChild(trees[lane], parts[lane], level + 1); });
+      for (int lane = 0; lane < count; ++lane) children[lane] = append(tree, trees[lane]);
+    } else {
+      for (int lane = 0; lane < count; ++lane) children[lane] = buildChild(tree, parts[lane], level + 1);
     }
+    std::copy(children.begin(), children.end(), tree.nodes[self].child);
     return self;
   }
 
-  std::uint32_t buildChild(const Range& range, int level) {
-    if (range.size() > kLeafSize) return buildNode(range, level);
-    blocks_.push_back({{}, range.begin, range.size()});
-    return kBlockBit | static_cast<std::uint32_t>(blocks_.size() - 1);
+  std::uint32_t buildChild(Tree& tree, const Range& range, int level) {
+    if (range.size() > kLeafSize) return buildNode(tree, range, level);
+    tree.blocks.push_back({{}, range.begin, range.size()});
+    return kBlockBit | static_cast<std::uint32_t>(tree.blocks.size() - 1);
+  }
+
+  /// Returns what stands for the root of `part` among the children of a node.
+  static std::uint32_t append(Tree& tree, const Tree& part) {
+    const auto nodes = static_cast<std::uint32_t>(tree.nodes.size());
+    const auto blocks = static_cast<std::uint32_t>(tree.blocks.size());
+    for (Node node : part.nodes) {
+      for (std::uint32_t& child : node.child)
+        if (child != kEmpty) child += child & kBlockBit ? blocks : nodes;
+      tree.nodes.push_back(node);
+    }
+    tree.blocks.insert(tree.blocks.end(), part.blocks.begin(), part.blocks.end());
+    tree.ranges.insert(tree.ranges.end(), part.ranges.begin(), part.ranges.end());
+    return part.nodes.empty() ? kBlockBit | blocks : nodes;
   }
 
   int divide(std::array<Range, kWidth>& parts, int level) {
@@ -192,10 +219,7 @@ class Builder {
     return middle;
   }
 
-  std::vector<Node>& nodes_;
-  std::vector<Block>& blocks_;
   std::vector<Item> items_;
-  std::vector<std::array<Range, kWidth>> ranges_;
 };
 
 /// A box whose axes are `axes`' columns, as float, around the corners that `visit` shows.
@@ -308,8 +332,8 @@ Hierarchy::Hierarchy(std::vector<TriangleFrame> triangles) {
   scale_ = half > 0 ? 1 / half : 1;
 
   std::vector<Item> items(triangles.size());
-  for (std::uint32_t i = 0; i < items.size(); ++i) {
-    items[i].index = i;
+  tbb::parallel_for(std::size_t{0}, items.size(), [&](std::size_t i) {
+    items[i].index = static_cast<std::uint32_t>(i);
     for (const Vector3& corner : cornersOf(triangles[i])) {
       const Vector3 local = (corner - center_) * scale_;
       FloatBox point{Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
@@ -319,13 +343,16 @@ Hierarchy::Hierarchy(std::vector<TriangleFrame> triangles) {
       }
       items[i].box.extend(point);
     }
-  }
-  Builder builder(nodes_, blocks_, std::move(items));
-  builder.build();
-  triangles_.reserve(triangles.size());
-  for (const Item& item : builder.items()) triangles_.push_back(triangles[item.index]);
+  });
+  Builder builder(std::move(items));
+  Builder::Tree tree = builder.build();
+  nodes_ = std::move(tree.nodes);
+  blocks_ = std::move(tree.blocks);
+  triangles_.resize(triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(),
+                    [&](std::size_t slot) { triangles_[slot] = triangles[builder.items()[slot].index]; });
   const Fitter fitter(*this, triangles_);
-  tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) { fitter.fit(nodes_[n], builder.ranges()[n]); });
+  tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) { fitter.fit(nodes_[n], tree.ranges[n]); });
   tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { fitter.fit(blocks_[b]); });
 }
 

@@ -1,5 +1,7 @@
 #include "distance/pseudonormals.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -71,8 +73,8 @@ void sumAtVertices(const TriangleMesh& mesh, const std::vector<Vector3>& unitNor
 
 Pseudonormals makePseudonormals(const TriangleMesh& mesh, const std::vector<Vector3>& unitNormals) {
   Pseudonormals result;
-  sumAtEdges(mesh, unitNormals, result);
-  sumAtVertices(mesh, unitNormals, result);
+  tbb::parallel_invoke([&] { sumAtEdges(mesh, unitNormals, result); },
+                       [&] { sumAtVertices(mesh, unitNormals, result); });
   return result;
 }
 

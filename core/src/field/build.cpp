@@ -1,8 +1,6 @@
 #include "hpsdf/build.h"
 
-#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
 #include "hpsdf/error.h"
+#include "threads.h"
 
 namespace hpsdf {
 namespace {
@@ -217,10 +216,8 @@ class Construction {
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
             const Progress& progress) {
   checkBuild(domain, options);
-  // asked for more than it may have, TBB would complain on stderr
-  const int most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  tbb::task_arena arena(options.threads == 0 ? tbb::task_arena::automatic : std::min(options.threads, most));
-  return Field(arena.execute([&] { return Construction(distance, domain, options, progress).run(distance.source()); }));
+  return Field(withThreads(options.threads,
+                           [&] { return Construction(distance, domain, options, progress).run(distance.source()); }));
 }
 
 }  // namespace hpsdf
