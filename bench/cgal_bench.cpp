@@ -1,0 +1,46 @@
+// CGAL's tree of boxes, without its exact arithmetic: squared distances in double.
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Simple_cartesian.h>
+
+#include <cmath>
+#include <vector>
+
+#include "peer_points.h"
+
+namespace hpsdf::bench {
+namespace {
+
+using Kernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+
+Kernel::Point_3 toPoint(const Vector3& x) { return {x.x(), x.y(), x.z()}; }
+
+Triangles toTriangles(const TriangleMesh& mesh) {
+  Triangles triangles;
+  for (const auto& [a, b, c] : mesh.triangles)
+    triangles.emplace_back(toPoint(mesh.vertices[a]), toPoint(mesh.vertices[b]), toPoint(mesh.vertices[c]));
+  return triangles;
+}
+
+void uniform(benchmark::State& state) {
+  static const Triangles triangles = toTriangles(bunny());
+  static Tree tree(triangles.begin(), triangles.end());
+  tree.accelerate_distance_queries();
+  const std::vector<Vector3> points = uniformPoints(kUniformPoints);
+  std::vector<double> out(points.size());
+  timeEach(state, points.size(), [&] {
+    for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::sqrt(tree.squared_distance(toPoint(points[i])));
+  });
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (std::abs(std::abs(bunnyDistance()(points[i])) - out[i]) > 1e-9) state.SkipWithError("wrong distances");
+}
+
+BENCHMARK(uniform)->Name("distance/uniform/cgal");
+
+}  // namespace
+}  // namespace hpsdf::bench
