@@ -67,7 +67,7 @@ void nearSurface(benchmark::State& state) {
 }
 
 BENCHMARK(bunnyValue)->Name("query/bunny/openvdb");
-BENCHMARK(nearSurface)->Name("near/openvdb")->UseRealTime()->Iterations(1);
+BENCHMARK(nearSurface)->Name("near/openvdb")->MeasureProcessCPUTime()->UseRealTime()->Iterations(1);
 
 }  // namespace
 }  // namespace hpsdf::bench
