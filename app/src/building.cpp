@@ -227,9 +227,11 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     ImportedMesh imported = importSurface(surface);
     if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
       console.err << "hpsdf: warning: " << warning << std::endl;
-    const Normalization normalization =
-        wantsNormalized(arguments) ? normalizing(boundingBox(imported.mesh)) : Normalization{};
-    if (wantsNormalized(arguments)) imported.mesh = normalized(imported.mesh);
+    Normalization normalization;
+    if (wantsNormalized(arguments)) {
+      normalization = normalizing(boundingBox(imported.mesh));
+      imported.mesh = normalized(imported.mesh);
+    }
     const auto start = std::chrono::steady_clock::now();
     const ExactDistance distance(imported.mesh, arguments.whole("threads"));
     Source source = distance.source();

@@ -78,11 +78,6 @@ void report(Session& session, const Arguments& arguments, int width, int height,
   session.console().out << fmt::format("{}: {}x{}, {}\n", file, width, height, renderer.description());
 }
 
-/// 0, or where the domain does not hold that, its middle.
-double defaultOffset(const Box& domain, int axis) {
-  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
-}
-
 void runSlice(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const SliceFormat format = sliceFormat(file);
@@ -229,6 +224,10 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   return picture;
 }
 
+double defaultOffset(const Box& domain, int axis) {
+  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
+}
+
 void addPictureCommands(Registry& registry) {
   registry.add(withParameters(
       {.name = "slice",
@@ -257,8 +256,9 @@ void addPictureCommands(Registry& registry) {
                        .choices = {"x", "y", "z"}},
                       {.name = "offset",
                        .type = ParameterType::number,
-                       .help = "Where the plane crosses that axis; when left out, at 0, or in the domain's middle where 0 "
-                               "lies outside.",
+                       .help =
+                           "Where the plane crosses that axis; when left out, at 0, or in the domain's middle where 0 "
+                           "lies outside.",
                        .unit = "world units"},
                       {.name = "plane",
                        .type = ParameterType::numbers,

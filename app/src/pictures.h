@@ -19,4 +19,7 @@ render::SlicePicture slicePicture(const Arguments& arguments);
 /// Throws `Error` for a camera out of range.
 render::SurfacePicture surfacePicture(const Arguments& arguments);
 
+/// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.
+double defaultOffset(const Box& domain, int axis);
+
 }  // namespace hpsdf::app

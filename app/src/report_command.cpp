@@ -133,19 +133,13 @@ std::vector<Drawing> drawings() {
   };
 }
 
-/// The plane z = 0, or where the domain does not hold that, its middle.
-double sliceOffset(const Field& field) {
-  const Box& domain = field.domain();
-  return domain.min().z() <= 0 && domain.max().z() > 0 ? 0 : domain.center().z();
-}
-
 ReportPicture drawInto(const fs::path& folder, Session& session, render::Renderer& renderer,
                        const std::string& fieldFile, const Drawing& drawing, int samples) {
   const Field& field = session.current().field;
   std::string command = "hpsdf " + fmt::format(fmt::runtime(drawing.command), fieldFile);
   render::Image image;
   if (const auto* color = std::get_if<render::SliceColor>(&drawing.color)) {
-    const double offset = sliceOffset(field);
+    const double offset = defaultOffset(field.domain(), 2);
     if (offset != 0) command += fmt::format(" --offset={}", offset);
     image =
         render::draw(renderer, field,

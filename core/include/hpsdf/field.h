@@ -89,6 +89,9 @@ struct Directory {
   int depth = 0;
   /// x fastest. A node's bits, bits 40 to 47 its depth: below `depth` for a leaf that covers several entries.
   std::vector<std::uint64_t> entries;
+
+  static constexpr std::uint64_t entry(std::uint64_t node, int depth) { return node | std::uint64_t(depth) << 40; }
+  static constexpr int depthOf(std::uint64_t entry) { return static_cast<int>(entry >> 40 & 0xff); }
 };
 
 /// A hierarchical hp-adaptive signed distance field: immutable; every query is const, thread-safe and allocation-free.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint32_t kLeafSize = 4;
 constexpr int kBins = 16;
+constexpr float kNarrowest = 1e-30f;  ///< extents below would give bins no width
 
 /// Below this level nodes are halved by count, so that no input makes the tree deeper than kMaxLevel + 32 levels
 /// (2^32 triangles, each level at least halves a range).
@@ -165,10 +166,9 @@ class Builder {
     const Eigen::Array4f extent = centers.upper - centers.lower;
     int widest = 0;
     extent.head<3>().maxCoeff(&widest);
-    // so close together that a bin would have no width
-    if (level >= kMaxLevel || !(extent[widest] > 1e-30f)) return splitByCount(range, widest);
+    if (level >= kMaxLevel || !(extent[widest] > kNarrowest)) return splitByCount(range, widest);
 
-    const Bins bins{centers.lower, (extent > 1e-30f).select(kBins / extent, 0)};
+    const Bins bins{centers.lower, (extent > kNarrowest).select(kBins / extent, 0)};
     const auto [axis, cut] = bestCut(range, bins);
     if (cut == 0) return splitByCount(range, widest);
     const auto middle = std::partition(items_.begin() + range.begin, items_.begin() + range.end,

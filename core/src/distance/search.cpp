@@ -193,6 +193,47 @@ HWY_INLINE void fetch(const Node* nodes, const Block* blocks, std::uint32_t chil
   for (std::size_t line = 0; line < sizeof(Node); line += 64) hwy::Prefetch(from + line);
 }
 
+/// Children that wait for their visit. `Entry` has a key, by which those of one node lie farthest first, so that the
+/// nearest comes off next, and a child.
+template <class Entry>
+class Stack {
+ public:
+  bool empty() const { return top_ == 0; }
+  std::size_t size() const { return top_; }
+  const Entry& pop() { return entries_[--top_]; }
+
+  /// A new entry's place among those from `bottom` on.
+  HWY_INLINE Entry& insert(std::size_t bottom, float key) {
+    std::size_t place = top_++;
+    for (; place > bottom && entries_[place - 1].key < key; --place) entries_[place] = entries_[place - 1];
+    return entries_[place];
+  }
+
+ private:
+  std::array<Entry, kStackSize> entries_;
+  std::size_t top_ = 0;
+};
+
+/// Visits the seeds and then what is within reach when its turn comes; settles the search.
+template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
+HWY_INLINE void walk(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode, const VisitBlock& visitBlock,
+                     const InReach& inReach) {
+  for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
+  for (std::uint32_t current = 0;;) {
+    if (!(current & kBlockBit))
+      visitNode(s.hierarchy.nodes()[current]);
+    else if (!isSeed(s, current & ~kBlockBit))
+      visitBlock(current & ~kBlockBit);
+    while (true) {
+      if (stack.empty()) return settle(s);
+      const Entry& next = stack.pop();
+      if (!inReach(next)) continue;
+      current = next.child;
+      break;
+    }
+  }
+}
+
 struct Waiting {
   float key;
   std::uint32_t child;
@@ -202,12 +243,10 @@ void runOne(Search<1>& s) {
   if (s.tooFar) return tryAll(s);
   const hn::CappedTag<float, kWidth> d;
   constexpr std::size_t kStep = hn::MaxLanes(d);
-  const Node* nodes = s.hierarchy.nodes().data();
   const Block* blocks = s.hierarchy.blocks().data();
   const Point<hn::Vec<decltype(d)>> point{hn::Set(d, s.point[0][0]), hn::Set(d, s.point[1][0]),
                                           hn::Set(d, s.point[2][0])};
-  std::array<Waiting, kStackSize> stack;
-  std::size_t top = 0;
+  Stack<Waiting> stack;
   HWY_ALIGN float lower[kWidth];
   const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
     const Block& block = blocks[place];
@@ -228,28 +267,12 @@ void runOne(Search<1>& s) {
   const auto visitNode = [&](const Node& node) HWY_ATTR {
     for (std::size_t at = 0; at < kWidth; at += kStep)
       hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, node.field[f] + at); }), d, lower + at);
-    // farthest first onto the stack, so that the nearest comes off next
-    const std::size_t bottom = top;
-    for (int lane = 0; lane < kWidth; ++lane) {
-      if (!(lower[lane] <= s.limit[0]) || node.child[lane] == kEmpty) continue;
-      std::size_t place = top++;
-      for (; place > bottom && stack[place - 1].key < lower[lane]; --place) stack[place] = stack[place - 1];
-      stack[place] = {lower[lane], node.child[lane]};
-    }
+    const std::size_t bottom = stack.size();
+    for (int child = 0; child < kWidth; ++child)
+      if (lower[child] <= s.limit[0] && node.child[child] != kEmpty)
+        stack.insert(bottom, lower[child]) = {lower[child], node.child[child]};
   };
-  for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
-  std::uint32_t current = 0;
-  while (true) {
-    if (!(current & kBlockBit))
-      visitNode(nodes[current]);
-    else if (!isSeed(s, current & ~kBlockBit))
-      visitBlock(current & ~kBlockBit);
-    do {
-      if (top == 0) return settle(s);
-      --top;
-    } while (!(stack[top].key <= s.limit[0]));
-    current = stack[top].child;
-  }
+  walk(s, stack, visitNode, visitBlock, [&](const Waiting& next) HWY_ATTR { return next.key <= s.limit[0]; });
 }
 
 using PacketTag = hn::CappedTag<float, kPacket>;
@@ -273,8 +296,7 @@ void runPacket(Search<kPacket>& s) {
   using V = hn::Vec<PacketTag>;
   const Node* nodes = s.hierarchy.nodes().data();
   const Block* blocks = s.hierarchy.blocks().data();
-  std::array<PacketWaiting, kStackSize> stack;
-  std::size_t top = 0;
+  Stack<PacketWaiting> stack;
   const auto pointAt = [&](std::size_t at) HWY_ATTR {
     return Point<V>{hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
   };
@@ -306,32 +328,19 @@ void runPacket(Search<kPacket>& s) {
     unsigned hits = 0;
     for (int child = 0; child < kWidth; ++child)
       hits |= unsigned{anyInReach<kPacket>(lower[child], s.limit) && node.child[child] != kEmpty} << child;
-    // farthest first onto the stack, so that the nearest comes off next
-    const std::size_t bottom = top;
+    const std::size_t bottom = stack.size();
     for (; hits != 0; hits &= hits - 1) {
       const int child = std::countr_zero(hits);
       const float key = least(d, lower[child]);
-      std::size_t place = top++;
-      for (; place > bottom && stack[place - 1].key < key; --place) stack[place] = stack[place - 1];
-      std::copy_n(lower[child], kPacket, stack[place].lower);
-      stack[place].key = key;
-      stack[place].child = node.child[child];
+      PacketWaiting& waiting = stack.insert(bottom, key);
+      std::copy_n(lower[child], kPacket, waiting.lower);
+      waiting.key = key;
+      waiting.child = node.child[child];
       fetch(nodes, blocks, node.child[child]);
     }
   };
-  for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
-  std::uint32_t current = 0;
-  while (true) {
-    if (!(current & kBlockBit))
-      visitNode(nodes[current]);
-    else if (!isSeed(s, current & ~kBlockBit))
-      visitBlock(current & ~kBlockBit);
-    do {
-      if (top == 0) return settle(s);
-      --top;
-    } while (!anyInReach<kPacket>(stack[top].lower, s.limit));
-    current = stack[top].child;
-  }
+  walk(s, stack, visitNode, visitBlock,
+       [&](const PacketWaiting& next) HWY_ATTR { return anyInReach<kPacket>(next.lower, s.limit); });
 }
 
 }  // namespace

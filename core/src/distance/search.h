@@ -1,6 +1,6 @@
 #pragma once
-// The part of a search that is vectorised: walking the hierarchy in float and collecting the triangles that may be the
-// nearest. What is exact is done elsewhere, once for all instruction sets.
+// A search for nearest triangles, vectorised: it walks the hierarchy in float, collects the triangles that may be the
+// nearest, and measures those in double, in the same operations on every instruction set.
 
 #include <array>
 #include <cstdint>

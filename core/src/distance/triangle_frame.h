@@ -44,6 +44,7 @@ struct FramePoint {
   bool inside;  ///< projects strictly into the triangle
 };
 
+/// search.cpp has the same in vectors; tests hold that against this.
 inline FramePoint locate(const TriangleFrame& f, const Vector3& x) {
   const double wx = x[0] - f.origin[0], wy = x[1] - f.origin[1], wz = x[2] - f.origin[2];
   const double p = wx * f.along[0] + wy * f.along[1] + wz * f.along[2];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <sstream>
 #include <string>
 
@@ -17,20 +16,20 @@ int pointsPerAxis(int degree, int multiple) { return std::max((multiple * degree
 /// Points handed to Φ at once: long enough to amortise a call, short enough to notice a cancellation.
 constexpr std::size_t kBatch = 512;
 
-/// The points of a tensor product of n an axis as indices, along Morton's curve: neighbours in this order are
-/// neighbours in space, which exact distances are fastest with.
-std::vector<std::uint32_t> mortonOrder(std::uint32_t n) {
-  const auto spread = [](std::uint32_t index) {  // a bit in three
+/// The points of a tensor product of n an axis along Morton's curve: neighbours in this order are neighbours in space,
+/// which exact distances are fastest with.
+std::vector<std::array<std::uint32_t, 3>> mortonOrder(std::uint32_t n) {
+  const auto code = [](const std::array<std::uint32_t, 3>& point) {
     std::uint32_t bits = 0;
-    for (int bit = 0; bit < 10; ++bit) bits |= (index >> bit & 1) << (3 * bit);
+    for (int bit = 0; bit < 10; ++bit)
+      for (int axis = 0; axis < 3; ++axis) bits |= (point[axis] >> bit & 1) << (3 * bit + 2 - axis);
     return bits;
   };
-  const auto code = [&](std::uint32_t index) {
-    return spread(index / (n * n)) << 2 | spread(index / n % n) << 1 | spread(index % n);
-  };
-  std::vector<std::uint32_t> order(std::size_t(n) * n * n);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return code(a) < code(b); });
+  std::vector<std::array<std::uint32_t, 3>> order;
+  for (std::uint32_t a = 0; a < n; ++a)
+    for (std::uint32_t b = 0; b < n; ++b)
+      for (std::uint32_t c = 0; c < n; ++c) order.push_back({a, b, c});
+  std::ranges::sort(order, {}, code);
   return order;
 }
 
@@ -101,13 +100,16 @@ CellFitter::Samples CellFitter::sample(const Box& cell, const Rules& rules) cons
   std::array<double, kBatch> values;
   for (std::size_t first = 0; first < rules.order.size(); first += kBatch) {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-    const std::span<const std::uint32_t> batch(&rules.order[first], std::min(kBatch, rules.order.size() - first));
-    for (std::size_t i = 0; i < batch.size(); ++i)
-      points[i] = centre + half.cwiseProduct(Vector3(at[batch[i] / (n * n)], at[batch[i] / n % n], at[batch[i] % n]));
+    const auto batch = std::span(rules.order).subspan(first, std::min(kBatch, rules.order.size() - first));
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const auto [a, b, c] = batch[i];
+      points[i] = centre + half.cwiseProduct(Vector3(at[a], at[b], at[c]));
+    }
     distance_(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
     checkFinite(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      samples.values[batch[i]] = values[i];
+      const auto [a, b, c] = batch[i];
+      samples.values[(a * n + b) * n + c] = values[i];
       if (options_.band > 0) {
         const double farthestCorner = ((points[i] - centre).cwiseAbs() + half).norm();
         clearance = std::max(clearance, std::abs(values[i]) - farthestCorner);

@@ -45,10 +45,10 @@ class CellFitter {
  private:
   /// Quadrature of one degree p and the projections that use its points.
   struct Rules {
-    QuadratureRule points;             ///< an axis
-    std::vector<std::uint32_t> order;  ///< in which the samples are taken
-    Projection own;                    ///< onto degree p, from the cell's own points
-    Projection raised;                 ///< onto degree p+1, from the points of the eight children
+    QuadratureRule points;                            ///< an axis
+    std::vector<std::array<std::uint32_t, 3>> order;  ///< in which the samples are taken: a point of each axis
+    Projection own;                                   ///< onto degree p, from the cell's own points
+    Projection raised;                                ///< onto degree p+1, from the points of the eight children
   };
   struct Samples {
     std::vector<double> values;

@@ -134,6 +134,38 @@ void answerMany(const FieldData& field, const Directory& directory, std::span<co
       field.coefficients);
 }
 
+/// A node on a way through the whole octree.
+struct Visited {
+  std::uint32_t node;
+  int depth;
+  std::array<std::uint32_t, 3> base;  ///< base cell
+  std::array<std::uint32_t, 3> path;  ///< see `Location::path`
+};
+
+/// Base cells first to last, children 0 to 7; below an internal node where `visit` returns true for it.
+template <typename Visit>
+void visitNodes(const FieldData& field, Visit&& visit) {
+  std::vector<Visited> stack;
+  std::uint32_t root = 0;
+  for (std::uint32_t z = 0; z < field.grid[2]; ++z)
+    for (std::uint32_t y = 0; y < field.grid[1]; ++y)
+      for (std::uint32_t x = 0; x < field.grid[0]; ++x) {
+        stack.push_back({root++, 0, {x, y, z}, {0, 0, 0}});
+        while (!stack.empty()) {
+          const Visited at = stack.back();
+          stack.pop_back();
+          const std::uint64_t bits = field.nodes[at.node];
+          if (!visit(at) || node::isLeaf(bits)) continue;
+          for (std::uint32_t child = 8; child-- > 0;)
+            stack.push_back(
+                {node::firstChild(bits) + child,
+                 at.depth + 1,
+                 at.base,
+                 {2 * at.path[0] + (child & 1), 2 * at.path[1] + (child >> 1 & 1), 2 * at.path[2] + (child >> 2)}});
+        }
+      }
+}
+
 /// As deep as a sixteenth of the field's own size allows.
 Directory makeDirectory(const FieldData& field) {
   Directory directory;
@@ -143,23 +175,18 @@ Directory makeDirectory(const FieldData& field) {
   const std::size_t most = bytes / 16 / sizeof(directory.entries[0]);
   while (directory.depth < kMaxDepth && base << (3 * (directory.depth + 1)) <= most) ++directory.depth;
   directory.entries.resize(base << (3 * directory.depth));
-  const auto fill = [&](const auto& self, std::uint64_t bits, int depth, std::array<std::size_t, 3> place) -> void {
-    if (!node::isLeaf(bits) && depth < directory.depth) {
-      for (std::uint32_t child = 0; child < 8; ++child)
-        self(self, field.nodes[node::firstChild(bits) + child], depth + 1,
-             {2 * place[0] + (child & 1), 2 * place[1] + ((child >> 1) & 1), 2 * place[2] + (child >> 2)});
-      return;
-    }
-    const std::size_t width = std::size_t{1} << (directory.depth - depth);
-    const std::size_t nx = field.grid[0] << directory.depth, ny = field.grid[1] << directory.depth;
-    for (std::size_t z = place[2] * width; z < (place[2] + 1) * width; ++z)
-      for (std::size_t y = place[1] * width; y < (place[1] + 1) * width; ++y)
-        std::fill_n(&directory.entries[(z * ny + y) * nx + place[0] * width], width, bits | std::uint64_t(depth) << 40);
-  };
-  std::size_t root = 0;
-  for (std::size_t z = 0; z < field.grid[2]; ++z)
-    for (std::size_t y = 0; y < field.grid[1]; ++y)
-      for (std::size_t x = 0; x < field.grid[0]; ++x) fill(fill, field.nodes[root++], 0, {x, y, z});
+  const std::size_t nx = field.grid[0] << directory.depth, ny = field.grid[1] << directory.depth;
+  visitNodes(field, [&](const Visited& at) {
+    if (!node::isLeaf(field.nodes[at.node]) && at.depth < directory.depth) return true;
+    const std::size_t width = std::size_t{1} << (directory.depth - at.depth);
+    std::array<std::size_t, 3> first;  // of the entries that the node covers
+    for (int axis = 0; axis < 3; ++axis) first[axis] = ((at.base[axis] << at.depth) + at.path[axis]) * width;
+    for (std::size_t z = first[2]; z < first[2] + width; ++z)
+      for (std::size_t y = first[1]; y < first[1] + width; ++y)
+        std::fill_n(&directory.entries[(z * ny + y) * nx + first[0]], width,
+                    Directory::entry(field.nodes[at.node], at.depth));
+    return false;
+  });
   return directory;
 }
 
@@ -232,32 +259,10 @@ Cell Field::cellAt(const Vector3& x) const {
 }
 
 void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
-  struct Entry {
-    std::uint32_t node;
-    int depth;
-    std::array<std::uint32_t, 3> path;
-  };
-  std::vector<Entry> stack;
-  std::uint32_t root = 0;
-  for (std::uint32_t z = 0; z < data_.grid[2]; ++z)
-    for (std::uint32_t y = 0; y < data_.grid[1]; ++y)
-      for (std::uint32_t x = 0; x < data_.grid[0]; ++x) {
-        stack.push_back({root++, 0, {0, 0, 0}});
-        while (!stack.empty()) {
-          const Entry entry = stack.back();
-          stack.pop_back();
-          const std::uint64_t bits = data_.nodes[entry.node];
-          if (node::isLeaf(bits)) {
-            visit(makeCell(data_, entry.node, entry.depth, {x, y, z}, entry.path));
-            continue;
-          }
-          for (std::uint32_t child = 8; child-- > 0;)
-            stack.push_back({node::firstChild(bits) + child,
-                             entry.depth + 1,
-                             {2 * entry.path[0] + (child & 1), 2 * entry.path[1] + ((child >> 1) & 1),
-                              2 * entry.path[2] + (child >> 2)}});
-        }
-      }
+  visitNodes(data_, [&](const Visited& at) {
+    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, at.node, at.depth, at.base, at.path));
+    return true;
+  });
 }
 
 }  // namespace hpsdf

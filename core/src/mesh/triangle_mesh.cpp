@@ -41,6 +41,14 @@ class Hasher {
   std::unique_ptr<XXH3_state_t, Free> state_;
 };
 
+/// Throws `Error`, its message after `prefix`, for a surface without finite extent.
+double longestSide(const Box& surface, const std::string& prefix) {
+  const double longest = surface.isEmpty() ? 0 : surface.sizes().maxCoeff();
+  if (!(longest > 0) || !std::isfinite(longest))
+    throw Error(prefix + "the surface cannot be normalized, for it has no finite extent; check its vertices");
+  return longest;
+}
+
 }  // namespace
 
 void requireValidIndices(const TriangleMesh& mesh) {
@@ -95,22 +103,12 @@ std::uint64_t fingerprint(const TriangleMesh& mesh) {
   return hasher.digest();
 }
 
-Normalization normalizing(const Box& surface) {
-  const double longest = surface.isEmpty() ? 0 : surface.sizes().maxCoeff();
-  if (!(longest > 0) || !std::isfinite(longest))
-    throw Error("the surface cannot be normalized, for it has no finite extent; check its vertices");
-  return {surface.center(), 2 / longest};
-}
+Normalization normalizing(const Box& surface) { return {surface.center(), 2 / longestSide(surface, "")}; }
 
 TriangleMesh normalized(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
   const Box box = boundingBox(mesh);
-  try {
-    (void)normalizing(box);
-  } catch (const Error& error) {
-    throw Error(messagePrefix(mesh) + error.what());
-  }
-  const double longest = box.sizes().maxCoeff();
+  const double longest = longestSide(box, messagePrefix(mesh));
   TriangleMesh result = mesh;
   // (x - min) - (max - x) is 2(x - centre) without rounding the centre: on the longest side it is -longest at min and
   // longest at max in floating point too, and it never decreases with x, so that nothing leaves [-1, 1].
