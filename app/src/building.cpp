@@ -163,6 +163,12 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "3",
        .minimum = 2,
        .maximum = 8},
+      {.name = "cubature",
+       .type = ParameterType::choice,
+       .help = "Where a cell's samples stand: compact needs half the points for the same order where such rules are "
+               "known (orders up to 13); product takes Gauss points along each axis, as the paper does.",
+       .defaultText = "compact",
+       .choices = {"compact", "product"}},
       {.name = "band",
        .type = ParameterType::number,
        .help =
@@ -181,8 +187,8 @@ std::vector<Parameter> buildParameters() {
        .type = ParameterType::flag,
        .help =
            "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, max-degree "
-           "30, max-depth 10, quadrature 4 with samples of its own for each trial, double. Options written beside it "
-           "win.",
+           "30, max-depth 10, quadrature 4 by products with samples of its own for each trial, double. Options written "
+           "beside it win.",
        .defaultText = "false"},
   };
 }
@@ -199,6 +205,8 @@ BuildOptions buildOptions(const Arguments& arguments) {
   if (decides("max-degree")) options.maxDegree = arguments.whole("max-degree");
   if (decides("max-depth")) options.maxDepth = arguments.whole("max-depth");
   if (decides("quadrature")) options.quadrature = arguments.whole("quadrature");
+  if (decides("cubature"))
+    options.cubature = arguments.text("cubature") == "compact" ? CubatureKind::compact : CubatureKind::product;
   if (decides("strategy")) {
     const std::string name = arguments.text("strategy");
     options.strategy = name == "h1" ? Strategy::h1 : name == "h2" ? Strategy::h2 : Strategy::hp;

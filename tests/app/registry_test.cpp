@@ -68,7 +68,7 @@ TEST(Registry, holdsTheNamesToKeep) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> fixed = {
       {"build",
        {"target-error", "grid", "nearness", "max-degree", "max-depth", "domain", "margin", "normalize", "strategy",
-        "coefficients", "quadrature", "band", "threads", "paper", "json"}},
+        "coefficients", "quadrature", "cubature", "band", "threads", "paper", "json"}},
       {"info", {"json"}},
       {"query", {"json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
@@ -107,6 +107,7 @@ void expectEqual(const BuildOptions& a, const BuildOptions& b) {
   EXPECT_EQ(a.maxDepth, b.maxDepth);
   EXPECT_EQ(a.strategy, b.strategy);
   EXPECT_EQ(a.quadrature, b.quadrature);
+  EXPECT_EQ(a.cubature, b.cubature);
   EXPECT_EQ(a.trialSamples, b.trialSamples);
   EXPECT_EQ(a.band, b.band);
   EXPECT_EQ(a.coefficients, b.coefficients);
@@ -127,23 +128,26 @@ TEST(BuildArguments, whatIsWrittenBesidePaperWins) {
   expected.maxDegree = 12;
   expected.maxDepth = 3;
   expected.quadrature = 5;
+  expected.cubature = CubatureKind::compact;
   expected.strategy = Strategy::h2;
   expected.coefficients = CoefficientType::float32;
   expectEqual(buildOptions(parse("build",
                                  "m.obj -o f --nearness 7 --max-degree 12 --max-depth 3 --quadrature 5 --strategy h2 "
-                                 "--coefficients float --paper")),
+                                 "--cubature compact --coefficients float --paper")),
               expected);
 }
 
 TEST(BuildArguments, allAreRead) {
-  const BuildOptions options = buildOptions(parse(
-      "build",
-      "m.obj -o f --target-error 2.5e-7 --grid 3,4,5 --strategy h1 --coefficients double --band 0.25 --threads 3"));
+  const BuildOptions options = buildOptions(parse("build",
+                                                  "m.obj -o f --target-error 2.5e-7 --grid 3,4,5 --strategy h1 "
+                                                  "--coefficients double --band 0.25 --cubature product "
+                                                  "--threads 3"));
   EXPECT_EQ(options.targetError, 2.5e-7);
   EXPECT_EQ(options.grid, (std::array<std::uint32_t, 3>{3, 4, 5}));
   EXPECT_EQ(options.strategy, Strategy::h1);
   EXPECT_EQ(options.coefficients, CoefficientType::float64);
   EXPECT_EQ(options.band, 0.25);
+  EXPECT_EQ(options.cubature, CubatureKind::product);
   EXPECT_EQ(options.threads, 3);
 }
 

@@ -75,7 +75,9 @@ TEST(Build, CountsOfAKnownBox) {
   BuildOptions paper = paperOptions();
   paper.targetError = 1e-6;
   for (const Known& known :
-       {Known{{.targetError = 1e-6}, 23813, 280978, 2946560}, Known{paper, 16456, 207568, 6772552}}) {
+       {Known{{.targetError = 1e-6}, 24548, 284088, 1629360},
+        Known{{.targetError = 1e-6, .cubature = CubatureKind::product}, 23813, 280978, 2946560},
+        Known{paper, 16456, 207568, 6772552}}) {
     const Field field = build(shapes::analytic("analytic:box"), cube(), known.options);
     const FieldStatistics figures = statistics(field);
     EXPECT_NEAR(double(figures.leaves), known.leaves, 0.002 * known.leaves);

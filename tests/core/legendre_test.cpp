@@ -47,14 +47,5 @@ TEST(GaussLegendre, IntegratesUpToItsDegreeAndNoFurther) {
   }
 }
 
-TEST(GaussLegendre, HalvesHoldTheRuleTwice) {
-  const QuadratureRule whole = gaussLegendre(4);
-  const QuadratureRule halves = splitInHalves(whole);
-  ASSERT_EQ(halves.points.size(), 8u);
-  double sum = 0;
-  for (int q = 0; q < 8; ++q) sum += halves.weights[q] * std::abs(halves.points[q]);  // kink at the middle: exact
-  EXPECT_NEAR(sum, 1, 1e-14);
-}
-
 }  // namespace
 }  // namespace hpsdf

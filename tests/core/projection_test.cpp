@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -18,47 +20,100 @@ std::vector<double> randomCoefficients(int degree, unsigned seed) {
   return c;
 }
 
-std::vector<double> sampled(const std::vector<double>& c, int degree, const QuadratureRule& rule) {
+/// The polynomial at points of a part of the cell: `lower` is that part's corner, `size` its edge.
+std::vector<double> sampled(const std::vector<double>& c, int degree, const std::vector<Vector3>& points,
+                            const Vector3& lower = {-1, -1, -1}, double size = 2) {
   std::vector<double> samples;
-  for (const double x : rule.points)
-    for (const double y : rule.points)
-      for (const double z : rule.points) samples.push_back(evaluate(c.data(), degree, {x, y, z}));
+  for (const Vector3& point : points) {
+    const Vector3 x = lower + (point + Vector3::Ones()) * (size / 2);
+    samples.push_back(evaluate(c.data(), degree, {x.x(), x.y(), x.z()}));
+  }
   return samples;
+}
+
+void expectNear(const std::vector<double>& a, const std::vector<double>& b, double tolerance) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], tolerance) << "coefficient " << i;
 }
 
 TEST(Projection, ReproducesEveryPolynomialOfItsDegree) {
   for (const int degree : {1, 2, 3, 5, 9, 17, 30}) {
     const auto c = randomCoefficients(degree, 7);
-    for (const bool split : {false, true}) {
-      const QuadratureRule rule = split ? splitInHalves(gaussLegendre(degree + 1)) : gaussLegendre(degree + 1);
-      const auto fitted = Projection(rule, degree)(sampled(c, degree, rule));
-      ASSERT_EQ(fitted.size(), c.size());
-      for (std::size_t i = 0; i < c.size(); ++i) ASSERT_NEAR(fitted[i], c[i], 1e-11) << "degree " << degree;
-    }
+    const auto project = productProjection(gaussLegendre(degree + 1), degree);
+    expectNear((*project)(sampled(c, degree, project->points())), c, 1e-11);
+  }
+  for (int degree = 1; degree <= 6; ++degree) {
+    const auto c = randomCoefficients(degree, 8);
+    const auto project = plainProjection(*compactCubature(2 * degree), degree);
+    expectNear((*project)(sampled(c, degree, project->points())), c, 1e-13);
   }
 }
 
 TEST(Projection, LowerDegreesDoNotFeelHigherOnes) {
   const auto c = randomCoefficients(5, 3);
-  const QuadratureRule rule = gaussLegendre(6);
-  const auto samples = sampled(c, 5, rule);
-  const auto fitted = Projection(rule, 3)(samples);
-  forEachCoefficient(3, [&](int i, int j, int k, int index) {
-    forEachCoefficient(5, [&](int a, int b, int d, int other) {
-      if (a == i && b == j && d == k) {
-        EXPECT_NEAR(fitted[index], c[other], 1e-13);
-      }
+  for (const auto& project :
+       {productProjection(gaussLegendre(6), 3), plainProjection(*compactCubature(8), 3)}) {  // exact for 5 + 3
+    const auto fitted = (*project)(sampled(c, 5, project->points()));
+    forEachCoefficient(3, [&](int i, int j, int k, int index) {
+      forEachCoefficient(5, [&](int a, int b, int d, int other) {
+        if (a == i && b == j && d == k) {
+          EXPECT_NEAR(fitted[index], c[other], 1e-13);
+        }
+      });
     });
-  });
+  }
 }
 
 TEST(Projection, MeanSquareIsParseval) {
   const auto c = randomCoefficients(4, 11);
-  const QuadratureRule rule = gaussLegendre(5);
   double parseval = 0;
   forEachCoefficient(4,
                      [&](int i, int j, int k, int index) { parseval += c[index] * c[index] * squaredNorm(i, j, k); });
-  EXPECT_NEAR(Projection(rule, 4).meanSquare(sampled(c, 4, rule)), parseval, 1e-13);
+  for (const auto& project : {productProjection(gaussLegendre(5), 4), plainProjection(*compactCubature(8), 4)})
+    EXPECT_NEAR(project->meanSquare(sampled(c, 4, project->points())), parseval, 1e-13);
+}
+
+TEST(Projection, ChildrenJoinedAreTheParent) {
+  for (const int degree : {0, 1, 2, 5, 31}) {
+    const auto c = randomCoefficients(std::min(degree, kMaxDegree), 13);
+    const auto project = productProjection(gaussLegendre(degree + 1), degree);
+    std::array<std::vector<double>, 8> children;
+    for (int child = 0; child < 8; ++child) {
+      const Vector3 lower(child & 1, child >> 1 & 1, child >> 2);
+      children[child] =
+          (*project)(sampled(c, std::min(degree, kMaxDegree), project->points(), lower - Vector3::Ones(), 1));
+    }
+    auto expected = c;  // of degree 31 without its top shell
+    if (degree > kMaxDegree) expected = appendTopDegree(c, std::vector<double>(coefficientCount(degree), 0.0), degree);
+    expectNear(joined(children, degree), expected, 1e-10);
+  }
+}
+
+/// A function with a kink: nothing is exact, so that what is joined must be what the samples together give.
+TEST(Projection, ChildrenJoinedAreTheirSamplesTogether) {
+  const auto kink = [](const Vector3& x) { return std::abs(x.x() + 0.3 * x.y() - 0.2) + x.z() * x.x(); };
+  constexpr int kDegree = 4;
+  const auto project = plainProjection(*compactCubature(9), kDegree);
+  std::array<std::vector<double>, 8> children;
+  std::vector<double> together(coefficientCount(kDegree), 0.0);
+  for (int child = 0; child < 8; ++child) {
+    const Vector3 centre((child & 1) - 0.5, (child >> 1 & 1) - 0.5, (child >> 2) - 0.5);
+    std::vector<double> samples;
+    for (std::size_t q = 0; q < project->points().size(); ++q) {
+      const Vector3 x = centre + project->points()[q] / 2;
+      samples.push_back(kink(x));
+      double u[kDegree + 1], v[kDegree + 1], w[kDegree + 1];
+      legendreValues(x.x(), kDegree, u);
+      legendreValues(x.y(), kDegree, v);
+      legendreValues(x.z(), kDegree, w);
+      const double weight = compactCubature(9)->weights[q] / 64;
+      forEachCoefficient(kDegree, [&](int i, int j, int k, int index) {
+        together[index] += weight * samples.back() * u[i] * v[j] * w[k] / squaredNorm(i, j, k);
+      });
+    }
+    children[child] = (*project)(samples);
+  }
+  expectNear(joined(children, kDegree), together, 1e-14);
 }
 
 TEST(Projection, TopDegreeErrorIsTheNormOfTheLastShell) {
@@ -78,6 +133,11 @@ TEST(Projection, AppendingKeepsTheLowerCoefficients) {
   forEachCoefficient(4, [&](int i, int j, int k, int index) {
     EXPECT_EQ(both[index], i + j + k == 4 ? raised[index] : lower[next++]);
   });
+}
+
+TEST(Projection, DroppingTheTopKeepsTheRest) {
+  const auto c = randomCoefficients(5, 4);
+  expectNear(appendTopDegree(withoutTopDegree(c, 5), c, 5), c, 0);
 }
 
 TEST(Evaluate, GradientMatchesCentralDifferences) {

@@ -21,6 +21,12 @@ enum class TrialSamples : std::uint8_t {
   own,
 };
 
+/// Where the samples of a cell stand.
+enum class CubatureKind : std::uint8_t {
+  compact,  ///< few points for the same order, where such rules are known (orders up to 13); elsewhere `product`
+  product,  ///< the tensor product of Gauss rules (the paper)
+};
+
 /// Settings of the construction (paper, Algorithm 1). The defaults are ours; `paperOptions` are the paper's.
 struct BuildOptions {
   /// τ at the paper's scale, where the longest side of the mesh's box is 2. Internally τ·(L/2)^5, L that side in the
@@ -31,7 +37,8 @@ struct BuildOptions {
   int maxDegree = 30;                             ///< p_max, 1 to 30
   int maxDepth = 10;                              ///< l_max, 0 to 20
   Strategy strategy = Strategy::hp;
-  int quadrature = 3;  ///< order of the Gauss quadrature as a multiple of p, 2 to 8; the paper's is 4
+  int quadrature = 3;  ///< order of the quadrature as a multiple of p, 2 to 8; the paper's is 4
+  CubatureKind cubature = CubatureKind::compact;
   TrialSamples trialSamples = TrialSamples::children;
   /// Width in world units: cells wholly farther from the surface are not refined and do not count towards ε. 0: none.
   double band = 0;

@@ -31,15 +31,4 @@ QuadratureRule gaussLegendre(int n) {
   return rule;
 }
 
-QuadratureRule splitInHalves(const QuadratureRule& rule) {
-  QuadratureRule both;
-  for (const double side : {-1.0, 1.0}) {
-    for (std::size_t q = 0; q < rule.points.size(); ++q) {
-      both.points.push_back((rule.points[q] + side) / 2);
-      both.weights.push_back(rule.weights[q] / 2);
-    }
-  }
-  return both;
-}
-
 }  // namespace hpsdf

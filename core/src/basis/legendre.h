@@ -44,7 +44,4 @@ struct QuadratureRule {
 /// The n-point Gauss-Legendre rule: exact for polynomials up to degree 2n-1. Points ascend and are exactly symmetric.
 QuadratureRule gaussLegendre(int n);
 
-/// The rule squeezed into both halves of [-1, 1]: the points that the children of a cell share along an axis.
-QuadratureRule splitInHalves(const QuadratureRule& rule);
-
 }  // namespace hpsdf

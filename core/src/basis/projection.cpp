@@ -2,81 +2,187 @@
 
 #include <cassert>
 #include <cstddef>
+#include <utility>
 
 namespace hpsdf {
+namespace {
 
-Projection::Projection(const QuadratureRule& rule, int degree)
-    : degree_(degree), points_(static_cast<int>(rule.points.size())), weights_(rule.weights) {
-  rows_.resize(std::size_t(degree + 1) * points_);
-  std::vector<double> values(degree + 1);
-  for (int q = 0; q < points_; ++q) {
-    legendreValues(rule.points[q], degree, values.data());
-    for (int i = 0; i <= degree; ++i) rows_[std::size_t(i) * points_ + q] = (2 * i + 1) / 2.0 * weights_[q] * values[i];
-  }
+/// The tensor product of an axis rule, z fastest.
+Cubature product(const QuadratureRule& axis) {
+  Cubature all;
+  for (std::size_t a = 0; a < axis.points.size(); ++a)
+    for (std::size_t b = 0; b < axis.points.size(); ++b)
+      for (std::size_t c = 0; c < axis.points.size(); ++c) {
+        all.points.emplace_back(axis.points[a], axis.points[b], axis.points[c]);
+        all.weights.push_back(axis.weights[a] * axis.weights[b] * axis.weights[c]);
+      }
+  return all;
 }
 
-std::vector<double> Projection::operator()(std::span<const double> samples) const {
-  const int n = points_;
-  const int count = degree_ + 1;
-  assert(samples.size() == std::size_t(n) * n * n);
-
-  // z: alongZ[a][b][k]
-  std::vector<double> alongZ(std::size_t(n) * n * count);
-  for (int line = 0; line < n * n; ++line) {
-    const double* in = &samples[std::size_t(line) * n];
-    double* out = &alongZ[std::size_t(line) * count];
-    for (int k = 0; k < count; ++k) {
-      const double* row = &rows_[std::size_t(k) * n];
-      double sum = 0;
-      for (int c = 0; c < n; ++c) sum += row[c] * in[c];
-      out[k] = sum;
+class ProductProjection final : public Projection {
+ public:
+  ProductProjection(const QuadratureRule& axis, int degree)
+      : Projection(product(axis), degree),
+        points_(static_cast<int>(axis.points.size())),
+        rows_(std::size_t(degree + 1) * points_) {
+    std::vector<double> values(degree + 1);
+    for (int q = 0; q < points_; ++q) {
+      legendreValues(axis.points[q], degree, values.data());
+      for (int i = 0; i <= degree; ++i)
+        rows_[std::size_t(i) * points_ + q] = (2 * i + 1) / 2.0 * axis.weights[q] * values[i];
     }
   }
 
-  // y: alongY[a][j][k], j+k ≤ p
-  std::vector<double> alongY(std::size_t(n) * count * count, 0.0);
-  for (int a = 0; a < n; ++a) {
-    for (int j = 0; j < count; ++j) {
-      double* out = &alongY[(std::size_t(a) * count + j) * count];
-      for (int b = 0; b < n; ++b) {
-        const double factor = rows_[std::size_t(j) * n + b];
-        const double* in = &alongZ[(std::size_t(a) * n + b) * count];
-        for (int k = 0; k < count - j; ++k) out[k] += factor * in[k];
+  std::vector<double> operator()(std::span<const double> samples) const override {
+    const int n = points_;
+    const int count = degree_ + 1;
+    assert(samples.size() == std::size_t(n) * n * n);
+
+    // z: alongZ[a][b][k]
+    std::vector<double> alongZ(std::size_t(n) * n * count);
+    for (int line = 0; line < n * n; ++line) {
+      const double* in = &samples[std::size_t(line) * n];
+      double* out = &alongZ[std::size_t(line) * count];
+      for (int k = 0; k < count; ++k) {
+        const double* row = &rows_[std::size_t(k) * n];
+        double sum = 0;
+        for (int c = 0; c < n; ++c) sum += row[c] * in[c];
+        out[k] = sum;
       }
     }
+
+    // y: alongY[a][j][k], j+k ≤ p
+    std::vector<double> alongY(std::size_t(n) * count * count, 0.0);
+    for (int a = 0; a < n; ++a) {
+      for (int j = 0; j < count; ++j) {
+        double* out = &alongY[(std::size_t(a) * count + j) * count];
+        for (int b = 0; b < n; ++b) {
+          const double factor = rows_[std::size_t(j) * n + b];
+          const double* in = &alongZ[(std::size_t(a) * n + b) * count];
+          for (int k = 0; k < count - j; ++k) out[k] += factor * in[k];
+        }
+      }
+    }
+
+    // x
+    std::vector<double> coefficients(coefficientCount(degree_), 0.0);
+    double* out = coefficients.data();
+    for (int i = 0; i < count; ++i) {
+      for (int j = 0; j < count - i; ++j) {
+        const int length = count - i - j;
+        for (int a = 0; a < n; ++a) {
+          const double factor = rows_[std::size_t(i) * n + a];
+          const double* in = &alongY[(std::size_t(a) * count + j) * count];
+          for (int k = 0; k < length; ++k) out[k] += factor * in[k];
+        }
+        out += length;
+      }
+    }
+    return coefficients;
   }
 
-  // x
-  std::vector<double> coefficients(coefficientCount(degree_), 0.0);
-  double* out = coefficients.data();
-  for (int i = 0; i < count; ++i) {
-    for (int j = 0; j < count - i; ++j) {
-      const int length = count - i - j;
-      for (int a = 0; a < n; ++a) {
-        const double factor = rows_[std::size_t(i) * n + a];
-        const double* in = &alongY[(std::size_t(a) * count + j) * count];
-        for (int k = 0; k < length; ++k) out[k] += factor * in[k];
-      }
-      out += length;
+ private:
+  int points_;                ///< an axis
+  std::vector<double> rows_;  ///< [i][q] = (2i+1)/2 · w_q · L_i(x_q)
+};
+
+class PlainProjection final : public Projection {
+ public:
+  PlainProjection(const Cubature& cubature, int degree)
+      : Projection(cubature, degree), matrix_(points().size() * coefficientCount(degree)) {
+    std::vector<double> x(degree + 1), y(degree + 1), z(degree + 1);
+    double* row = matrix_.data();
+    for (std::size_t q = 0; q < points().size(); ++q) {
+      legendreValues(points()[q].x(), degree, x.data());
+      legendreValues(points()[q].y(), degree, y.data());
+      legendreValues(points()[q].z(), degree, z.data());
+      forEachCoefficient(degree, [&](int i, int j, int k, int) {
+        *row++ = cubature.weights[q] / 8 / squaredNorm(i, j, k) * x[i] * y[j] * z[k];
+      });
     }
   }
-  return coefficients;
+
+  std::vector<double> operator()(std::span<const double> samples) const override {
+    assert(samples.size() == points().size());
+    std::vector<double> coefficients(coefficientCount(degree_), 0.0);
+    const double* row = matrix_.data();
+    for (const double sample : samples)
+      for (double& c : coefficients) c += *row++ * sample;
+    return coefficients;
+  }
+
+ private:
+  std::vector<double> matrix_;  ///< [q][coefficient]
+};
+
+/// Place of (i, j, k) among the coefficients of a degree.
+int placeOf(int i, int j, int k, int degree) {
+  const int rest = degree - i;
+  return coefficientCount(degree) - coefficientCount(rest) +
+         ((rest + 1) * (rest + 2) - (rest - j + 1) * (rest - j + 2)) / 2 + k;
 }
+
+/// What coefficient a of the half of an axis adds to coefficient i of the whole: L_i of the whole is
+/// Σ_a share·L_a/‖L_a‖² of the half above; below, the signs of odd i + a change.
+class HalfShares {
+ public:
+  HalfShares() {
+    constexpr int n = kMaxDegree + 2;
+    // L_i((t+1)/2) = Σ_a r[i][a] L_a(t), by the recurrences of L_i and of t·L_a
+    std::array<std::array<double, n + 1>, n> r{};
+    r[0][0] = 1;
+    r[1][0] = r[1][1] = 0.5;
+    for (int i = 1; i + 1 < n; ++i) {
+      std::array<double, n + 1> product{};  // (t+1)/2 · L_i
+      for (int a = 0; a <= i; ++a) {
+        product[a] += r[i][a] / 2;
+        product[a + 1] += r[i][a] * (a + 1) / (2 * a + 1) / 2;
+        if (a > 0) product[a - 1] += r[i][a] * a / (2 * a + 1) / 2;
+      }
+      for (int a = 0; a <= i + 1; ++a) r[i + 1][a] = ((2 * i + 1) * product[a] - i * r[i - 1][a]) / (i + 1);
+    }
+    for (int i = 0; i < n; ++i)
+      for (int a = 0; a <= i; ++a) share_[i][a] = r[i][a] * (2 * i + 1) / (2 * a + 1) / 2;
+  }
+
+  double above(int i, int a) const { return share_[i][a]; }
+  double below(int i, int a) const { return (i + a) % 2 == 0 ? share_[i][a] : -share_[i][a]; }
+
+ private:
+  std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2> share_{};
+};
+
+/// Two halves along an axis as one.
+std::vector<double> joinedAlong(int axis, const std::vector<double>& below, const std::vector<double>& above,
+                                int degree) {
+  static const HalfShares shares;
+  std::vector<double> whole(below.size(), 0.0);
+  forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+    std::array<int, 3> at{i, j, k};
+    const int top = at[axis];
+    for (int a = 0; a <= top; ++a) {
+      at[axis] = a;
+      const int place = placeOf(at[0], at[1], at[2], degree);
+      whole[index] += shares.below(top, a) * below[place] + shares.above(top, a) * above[place];
+    }
+  });
+  return whole;
+}
+
+}  // namespace
 
 double Projection::meanSquare(std::span<const double> samples) const {
-  const int n = points_;
   double total = 0;
-  for (int a = 0; a < n; ++a) {
-    for (int b = 0; b < n; ++b) {
-      double line = 0;
-      for (int c = 0; c < n; ++c) {
-        const double value = samples[(std::size_t(a) * n + b) * n + c];
-        line += weights_[c] * value * value;
-      }
-      total += weights_[a] * weights_[b] * line;
-    }
-  }
+  for (std::size_t s = 0; s < samples.size(); ++s) total += cubature_.weights[s] * samples[s] * samples[s];
   return total / 8;
+}
+
+std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, int degree) {
+  return std::make_unique<ProductProjection>(axis, degree);
+}
+
+std::unique_ptr<const Projection> plainProjection(const Cubature& cubature, int degree) {
+  return std::make_unique<PlainProjection>(cubature, degree);
 }
 
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree) {
@@ -87,6 +193,25 @@ std::vector<double> appendTopDegree(std::span<const double> lower, std::span<con
   });
   assert(next == lower.size());
   return result;
+}
+
+std::vector<double> withoutTopDegree(std::span<const double> coefficients, int degree) {
+  std::vector<double> result;
+  result.reserve(coefficientCount(degree - 1));
+  forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+    if (i + j + k < degree) result.push_back(coefficients[index]);
+  });
+  return result;
+}
+
+std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree) {
+  std::vector<std::vector<double>> parts(children.begin(), children.end());
+  for (int axis = 0; axis < 3; ++axis) {  // pairs along x, then y, then z
+    for (std::size_t pair = 0; pair < parts.size() / 2; ++pair)
+      parts[pair] = joinedAlong(axis, parts[2 * pair], parts[2 * pair + 1], degree);
+    parts.resize(parts.size() / 2);
+  }
+  return parts[0];
 }
 
 }  // namespace hpsdf

@@ -1,13 +1,14 @@
 #pragma once
-// L2 projection of samples onto the polynomials of total degree p of a cell: a tensor contraction one axis after
-// another.
+// L2 projection of samples onto the polynomials of total degree p of a cell.
 //
-// Samples stand at the tensor product of an axis rule of n points, z fastest: sample (a, b, c) at (a·n + b)·n + c.
 // Coefficients stand in the order of FieldData: lexicographic in (i, j, k), i+j+k ≤ p, k fastest, of plain L_i L_j L_k.
 
+#include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "basis/cubature.h"
 #include "basis/legendre.h"
 #include "hpsdf/field.h"
 
@@ -41,28 +42,42 @@ double topDegreeError(const T* coefficients, int degree, double volume) {
   return sum * volume;
 }
 
-/// Projects from the tensor product of one axis rule.
+/// Projects samples at fixed points of the reference cell.
 class Projection {
  public:
-  Projection(const QuadratureRule& rule, int degree);
+  virtual ~Projection() = default;
 
+  /// Where samples stand in [-1, 1]³.
+  const std::vector<Vector3>& points() const { return cubature_.points; }
   int degree() const { return degree_; }
-  int pointsPerAxis() const { return points_; }
 
-  /// `samples`: pointsPerAxis()³ values. Returns n(p) coefficients.
-  std::vector<double> operator()(std::span<const double> samples) const;
+  /// Of a sample at each point; n(p) coefficients.
+  virtual std::vector<double> operator()(std::span<const double> samples) const = 0;
 
   /// Mean of the squared samples by the same quadrature: ∫Φ² / V.
   double meanSquare(std::span<const double> samples) const;
 
- private:
+ protected:
+  Projection(Cubature cubature, int degree) : cubature_(std::move(cubature)), degree_(degree) {}
+
+  Cubature cubature_;
   int degree_;
-  int points_;
-  std::vector<double> weights_;  ///< of the rule, summing to 2
-  std::vector<double> rows_;     ///< [i][q] = (2i+1)/2 · w_q · L_i(x_q)
 };
+
+/// From the tensor product of an axis rule: a contraction one axis after another.
+std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, int degree);
+
+/// From any points: one matrix.
+std::unique_ptr<const Projection> plainProjection(const Cubature& cubature, int degree);
 
 /// The coefficients of degree p as the first of degree p+1, the new shell filled from `raised` (paper, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
+
+/// The coefficients of degree below `degree`: without the top shell.
+std::vector<double> withoutTopDegree(std::span<const double> coefficients, int degree);
+
+/// The cell's projection from those of its eight children (number x + 2y + 4z), all of one degree: exactly what the
+/// children's samples together would give.
+std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree);
 
 }  // namespace hpsdf

@@ -106,6 +106,7 @@ BuildOptions paperOptions() {
   options.maxDepth = 10;
   options.strategy = Strategy::hp;
   options.quadrature = 4;
+  options.cubature = CubatureKind::product;
   options.trialSamples = TrialSamples::own;
   options.coefficients = CoefficientType::float64;
   return options;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 #include <string>
 
@@ -10,26 +11,37 @@
 namespace hpsdf {
 namespace {
 
-/// Points an axis for a rule exact to degree multiple·p; at least p+2, so that the children's points also carry p+1.
-int pointsPerAxis(int degree, int multiple) { return std::max((multiple * degree + 2) / 2, degree + 2); }
-
 /// Points handed to Φ at once: long enough to amortise a call, short enough to notice a cancellation.
 constexpr std::size_t kBatch = 512;
 
-/// The points of a tensor product of n an axis along Morton's curve: neighbours in this order are neighbours in space,
-/// which exact distances are fastest with.
-std::vector<std::array<std::uint32_t, 3>> mortonOrder(std::uint32_t n) {
-  const auto code = [](const std::array<std::uint32_t, 3>& point) {
-    std::uint32_t bits = 0;
-    for (int bit = 0; bit < 10; ++bit)
-      for (int axis = 0; axis < 3; ++axis) bits |= (point[axis] >> bit & 1) << (3 * bit + 2 - axis);
-    return bits;
-  };
-  std::vector<std::array<std::uint32_t, 3>> order;
-  for (std::uint32_t a = 0; a < n; ++a)
-    for (std::uint32_t b = 0; b < n; ++b)
-      for (std::uint32_t c = 0; c < n; ++c) order.push_back({a, b, c});
-  std::ranges::sort(order, {}, code);
+/// For cells of a degree p, whose children's points also carry p+1.
+std::unique_ptr<const Projection> makeProjection(int degree, const BuildOptions& options) {
+  const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
+  if (options.cubature == CubatureKind::compact)
+    if (const auto cubature = compactCubature(order)) return plainProjection(*cubature, degree + 1);
+  return productProjection(gaussLegendre(order / 2 + 1), degree + 1);
+}
+
+/// Points that Φ takes together: exact distances are fastest when each such group lies close together.
+constexpr std::size_t kGroup = 8;
+
+/// Arranges indices of points into compact groups: halved across their widest extent, again and again.
+void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& points) {
+  if (order.size() <= kGroup) return;
+  Box box;
+  for (const std::uint32_t at : order) box.extend(points[at]);
+  int widest = 0;
+  box.sizes().maxCoeff(&widest);
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t at) { return points[at][widest]; });
+  const std::size_t middle = std::max(kGroup, (order.size() / 2 + kGroup / 2) / kGroup * kGroup);
+  intoGroups(order.first(middle), points);
+  intoGroups(order.subspan(middle), points);
+}
+
+std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  intoGroups(order, points);
   return order;
 }
 
@@ -44,20 +56,6 @@ Box childBox(const Box& cell, int child) {
     }
   }
   return Box(lo, hi);
-}
-
-/// The children's samples, put together as one tensor over the parent.
-std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int n) {
-  std::vector<double> all(std::size_t(8) * n * n * n);
-  const int side = 2 * n;
-  for (int child = 0; child < 8; ++child) {
-    const int x = child & 1, y = (child >> 1) & 1, z = child >> 2;
-    const double* in = children[child].data();
-    for (int a = 0; a < n; ++a)
-      for (int b = 0; b < n; ++b, in += n)
-        std::copy_n(in, n, &all[(std::size_t(x * n + a) * side + y * n + b) * side + z * n]);
-  }
-  return all;
 }
 
 double volumeOf(const Box& box) { return (box.max() - box.min()).prod(); }
@@ -80,45 +78,49 @@ CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& opt
 
 const CellFitter::Rules& CellFitter::rules(int degree) const {
   std::call_once(rulesMade_[degree], [&] {
-    const QuadratureRule rule = gaussLegendre(pointsPerAxis(degree, options_.quadrature));
+    auto projection = makeProjection(degree, options_);
+    std::vector<Vector3> ofChildren;
+    for (int child = 0; child < 8; ++child) {
+      const Box box = childBox(Box(-Vector3::Ones(), Vector3::Ones()), child);
+      for (const Vector3& point : projection->points()) ofChildren.push_back(box.center() + point / 2);
+    }
+    auto orderOfOne = groupedOrder(projection->points());
     rules_[degree] =
-        std::make_unique<Rules>(Rules{rule, mortonOrder(static_cast<std::uint32_t>(rule.points.size())),
-                                      Projection(rule, degree), Projection(splitInHalves(rule), degree + 1)});
+        std::make_unique<Rules>(Rules{std::move(projection), std::move(orderOfOne), groupedOrder(ofChildren)});
   });
   return *rules_[degree];
 }
 
-CellFitter::Samples CellFitter::sample(const Box& cell, const Rules& rules) const {
-  const auto& at = rules.points.points;
-  const std::size_t n = at.size();
-  const Vector3 centre = cell.center();
-  const Vector3 half = cell.sizes() / 2;
-  Samples samples;
-  samples.values.resize(n * n * n);
-  double clearance = 0;  // no point of the cell is closer to the surface, Φ being 1-Lipschitz
+std::vector<double> CellFitter::sample(std::span<const Box> cells, const Projection& projection,
+                                       std::span<const std::uint32_t> order) const {
+  const std::vector<Vector3>& places = projection.points();
+  std::vector<double> samples(order.size());
   std::array<Vector3, kBatch> points;
   std::array<double, kBatch> values;
-  for (std::size_t first = 0; first < rules.order.size(); first += kBatch) {
+  for (std::size_t first = 0; first < order.size(); first += kBatch) {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-    const auto batch = std::span(rules.order).subspan(first, std::min(kBatch, rules.order.size() - first));
+    const auto batch = order.subspan(first, std::min(kBatch, order.size() - first));
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      const auto [a, b, c] = batch[i];
-      points[i] = centre + half.cwiseProduct(Vector3(at[a], at[b], at[c]));
+      const Box& cell = cells[batch[i] / places.size()];
+      points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(places[batch[i] % places.size()]);
     }
     distance_(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
     checkFinite(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const auto [a, b, c] = batch[i];
-      samples.values[(a * n + b) * n + c] = values[i];
-      if (options_.band > 0) {
-        const double farthestCorner = ((points[i] - centre).cwiseAbs() + half).norm();
-        clearance = std::max(clearance, std::abs(values[i]) - farthestCorner);
-      }
-    }
+    for (std::size_t i = 0; i < batch.size(); ++i) samples[batch[i]] = values[i];
   }
-  evaluations_ += samples.values.size();
-  samples.outsideBand = options_.band > 0 && clearance > options_.band;
+  evaluations_ += samples.size();
   return samples;
+}
+
+bool CellFitter::outsideBand(const Box& cell, const Projection& projection, std::span<const double> samples) const {
+  if (!(options_.band > 0)) return false;
+  double clearance = 0;  // no point of the cell is closer to the surface, Φ being 1-Lipschitz
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Vector3 fromCentre = (cell.sizes() / 2).cwiseProduct(projection.points()[i]);
+    const double farthestCorner = (fromCentre.cwiseAbs() + cell.sizes() / 2).norm();
+    clearance = std::max(clearance, std::abs(samples[i]) - farthestCorner);
+  }
+  return clearance > options_.band;
 }
 
 double CellFitter::shellError(const Fit& fit, double volume) const {
@@ -131,11 +133,11 @@ double CellFitter::nearnessWeight(const Fit& fit) const {
   return std::pow(std::clamp(1 - std::abs(mean) / diagonal_, 0.0, 1.0), options_.nearness);
 }
 
-Fit CellFitter::project(const Projection& projection, const Box& cell, std::span<const double> samples,
+Fit CellFitter::makeFit(std::vector<double> coefficients, int degree, const Box& cell, double meanSquare,
                         bool outsideBand) const {
   Fit fit;
-  fit.degree = projection.degree();
-  fit.coefficients = projection(samples);
+  fit.degree = degree;
+  fit.coefficients = std::move(coefficients);
   if (outsideBand) return fit;
   fit.error = shellError(fit, volumeOf(cell));
   if (options_.trialSamples == TrialSamples::own) return fit;
@@ -143,7 +145,6 @@ Fit CellFitter::project(const Projection& projection, const Box& cell, std::span
   // The estimate's blind spot: where Φ is even or odd about the cell's centre, every other shell of coefficients is
   // empty. What the samples say is left over, ∫Φ² − Σc², then stands in; it counts only where it is far above the
   // shell, so that everywhere else the paper's estimate decides.
-  const double meanSquare = projection.meanSquare(samples);
   double represented = 0;
   forEachCoefficient(fit.degree, [&](int i, int j, int k, int index) {
     represented += fit.coefficients[index] * fit.coefficients[index] * squaredNorm(i, j, k);
@@ -156,9 +157,10 @@ Fit CellFitter::project(const Projection& projection, const Box& cell, std::span
 }
 
 Fit CellFitter::fit(const Box& cell, int degree) const {
-  const Rules& r = rules(degree);
-  const Samples samples = sample(cell, r);
-  return project(r.own, cell, samples.values, samples.outsideBand);
+  const Projection& projection = *rules(degree).projection;
+  const std::vector<double> samples = sample({&cell, 1}, projection, rules(degree).orderOfOne);
+  return makeFit(withoutTopDegree(projection(samples), degree + 1), degree, cell, projection.meanSquare(samples),
+                 outsideBand(cell, projection, samples));
 }
 
 Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
@@ -177,21 +179,30 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
     trial.raised = raisedByOwnSamples(cell, current);
     return trial;
   }
-  const Rules& r = rules(current.degree);
-  std::array<std::vector<double>, 8> samples;
+  const int degree = current.degree;
+  const Projection& projection = *rules(degree).projection;
+  std::array<Box, 8> boxes;
+  for (int child = 0; child < 8; ++child) boxes[child] = childBox(cell, child);
+  const std::vector<double> samples = sample(boxes, projection, rules(degree).orderOfEight);
+  std::array<std::vector<double>, 8> raised;  // each child's own, one degree higher
   trial.children.emplace();
-  bool outsideBand = true;
+  bool allOutside = true;
+  double meanSquare = 0;
   for (int child = 0; child < 8; ++child) {
-    const Box box = childBox(cell, child);
-    Samples taken = sample(box, r);
-    (*trial.children)[child] = project(r.own, box, taken.values, taken.outsideBand);
-    outsideBand = outsideBand && taken.outsideBand;
-    samples[child] = std::move(taken.values);
+    const std::size_t count = projection.points().size();
+    const auto own = std::span(samples).subspan(child * count, count);
+    const bool outside = outsideBand(boxes[child], projection, own);
+    const double ownMeanSquare = projection.meanSquare(own);
+    raised[child] = projection(own);
+    (*trial.children)[child] =
+        makeFit(withoutTopDegree(raised[child], degree + 1), degree, boxes[child], ownMeanSquare, outside);
+    allOutside = allOutside && outside;
+    meanSquare += ownMeanSquare / 8;
   }
   if (mayRaise) {
     trial.raised = options_.trialSamples == TrialSamples::own
                        ? raisedByOwnSamples(cell, current)
-                       : project(r.raised, cell, joined(samples, r.own.pointsPerAxis()), outsideBand);
+                       : makeFit(joined(raised, degree + 1), degree + 1, cell, meanSquare, allOutside);
   }
   return trial;
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "basis/projection.h"
@@ -43,21 +44,20 @@ class CellFitter {
   std::uint64_t evaluations() const { return evaluations_; }
 
  private:
-  /// Quadrature of one degree p and the projections that use its points.
+  /// What all cells of one degree p share.
   struct Rules {
-    QuadratureRule points;                            ///< an axis
-    std::vector<std::array<std::uint32_t, 3>> order;  ///< in which the samples are taken: a point of each axis
-    Projection own;                                   ///< onto degree p, from the cell's own points
-    Projection raised;                                ///< onto degree p+1, from the points of the eight children
-  };
-  struct Samples {
-    std::vector<double> values;
-    bool outsideBand = false;
+    std::unique_ptr<const Projection> projection;  ///< onto degree p+1, whose lower coefficients are those of degree p
+    std::vector<std::uint32_t> orderOfOne;         ///< in which a cell's samples are taken
+    std::vector<std::uint32_t> orderOfEight;       ///< the same of eight children, number · points + point
   };
 
   const Rules& rules(int degree) const;
-  Samples sample(const Box& cell, const Rules& rules) const;
-  Fit project(const Projection& projection, const Box& cell, std::span<const double> samples, bool outsideBand) const;
+  /// Their samples, one cell after another; taken in the given order.
+  std::vector<double> sample(std::span<const Box> cells, const Projection& projection,
+                             std::span<const std::uint32_t> order) const;
+  bool outsideBand(const Box& cell, const Projection& projection, std::span<const double> samples) const;
+  /// `meanSquare` of the samples that the coefficients come from.
+  Fit makeFit(std::vector<double> coefficients, int degree, const Box& cell, double meanSquare, bool outsideBand) const;
   double nearnessWeight(const Fit& fit) const;
   double shellError(const Fit& fit, double volume) const;
   Fit raisedByOwnSamples(const Box& cell, const Fit& current) const;
