@@ -49,9 +49,9 @@ vec4 evaluateWithGradient(int index, int degree, vec3 local) {
 }
 
 void main() {
-  cellLevelsValueDistance = uvec4(kNoCell, 0u, 0u, 0u);
   normal = vec4(0.0);
   uvec4 integers = texelFetch(stateIntegers, ivec2(gl_FragCoord.xy), 0);
+  cellLevelsValueDistance = uvec4(kNoCell, integers.x, 0u, 0u);
   if (integers.x < kOnFace) return;
   vec4 bracket = texelFetch(stateFloats, ivec2(gl_FragCoord.xy), 0);
   bool bracketed = integers.x == kBracketed;

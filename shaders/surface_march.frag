@@ -5,6 +5,10 @@
 layout(location = 11) uniform int mostSteps;
 layout(location = 12) uniform bool resume;  // draw again: takes up the pixels under way, leaves the others
 
+layout(location = 14) uniform float startSide;
+
+flat in float start;
+
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
@@ -35,8 +39,10 @@ float linearSlope(Node leaf, vec3 localDirection) {
 }
 
 void main() {
-  float t = 0.0;
-  float side = 0.0;  // of the surface, on which the ray starts: the height above the surface is side * (f - offset)
+  Ray ray = pixelRay();
+  float nudge = kNudge * diagonal;
+  float t = max(0.0, float(double(start) - ray.fromEye) - 4.0 * nudge);
+  float side = t > 0.0 ? startSide : 0.0;  // of the surface, on which the ray starts: the height above the surface is side * (f - offset)
   // what the step before has left where it stayed in its leaf: the height at t, and the longest step to try
   uint lastLeaf = kNoCell;
   float lastHeight = 0.0, reach = 0.0;
@@ -53,12 +59,10 @@ void main() {
   uint kind = kUnderWay;
   vec4 bracket = vec4(0.0);
 
-  Ray ray = pixelRay();
   vec3 origin = vec3(ray.origin);
   vec3 direction = vec3(ray.direction);
   vec3 inverse = abs(1.0 / direction);
   float rayLength = float(ray.length);
-  float nudge = kNudge * diagonal;
 
   for (int step = 0; step < mostSteps; ++step) {
     if (!(t <= rayLength)) {

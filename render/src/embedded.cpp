@@ -27,6 +27,7 @@ HPSDF_EMBED(field_glsl, HPSDF_SHADER_DIR "/field.glsl")
 HPSDF_EMBED(full_screen_vert, HPSDF_SHADER_DIR "/full_screen.vert")
 HPSDF_EMBED(slice_frag, HPSDF_SHADER_DIR "/slice.frag")
 HPSDF_EMBED(surface_glsl, HPSDF_SHADER_DIR "/surface.glsl")
+HPSDF_EMBED(surface_vert, HPSDF_SHADER_DIR "/surface.vert")
 HPSDF_EMBED(surface_hit_frag, HPSDF_SHADER_DIR "/surface_hit.frag")
 HPSDF_EMBED(surface_march_frag, HPSDF_SHADER_DIR "/surface_march.frag")
 
@@ -46,6 +47,7 @@ std::string_view shaderText(std::string_view name) {
   if (name == "full_screen.vert") return text(hpsdf_embedded_full_screen_vert, hpsdf_embedded_full_screen_vert_end);
   if (name == "slice.frag") return text(hpsdf_embedded_slice_frag, hpsdf_embedded_slice_frag_end);
   if (name == "surface.glsl") return text(hpsdf_embedded_surface_glsl, hpsdf_embedded_surface_glsl_end);
+  if (name == "surface.vert") return text(hpsdf_embedded_surface_vert, hpsdf_embedded_surface_vert_end);
   if (name == "surface_hit.frag") return text(hpsdf_embedded_surface_hit_frag, hpsdf_embedded_surface_hit_frag_end);
   if (name == "surface_march.frag")
     return text(hpsdf_embedded_surface_march_frag, hpsdf_embedded_surface_march_frag_end);

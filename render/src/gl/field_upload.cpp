@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "hpsdf/error.h"
-#include "node_bounds.h"
 
 namespace hpsdf::render {
 namespace {
@@ -21,8 +20,7 @@ void checkFits(std::size_t texels, std::size_t largest, const char* what) {
                 std::to_string(largest) + ": render with --cpu, or build a coarser field");
 }
 
-std::vector<NodeTexel> nodeTexels(const FieldData& field) {
-  const std::vector<NodeBounds> bounds = nodeBounds(field);
+std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<NodeBounds>& bounds) {
   std::vector<NodeTexel> texels(field.nodes.size());
   for (std::size_t n = 0; n < texels.size(); ++n) {
     const std::uint64_t bits = field.nodes[n];
@@ -48,14 +46,14 @@ void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum forma
 
 }  // namespace
 
-FieldUpload::FieldUpload(const FieldData& field) {
+FieldUpload::FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds) {
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &largest);
   const std::size_t coefficients = std::visit([](const auto& c) { return c.size(); }, field.coefficients);
   checkFits(field.nodes.size(), largest, "nodes");
   checkFits(coefficients, std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "coefficients");
 
-  const std::vector<NodeTexel> texels = nodeTexels(field);
+  const std::vector<NodeTexel> texels = nodeTexels(field, bounds);
   upload(nodeBuffer_, nodes_, GL_RGBA32UI, texels.data(), texels.size() * sizeof(NodeTexel));
   if (const auto* single = std::get_if<std::vector<float>>(&field.coefficients)) {
     upload(coefficientBuffer_, coefficients_, GL_R32F, single->data(), single->size() * sizeof(float));

@@ -2,6 +2,7 @@
 
 #include "gl/gl_objects.h"
 #include "hpsdf/field.h"
+#include "node_bounds.h"
 
 namespace hpsdf::render {
 
@@ -14,7 +15,7 @@ namespace hpsdf::render {
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
-  explicit FieldUpload(const FieldData& field);
+  FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds);
 
   /// To texture units 0 (nodes) and 1 (coefficients).
   void bind() const;

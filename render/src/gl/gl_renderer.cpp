@@ -11,17 +11,20 @@
 #include "grid_space.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
+#include "surface_blocks.h"
 #include "view_buffers.h"
 
 namespace hpsdf::render {
 namespace {
 
 constexpr int kTile = 2048;  // pixels a side: larger views are drawn in tiles, so that any size fits the device
+static_assert(kTile % kBlock == 0);
 
 /// Locations of the uniforms, as in shaders/.
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
+enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
 constexpr int kStepsInAll = 1 << 16;  // of a ray, as on the CPU
@@ -60,6 +63,14 @@ class Target {
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
+  /// All pixels to no cell and no normal.
+  void clear() const {
+    constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
+    constexpr GLfloat kZero[] = {0, 0, 0, 0};
+    glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
+    glClearNamedFramebufferfv(framebuffer_.name(), GL_COLOR, 1, kZero);
+  }
+
   /// As textures of units 2 and 3.
   void bindForReading() const {
     glBindTextureUnit(2, integers_.name());
@@ -88,12 +99,27 @@ struct Tile {
   int left, top, width, height;
 };
 
-std::vector<Tile> tiles(int width, int height) {
+std::vector<Tile> tiles(const Tile& part) {
   std::vector<Tile> result;
-  for (int top = 0; top < height; top += kTile)
-    for (int left = 0; left < width; left += kTile)
-      result.push_back({left, top, std::min(kTile, width - left), std::min(kTile, height - top)});
+  for (int y = 0; y < part.height; y += kTile)
+    for (int x = 0; x < part.width; x += kTile)
+      result.push_back(
+          {part.left + x, part.top + y, std::min(kTile, part.width - x), std::min(kTile, part.height - y)});
   return result;
+}
+
+/// The smallest part of a view that holds all blocks, of which there is one at least.
+Tile partWith(const std::vector<Block>& blocks, int width, int height) {
+  const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
+  const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);
+  const int x = static_cast<int>(left.x);
+  const int y = static_cast<int>(top.y);
+  return {x, y, std::min(width, int(right.x) + kBlock) - x, std::min(height, int(bottom.y) + kBlock) - y};
+}
+
+/// The octree alone.
+FieldData withoutCoefficients(const FieldData& field) {
+  return {.domain = field.domain, .grid = field.grid, .nodes = field.nodes, .coefficients = {}, .metadata = {}};
 }
 
 int highestDegree(const FieldData& field) {
@@ -112,18 +138,21 @@ void checkGl(const char* what) {
 
 /// Everything on the device. Made and destroyed with the context current.
 struct Resources {
-  explicit Resources(const FieldData& data)
-      : field(data),
-        slice(fullScreenProgram({"field.glsl", "slice.frag"})),
-        march(fullScreenProgram({"field.glsl", "surface.glsl", "surface_march.frag"})),
-        hit(fullScreenProgram({"field.glsl", "surface.glsl", "surface_hit.frag"})) {
+  Resources(const FieldData& data, const std::vector<NodeBounds>& bounds)
+      : field(data, bounds),
+        slice(linkedProgram({"full_screen.vert"}, {"field.glsl", "slice.frag"})),
+        march(linkedProgram({"surface.vert"}, {"field.glsl", "surface.glsl", "surface_march.frag"})),
+        hit(linkedProgram({"surface.vert"}, {"field.glsl", "surface.glsl", "surface_hit.frag"})) {
     for (const GlProgram* program : {&slice, &march, &hit})
       glProgramUniform3ui(program->name(), kGrid, data.grid[0], data.grid[1], data.grid[2]);
+    glEnableVertexArrayAttrib(blocks.name(), 0);
+    glVertexArrayAttribFormat(blocks.name(), 0, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(blocks.name(), 0, 0);
   }
 
   FieldUpload field;
   GlProgram slice, march, hit;
-  GlVertexArray noVertices;
+  GlVertexArray noVertices, blocks;
   GlQuery anyPixels;
 };
 
@@ -147,20 +176,18 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
   glProgramUniform1f(program.name(), kDiagonal, static_cast<float>(diagonal));
 }
 
-void drawTile(const GlProgram& program, const Tile& tile) {
-  glProgramUniform2i(program.name(), kFirstPixel, tile.left, tile.top);
-  glUseProgram(program.name());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-}
-
 class GlRenderer final : public Renderer {
  public:
-  GlRenderer(const Field& field, GlChoice choice) : context_(choice), space_(field.data()) {
+  GlRenderer(const Field& field, GlChoice choice)
+      : context_(choice),
+        space_(field.data()),
+        octree_(withoutCoefficients(field.data())),
+        bounds_(nodeBounds(field.data())) {
     const int evaluation = evaluationLoops(highestDegree(field.data()));
     stepsInPass_ = kLoopBudget / (2 * evaluation + kMaxDepth + 3);
     refinements_ = std::min(kRefinementsInAll, (kLoopBudget - kMaxDepth) / (evaluation + 1) - 1);
     const EglContext::Current current(context_);
-    resources_ = std::make_unique<Resources>(field.data());
+    resources_ = std::make_unique<Resources>(field.data(), bounds_);
   }
 
   ~GlRenderer() override {
@@ -186,10 +213,13 @@ class GlRenderer final : public Renderer {
     ViewBuffers buffers = emptyBuffers(width, height, false);
     const Target target(std::min(width, kTile), std::min(height, kTile));
     prepare();
-    for (const Tile& tile : tiles(width, height)) {
+    glUseProgram(program.name());
+    glBindVertexArray(resources_->noVertices.name());
+    for (const Tile& tile : tiles({0, 0, width, height})) {
       glViewport(0, 0, tile.width, tile.height);
+      glProgramUniform2i(program.name(), kFirstPixel, tile.left, tile.top);
       target.bindForDrawing();
-      drawTile(program, tile);
+      glDrawArrays(GL_TRIANGLES, 0, 3);
       target.readIntegers(tile.width, tile.height, integers_);
       forEachPixel(tile, width, [&](std::size_t from, std::size_t to) {
         const Texel& texel = integers_[from];
@@ -213,17 +243,34 @@ class GlRenderer final : public Renderer {
     glProgramUniform1i(resources_->hit.name(), kMostRefinements, refinements_);
 
     ViewBuffers buffers = emptyBuffers(width, height, true);
-    const Target state(std::min(width, kTile), std::min(height, kTile));
-    const Target target(std::min(width, kTile), std::min(height, kTile));
+    const SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
+    if (found.blocks.empty()) return buffers;
+    const GlBuffer blocks;
+    glNamedBufferStorage(blocks.name(), GLsizeiptr(found.blocks.size() * sizeof(Block)), found.blocks.data(), 0);
+    glVertexArrayVertexBuffer(resources_->blocks.name(), 0, blocks.name(), 0, sizeof(Block));
+    glProgramUniform1f(resources_->march.name(), kStartSide, found.side);
+
+    const Tile part = partWith(found.blocks, width, height);
+    const Target state(std::min(part.width, kTile), std::min(part.height, kTile));
+    const Target target(std::min(part.width, kTile), std::min(part.height, kTile));
     prepare();
+    glBindVertexArray(resources_->blocks.name());
+    glEnable(GL_PROGRAM_POINT_SIZE);
     state.bindForReading();
-    for (const Tile& tile : tiles(width, height)) {
-      glViewport(0, 0, tile.width, tile.height);
+    for (const Tile& tile : tiles(part)) {
+      setTile(tile);
+      const GLsizei count = static_cast<GLsizei>(found.blocks.size());
       state.bindForDrawing();
-      march(tile);
-      target.bindForDrawing();
-      drawTile(resources_->hit, tile);
+      march(count);
+      target.clear();
+      hit(target, count);
       target.readIntegers(tile.width, tile.height, integers_);
+      if (std::ranges::any_of(integers_, isUnderWay)) {
+        state.bindForDrawing();
+        marchOn(count);
+        hit(target, count);
+        target.readIntegers(tile.width, tile.height, integers_);
+      }
       target.readFloats(tile.width, tile.height, normals_);
       forEachPixel(tile, width, [&](std::size_t from, std::size_t to) {
         const Texel& texel = integers_[from];
@@ -244,29 +291,51 @@ class GlRenderer final : public Renderer {
  private:
   void prepare() const {
     resources_->field.bind();
-    glBindVertexArray(resources_->noVertices.name());
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
   }
 
+  void setTile(const Tile& tile) const {
+    // whole blocks, since a point whose centre lies outside is not drawn
+    const auto up = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
+    glViewport(0, 0, up(tile.width), up(tile.height));
+    for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
+      glProgramUniform2i(program->name(), kFirstPixel, tile.left, tile.top);
+      glProgramUniform2i(program->name(), kViewport, up(tile.width), up(tile.height));
+    }
+  }
+
+  void march(GLsizei blocks) const {
+    glUseProgram(resources_->march.name());
+    glProgramUniform1i(resources_->march.name(), kResume, GL_FALSE);
+    glDrawArrays(GL_POINTS, 0, blocks);
+    glTextureBarrier();
+  }
+
   /// Draws the march again until no pixel is under way, or all steps are used up.
-  void march(const Tile& tile) const {
-    const GLuint program = resources_->march.name();
+  void marchOn(GLsizei blocks) const {
     const GLuint query = resources_->anyPixels.name();
-    glProgramUniform1i(program, kResume, GL_FALSE);
-    drawTile(resources_->march, tile);
-    glProgramUniform1i(program, kResume, GL_TRUE);
+    glUseProgram(resources_->march.name());
+    glProgramUniform1i(resources_->march.name(), kResume, GL_TRUE);
     for (int steps = stepsInPass_; steps < kStepsInAll; steps += stepsInPass_) {
-      // the pass reads the texels that it writes, each pixel its own
-      glTextureBarrier();
       glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
-      drawTile(resources_->march, tile);
+      glDrawArrays(GL_POINTS, 0, blocks);
       glEndQuery(GL_ANY_SAMPLES_PASSED);
+      // the pass reads the texels that the one before has written, each pixel its own
+      glTextureBarrier();
       GLuint any = GL_FALSE;
       glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);
       if (any == GL_FALSE) break;
     }
-    glTextureBarrier();
   }
+
+  void hit(const Target& target, GLsizei blocks) const {
+    target.bindForDrawing();
+    glUseProgram(resources_->hit.name());
+    glDrawArrays(GL_POINTS, 0, blocks);
+  }
+
+  /// Whether the march of a pixel of the hit pass goes on.
+  static bool isUnderWay(const Texel& texel) { return texel[0] == kNoCell && texel[1] != 0; }
 
   /// Calls f with each pixel's place in the tile and in the view. Rows of a target run downwards, as those of a view.
   template <typename F>
@@ -278,6 +347,8 @@ class GlRenderer final : public Renderer {
 
   EglContext context_;
   GridSpace space_;
+  FieldData octree_;
+  std::vector<NodeBounds> bounds_;
   std::unique_ptr<Resources> resources_;
   int stepsInPass_;  ///< of a ray, in one pass
   int refinements_;

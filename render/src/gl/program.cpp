@@ -52,8 +52,9 @@ GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
 
 }  // namespace
 
-GlProgram fullScreenProgram(std::initializer_list<std::string_view> fragmentFiles) {
-  const GlShader vertex = compile(GL_VERTEX_SHADER, {"full_screen.vert"});
+GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
+                        std::initializer_list<std::string_view> fragmentFiles) {
+  const GlShader vertex = compile(GL_VERTEX_SHADER, vertexFiles);
   const GlShader fragment = compile(GL_FRAGMENT_SHADER, fragmentFiles);
   GlProgram program;
   glAttachShader(program.name(), vertex.name());

@@ -7,8 +7,9 @@
 
 namespace hpsdf::render {
 
-/// A linked program of the full-screen triangle and the fragment shader made of `fragmentFiles`, one after another, of
-/// those in shaders/. Throws `Error` with the compiler's log.
-GlProgram fullScreenProgram(std::initializer_list<std::string_view> fragmentFiles);
+/// A linked program of a vertex shader and a fragment shader, each made of files in shaders/, one after another. Throws
+/// `Error` with the compiler's log.
+GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
+                        std::initializer_list<std::string_view> fragmentFiles);
 
 }  // namespace hpsdf::render

@@ -1,0 +1,17 @@
+// A block of pixels as one point: see SurfaceBlocks.
+
+layout(location = 1) uniform ivec2 firstPixel;
+layout(location = 13) uniform ivec2 viewport;
+
+layout(location = 0) in vec3 block;  // x and y of its upper left pixel, start
+
+flat out float start;
+
+const float kBlock = 16.0;  // pixels a side; as in surface_blocks.h
+
+void main() {
+  vec2 center = block.xy + 0.5 * kBlock - vec2(firstPixel);
+  gl_Position = vec4(2.0 * center / vec2(viewport) - 1.0, 0.0, 1.0);
+  gl_PointSize = kBlock;
+  start = block.z;
+}
