@@ -13,7 +13,8 @@ struct Node {
   uint firstChild;  // of an internal node
   int degree;       // of a leaf
   int offset;       // of a leaf's coefficients
-  float lo, hi;     // the field's values lie between
+  float lo, hi;     // of an internal node: the field's values lie between
+  float rest;       // of a leaf: the value differs from the linear part's by at most this
   float bend;       // of a leaf: the gradient in local coordinates differs from the linear part's by at most this
   float curve;      // of a leaf: largest second derivative in local coordinates
 };
@@ -27,6 +28,7 @@ Node fetchNode(uint index) {
   node.offset = int(texel.x & 0x7ffffffu);
   node.lo = uintBitsToFloat(texel.y << 16);
   node.hi = uintBitsToFloat(texel.y & 0xffff0000u);
+  node.rest = uintBitsToFloat(texel.y);
   node.bend = uintBitsToFloat(texel.z);
   node.curve = uintBitsToFloat(texel.w);
   node.leaf = node.bend >= 0.0;

@@ -11,8 +11,8 @@ layout(location = 8) uniform dvec2 pixelStep;
 layout(location = 9) uniform float offset;
 layout(location = 10) uniform float diagonal;  // of the domain, world units
 
-// State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, height
-// at a, b, height at b), for a pixel under way (last height, reach, -, -).
+// State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, b,
+// a first guess, -), for a pixel under way (last height, reach, -, -).
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 

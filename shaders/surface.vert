@@ -7,7 +7,7 @@ layout(location = 0) in vec3 block;  // x and y of its upper left pixel, start
 
 flat out float start;
 
-const float kBlock = 16.0;  // pixels a side; as in surface_blocks.h
+const float kBlock = 8.0;  // pixels a side; as in surface_blocks.h
 
 void main() {
   vec2 center = block.xy + 0.5 * kBlock - vec2(firstPixel);

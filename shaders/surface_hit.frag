@@ -6,6 +6,8 @@ layout(location = 11) uniform int mostRefinements;
 layout(location = 0) out uvec4 cellLevelsValueDistance;  // degree | depth << 8; value and distance as bits of floats
 layout(location = 1) out vec4 normal;
 
+const float kTurned = 1e-4;     // radians, about: how far the gradient may have turned since where it was taken
+const float kInfinity = 1e30;
 const float kConverged = 1e-8;  // in domain diagonals: change of the root between two steps; as in trace.cpp
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
@@ -49,47 +51,55 @@ vec4 evaluateWithGradient(int index, int degree, vec3 local) {
 }
 
 void main() {
-  normal = vec4(0.0);
   uvec4 integers = texelFetch(stateIntegers, ivec2(gl_FragCoord.xy), 0);
   cellLevelsValueDistance = uvec4(kNoCell, integers.x, 0u, 0u);
+  normal = vec4(0.0);
   if (integers.x < kOnFace) return;
   vec4 bracket = texelFetch(stateFloats, ivec2(gl_FragCoord.xy), 0);
   bool bracketed = integers.x == kBracketed;
+  float t = uintBitsToFloat(integers.y);
   float side = uintBitsToFloat(integers.z);
 
   Ray ray = pixelRay();
-  double t = double(uintBitsToFloat(integers.y));
-  // the march stood in this leaf when it found the bracket, and finds it again from the same point
-  float tInLeaf = bracketed ? bracket.x : float(t);
-  CellPoint at = baseCellAt(vec3(ray.origin) + tInLeaf * vec3(ray.direction));
+  // the march stood in this leaf, and finds it again from the same point
+  CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);
 
-  if (bracketed) {
-    // regula falsi, Illinois variant
-    double a = double(bracket.x), b = double(bracket.z);
-    float heightA = bracket.y, heightB = bracket.w;
-    t = b;
-    for (int i = 0; i < mostRefinements; ++i) {
-      double next = b - double(heightB) * (b - a) / double(heightB - heightA);
-      double change = abs(next - t);
-      t = next;
-      if (change <= double(kConverged * diagonal)) break;
-      float height = side * (evaluate(at.node.offset, at.node.degree, localAt(at, ray, t)) - offset);
-      if ((height > 0.0) == (heightB > 0.0)) {
-        heightA *= 0.5;
-      } else {
-        a = b;
-        heightA = heightB;
-      }
-      b = t;
-      heightB = height;
+  // Newton's method from `first`, in double precision, by what is to be added, in single precision; halving where it
+  // would leave the bracket
+  double first = double(bracketed ? bracket.z : t);
+  vec3 local = localAt(at, ray, first);
+  vec3 localDirection = 2.0 * at.scale * vec3(ray.direction);
+  float curve = at.node.curve * dot(localDirection, localDirection);
+  float a = bracket.x - bracket.z, b = bracket.y - bracket.z;
+  float added = 0.0, change = 0.0;
+  vec4 gradientValue;
+  for (int i = 0; i < mostRefinements; ++i) {
+    added += change;
+    gradientValue = evaluateWithGradient(at.node.offset, at.node.degree, local + added * localDirection);
+    float height = side * (gradientValue.w - offset);
+    float slope = side * dot(gradientValue.xyz, localDirection);
+    if (!bracketed) break;
+    if (height > 0.0) {
+      a = added;
+    } else {
+      b = added;
     }
+    change = -height / slope;
+    bool newton = added + change >= a && added + change <= b;
+    if (!newton) change = 0.5 * (a + b) - added;
+    // what is left is curve / slope * change^2 / 2 at most
+    float turned = newton ? abs(curve / slope * change) : kInfinity;
+    bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
+    if (close || abs(change) <= kConverged * diagonal) break;
   }
-  vec4 gradientValue = evaluateWithGradient(at.node.offset, at.node.degree, localAt(at, ray, t));
+  added += change;
+  gradientValue.w += change * dot(gradientValue.xyz, localDirection);
   vec3 gradient = gradientValue.xyz * vec3(scale);
   float steepness = length(gradient);
   // a cell of degree 0 has no gradient: face the eye
   normal.xyz = steepness > 0.0 ? gradient / steepness : -vec3(ray.worldDirection);
-  cellLevelsValueDistance = uvec4(at.node.index, uint(at.node.degree) | at.depth << 8,
-                                  floatBitsToUint(gradientValue.w), floatBitsToUint(float(ray.fromEye + t)));
+  cellLevelsValueDistance =
+      uvec4(at.node.index, uint(at.node.degree) | at.depth << 8, floatBitsToUint(gradientValue.w),
+            floatBitsToUint(float(ray.fromEye + first + double(added))));
 }

@@ -12,13 +12,13 @@ flat in float start;
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
+layout(binding = 4) uniform samplerBuffer linearParts;  // of leaves: slopes in x, y, z, value in the middle
+
 const float kNudge = 1e-6;  // in domain diagonals: beyond a face; also the shortest step; as in trace.cpp
 
 const float kPastFace = 4e-7;  // of the grid; as in trace.cpp
 
 const float kInfinity = 1e30;
-
-bool excludes(Node node) { return node.lo > offset || node.hi < offset; }
 
 // World length from the point to where the ray has left the node's box, past a face by a little: see trace.cpp.
 // `inverse`: of the absolute direction, infinite for an axis along which the ray does not move.
@@ -28,21 +28,24 @@ float lengthToExit(CellPoint at, vec3 direction, vec3 inverse) {
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// Slope of the leaf's linear part along a direction in local coordinates.
-float linearSlope(Node leaf, vec3 localDirection) {
-  if (leaf.degree == 0) return 0.0;
-  // c_100, c_010, c_001 in lexicographic order
-  float cz = texelFetch(coefficients, leaf.offset + 1).x;
-  float cy = texelFetch(coefficients, leaf.offset + leaf.degree + 1).x;
-  float cx = texelFetch(coefficients, leaf.offset + (leaf.degree + 1) * (leaf.degree + 2) / 2).x;
-  return cx * localDirection.x + cy * localDirection.y + cz * localDirection.z;
+// Down to a leaf, or to a node whose range excludes the offset.
+CellPoint relevantNodeAt(vec3 p) {
+  CellPoint at = baseCellAt(p);
+  while (!at.node.leaf && at.node.lo <= offset && at.node.hi >= offset) descend(at);
+  return at;
 }
 
 void main() {
   Ray ray = pixelRay();
+  vec3 origin = vec3(ray.origin);
+  vec3 direction = vec3(ray.direction);
+  vec3 inverse = abs(1.0 / direction);
+  float rayLength = float(ray.length);
   float nudge = kNudge * diagonal;
+
   float t = max(0.0, float(double(start) - ray.fromEye) - 4.0 * nudge);
-  float side = t > 0.0 ? startSide : 0.0;  // of the surface, on which the ray starts: the height above the surface is side * (f - offset)
+  // of the surface, on which the ray starts, or 0: not known yet. The height above the surface is side * (f - offset)
+  float side = t > 0.0 ? startSide : 0.0;
   // what the step before has left where it stayed in its leaf: the height at t, and the longest step to try
   uint lastLeaf = kNoCell;
   float lastHeight = 0.0, reach = 0.0;
@@ -56,76 +59,106 @@ void main() {
     lastHeight = last.x;
     reach = last.y;
   }
-  uint kind = kUnderWay;
+  uint kind = t <= rayLength ? kUnderWay : kMiss;
   vec4 bracket = vec4(0.0);
 
-  vec3 origin = vec3(ray.origin);
-  vec3 direction = vec3(ray.direction);
-  vec3 inverse = abs(1.0 / direction);
-  float rayLength = float(ray.length);
+  int step = 0;
+  while (kind == kUnderWay && step < mostSteps) {
+    // on through all nodes of which the bounds alone say that nothing is crossed in them
+    CellPoint at;
+    vec3 localDirection;
+    // the height's linear part at t and its slope; the height at t lies between the next two, its slope within +-bend
+    float middle = 0.0, slope = 0.0, lowest = 0.0, highest = 0.0, bend = 0.0;
+    float toExit = 0.0;
+    bool known = false;  // the height at t
+    bool stays = false;
+    while (!stays && kind == kUnderWay && step < mostSteps) {
+      ++step;
+      at = relevantNodeAt(origin + t * direction);
+      toExit = lengthToExit(at, direction, inverse);
+      localDirection = 2.0 * at.scale * direction;
+      // of f - offset at first
+      middle = 0.0;
+      slope = 0.0;
+      lowest = at.node.lo - offset;
+      highest = at.node.hi - offset;
+      if (at.node.leaf) {
+        vec4 linear = texelFetch(linearParts, int(at.node.index));
+        middle = dot(linear.xyz, 2.0 * at.fraction - 1.0) + (linear.w - offset);
+        slope = dot(linear.xyz, localDirection);
+        lowest = middle - at.node.rest;
+        highest = middle + at.node.rest;
+      }
+      if (side == 0.0) side = lowest > 0.0 ? 1.0 : highest < 0.0 ? -1.0 : 0.0;
+      if (side < 0.0) {
+        float negated = -lowest;
+        lowest = -highest;
+        highest = negated;
+        middle = -middle;
+        slope = -slope;
+      }
+      bend = at.node.bend * length(localDirection);
+      known = at.node.index == lastLeaf;
+      if (side != 0.0 && highest < 0.0) {
+        kind = kOnFace;
+      } else if (side != 0.0 && ((lowest > 0.0 && lowest + slope * toExit > 0.0) ||
+                                 (known && lastHeight + (slope - bend) * toExit >= 0.0))) {
+        t += toExit + nudge;
+        lastLeaf = kNoCell;
+        if (!(t <= rayLength)) kind = kMiss;
+      } else {
+        stays = true;
+      }
+    }
+    if (!stays) break;
 
-  for (int step = 0; step < mostSteps; ++step) {
-    if (!(t <= rayLength)) {
-      kind = kMiss;
-      break;
-    }
-    CellPoint at = baseCellAt(origin + t * direction);
-    while (!at.node.leaf && !excludes(at.node)) descend(at);
-    float toExit = lengthToExit(at, direction, inverse);
-    if (excludes(at.node)) {
-      float sideHere = at.node.lo > offset ? 1.0 : -1.0;
-      if (side == 0.0) side = sideHere;
-      if (side != sideHere) {
-        kind = kOnFace;
-        break;
-      }
-      t += toExit + nudge;
-      continue;
-    }
-    if (at.node.index != lastLeaf) {
-      float here = evaluate(at.node.offset, at.node.degree, 2.0 * at.fraction - 1.0) - offset;
-      if (side == 0.0) side = here >= 0.0 ? 1.0 : -1.0;
-      lastLeaf = at.node.index;
-      lastHeight = side * here;
-      reach = kInfinity;
-      if (lastHeight < 0.0) {
-        kind = kOnFace;
-        break;
-      }
-    }
     // within this leaf the height's slope along the ray lies between these two, its second derivative in +-curve
-    vec3 localDirection = 2.0 * at.scale * direction;
-    float slope = side * linearSlope(at.node, localDirection);
-    float bend = at.node.bend * length(localDirection);
     float curve = at.node.curve * dot(localDirection, localDirection);
     float steepest = slope - bend;
     float shallowest = slope + bend;
-    if (lastHeight + steepest * toExit >= 0.0) {
-      t += toExit + nudge;
-      lastLeaf = kNoCell;
-      continue;
-    }
     bool falling = shallowest < 0.0;  // throughout: at most one root
+    if (side != 0.0 && falling && lowest > 0.0) {
+      if (highest + slope * toExit < 0.0) {
+        kind = kBracketed;
+        bracket = vec4(t, t, t, 0.0) + vec4(lowest, highest, middle, 0.0) / -slope;
+        break;
+      }
+      if (!known) {
+        // a height that is no smaller will do
+        known = true;
+        lastHeight = highest;
+        lastLeaf = at.node.index;
+      }
+    }
     float safe = lastHeight / -steepest + nudge;
     float stepLength = min(toExit, falling ? lastHeight / -shallowest + nudge
                                            : max(safe, min(reach, sqrt(4.0 * lastHeight / curve))));
+    if (!known) stepLength = 0.0;
     vec3 localAhead = 2.0 * (at.fraction + stepLength * at.scale * direction) - 1.0;
-    float ahead = side * (evaluate(at.node.offset, at.node.degree, localAhead) - offset);
-    bool certain = falling || stepLength <= safe;
-    if (ahead <= 0.0 && (certain || lastHeight - ahead > 0.5 * curve * stepLength * stepLength)) {
-      kind = kBracketed;
-      bracket = vec4(t, lastHeight, t + stepLength, ahead);
-      break;
-    }
-    // the height sags below its chord by at most curve * length^2 / 8
-    if (ahead > 0.0 && (certain || min(lastHeight, ahead) > 0.125 * curve * stepLength * stepLength)) {
-      bool leaves = stepLength == toExit;
-      t += leaves ? stepLength + nudge : stepLength;
-      if (leaves) lastLeaf = kNoCell;
-      lastHeight = ahead;
+    float value = evaluate(at.node.offset, at.node.degree, localAhead) - offset;
+    if (!known) {
+      if (side == 0.0) side = value >= 0.0 ? 1.0 : -1.0;
+      lastLeaf = at.node.index;
+      lastHeight = side * value;
       reach = kInfinity;
+      if (lastHeight < 0.0) kind = kOnFace;
     } else {
-      reach = 0.25 * stepLength;
+      float ahead = side * value;
+      bool certain = falling || stepLength <= safe;
+      if (ahead <= 0.0 && (certain || lastHeight - ahead > 0.5 * curve * stepLength * stepLength)) {
+        kind = kBracketed;
+        bracket = vec4(t, t + stepLength, t + stepLength * lastHeight / (lastHeight - ahead), 0.0);
+      } else if (ahead > 0.0 && (certain || min(lastHeight, ahead) > 0.125 * curve * stepLength * stepLength)) {
+        // the height sags below its chord by at most curve * length^2 / 8
+        bool leaves = stepLength == toExit;
+        t += leaves ? stepLength + nudge : stepLength;
+        if (leaves) lastLeaf = kNoCell;
+        lastHeight = ahead;
+        reach = kInfinity;
+        if (!(t <= rayLength)) kind = kMiss;
+      } else {
+        reach = 0.25 * stepLength;
+      }
     }
   }
   if (kind == kUnderWay) bracket = vec4(lastHeight, reach, 0.0, 0.0);

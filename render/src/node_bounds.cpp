@@ -17,8 +17,17 @@ double firstDerivative(int i) { return 0.5 * i * (i + 1); }
 double secondDerivative(int i) { return 0.125 * (i - 1) * i * (i + 1) * (i + 2); }
 
 template <typename T>
+std::array<float, 4> linearPart(const T* c, int degree) {
+  if (degree == 0) return {0, 0, 0, float(c[0])};
+  // in lexicographic order
+  const int x = coefficientCount(degree) - coefficientCount(degree - 1);
+  return {float(c[x]), float(c[degree + 1]), float(c[1]), float(c[0])};
+}
+
+template <typename T>
 NodeBounds leafBounds(const T* c, int degree) {
   double sum = 0;
+  double rest = 0;
   Vector3 bend = Vector3::Zero();
   Vector3 pure = Vector3::Zero();   // second derivatives xx, yy, zz
   Vector3 mixed = Vector3::Zero();  // yz, zx, xy
@@ -29,6 +38,7 @@ NodeBounds leafBounds(const T* c, int degree) {
         const double magnitude = std::abs(double(*next++));
         sum += magnitude;
         if (i + j + k < 2) continue;
+        rest += magnitude;
         const Vector3 first(firstDerivative(i), firstDerivative(j), firstDerivative(k));
         bend += magnitude * first;
         pure += magnitude * Vector3(secondDerivative(i), secondDerivative(j), secondDerivative(k));
@@ -38,9 +48,12 @@ NodeBounds leafBounds(const T* c, int degree) {
   const double range = sum - std::abs(mean) + kWiden * sum;
   // the Frobenius norm of the bounds is none below the matrix's own
   const double curve = std::sqrt(pure.squaredNorm() + 2 * mixed.squaredNorm());
-  return {static_cast<float>(mean - range), static_cast<float>(mean + range),
-          static_cast<float>(bend.norm() * (1 + kWiden) + kWiden * sum),
-          static_cast<float>(curve * (1 + kWiden) + kWiden * sum)};
+  return {.lo = static_cast<float>(mean - range),
+          .hi = static_cast<float>(mean + range),
+          .bend = static_cast<float>(bend.norm() * (1 + kWiden) + kWiden * sum),
+          .rest = static_cast<float>(rest + kWiden * sum),
+          .curve = static_cast<float>(curve * (1 + kWiden) + kWiden * sum),
+          .linear = linearPart(c, degree)};
 }
 
 }  // namespace
@@ -60,7 +73,7 @@ std::vector<NodeBounds> nodeBounds(const FieldData& field) {
   for (std::size_t n = bounds.size(); n-- > 0;) {
     if (node::isLeaf(field.nodes[n])) continue;
     const NodeBounds* children = &bounds[node::firstChild(field.nodes[n])];
-    bounds[n] = {children[0].lo, children[0].hi, -1, 0};
+    bounds[n] = {.lo = children[0].lo, .hi = children[0].hi, .bend = -1, .rest = 0, .curve = 0, .linear = {}};
     for (int child = 1; child < 8; ++child) {
       bounds[n].lo = std::min(bounds[n].lo, children[child].lo);
       bounds[n].hi = std::max(bounds[n].hi, children[child].hi);

@@ -9,7 +9,7 @@
 
 namespace hpsdf::render {
 
-constexpr int kBlock = 16;  // pixels a side
+constexpr int kBlock = 8;  // pixels a side
 
 /// A square of kBlock × kBlock pixels.
 struct Block {

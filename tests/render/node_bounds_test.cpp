@@ -124,6 +124,8 @@ TEST(NodeBounds, HoldAtEveryPointOfALeaf) {
         seed, {.grid = {1, 1, 2}, .roughness = 2, .refinement = 0.3, .maxDepth = 1, .minDegree = 0, .maxDegree = 9});
     forEachLeaf(field, [&](const NodeBounds& bounds, const double* c, int degree) {
       const Vector3 linear = linearPart(c, degree);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(bounds.linear[axis], static_cast<float>(linear[axis]));
+      EXPECT_EQ(bounds.linear[3], static_cast<float>(c[0]));
       for (int i = 0; i <= kSteps; ++i)
         for (int j = 0; j <= kSteps; ++j)
           for (int k = 0; k <= kSteps; ++k) {
@@ -131,6 +133,7 @@ TEST(NodeBounds, HoldAtEveryPointOfALeaf) {
             const Local here = evaluate(c, degree, point);
             ASSERT_GE(here.value, bounds.lo);
             ASSERT_LE(here.value, bounds.hi);
+            ASSERT_LE(std::abs(here.value - (c[0] + linear.dot(point))), bounds.rest);
             ASSERT_LE((here.gradient - linear).norm(), bounds.bend);
             ASSERT_LE(here.steepestCurve(), bounds.curve);
           }
@@ -172,6 +175,9 @@ TEST(NodeBounds, AreReachedButForRounding) {
       EXPECT_LE(bounds.hi, corner.value + slack);
       EXPECT_LE(bounds.lo, 2 * c[0] - corner.value);
       EXPECT_GE(bounds.lo, 2 * c[0] - corner.value - slack);
+      const double rest = corner.value - c[0] - linearPart(c, p).sum();
+      EXPECT_GE(bounds.rest, rest);
+      EXPECT_LE(bounds.rest, rest + slack);
       EXPECT_GE(bounds.bend, bend);
       EXPECT_LE(bounds.bend, bend * kSlack + slack);
       EXPECT_GE(bounds.curve, corner.hessian.norm());
@@ -194,6 +200,8 @@ TEST(NodeBounds, HoldForValuesInSinglePrecision) {
         const float value = evaluateSingle(c, p, at);
         EXPECT_GE(value, bounds.lo) << "degree " << p;
         EXPECT_LE(value, bounds.hi) << "degree " << p;
+        const auto& [x, y, z, middle] = bounds.linear;
+        EXPECT_LE(std::abs(value - (at.dot(Eigen::Vector3f(x, y, z)) + middle)), bounds.rest) << "degree " << p;
       }
     });
   }
@@ -221,7 +229,7 @@ TEST(NodeBounds, OfANodeSpanThoseOfItsChildren) {
 
 // As shaders/field.glsl takes it apart.
 NodeBounds unpacked(std::uint32_t packed) {
-  return {std::bit_cast<float>(packed << 16), std::bit_cast<float>(packed & 0xffff0000U), 0, 0};
+  return {std::bit_cast<float>(packed << 16), std::bit_cast<float>(packed & 0xffff0000U), 0, 0, 0, {}};
 }
 
 TEST(PackOutwards, HoldsTheRangeAndLittleMore) {

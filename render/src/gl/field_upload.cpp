@@ -27,8 +27,10 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Node
     const std::uint32_t word = node::isLeaf(bits)
                                    ? std::uint32_t(node::degree(bits)) << kOffsetBits | node::offset(bits)
                                    : node::firstChild(bits);
-    texels[n] = {word, packOutwards(bounds[n].lo, bounds[n].hi), std::bit_cast<std::uint32_t>(bounds[n].bend),
-                 std::bit_cast<std::uint32_t>(bounds[n].curve)};
+    texels[n] = {
+        word,
+        node::isLeaf(bits) ? std::bit_cast<std::uint32_t>(bounds[n].rest) : packOutwards(bounds[n].lo, bounds[n].hi),
+        std::bit_cast<std::uint32_t>(bounds[n].bend), std::bit_cast<std::uint32_t>(bounds[n].curve)};
   }
   return texels;
 }
@@ -55,6 +57,9 @@ FieldUpload::FieldUpload(const FieldData& field, const std::vector<NodeBounds>& 
 
   const std::vector<NodeTexel> texels = nodeTexels(field, bounds);
   upload(nodeBuffer_, nodes_, GL_RGBA32UI, texels.data(), texels.size() * sizeof(NodeTexel));
+  std::vector<std::array<float, 4>> linearParts;
+  for (const NodeBounds& node : bounds) linearParts.push_back(node.linear);
+  upload(linearPartBuffer_, linearParts_, GL_RGBA32F, linearParts.data(), linearParts.size() * sizeof linearParts[0]);
   if (const auto* single = std::get_if<std::vector<float>>(&field.coefficients)) {
     upload(coefficientBuffer_, coefficients_, GL_R32F, single->data(), single->size() * sizeof(float));
   } else {
@@ -67,6 +72,7 @@ FieldUpload::FieldUpload(const FieldData& field, const std::vector<NodeBounds>& 
 void FieldUpload::bind() const {
   glBindTextureUnit(0, nodes_.name());
   glBindTextureUnit(1, coefficients_.name());
+  glBindTextureUnit(4, linearParts_.name());
 }
 
 }  // namespace hpsdf::render

@@ -10,19 +10,20 @@ namespace hpsdf::render {
 /// MiB.
 ///
 /// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the first texel of coefficients; the rest
-/// are `NodeBounds`: y = upper halves of the floats hi (high) and lo (low), rounded outwards, z = bend and w = curve,
-/// as bits of floats. coefficients, R32F: as in FieldData.
+/// are `NodeBounds`: y = upper halves of the floats hi (high) and lo (low), rounded outwards, or, of a leaf, rest;
+/// z = bend and w = curve, as bits of floats. coefficients, R32F: as in FieldData. linearParts, RGBA32F, of leaves:
+/// c_100, c_010, c_001, c_000.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
   FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds);
 
-  /// To texture units 0 (nodes) and 1 (coefficients).
+  /// To texture units 0 (nodes), 1 (coefficients) and 4 (linear parts).
   void bind() const;
 
  private:
-  GlBuffer nodeBuffer_, coefficientBuffer_;
-  GlBufferTexture nodes_, coefficients_;
+  GlBuffer nodeBuffer_, coefficientBuffer_, linearPartBuffer_;
+  GlBufferTexture nodes_, coefficients_, linearParts_;
 };
 
 }  // namespace hpsdf::render

@@ -184,7 +184,7 @@ class GlRenderer final : public Renderer {
         octree_(withoutCoefficients(field.data())),
         bounds_(nodeBounds(field.data())) {
     const int evaluation = evaluationLoops(highestDegree(field.data()));
-    stepsInPass_ = kLoopBudget / (2 * evaluation + kMaxDepth + 3);
+    stepsInPass_ = kLoopBudget / (evaluation + kMaxDepth + 4);
     refinements_ = std::min(kRefinementsInAll, (kLoopBudget - kMaxDepth) / (evaluation + 1) - 1);
     const EglContext::Current current(context_);
     resources_ = std::make_unique<Resources>(field.data(), bounds_);

@@ -1,0 +1,132 @@
+#include "surface_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "hpsdf/render/renderer.h"
+#include "random_field.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr int kWidth = 203;  // no multiple of a block
+constexpr int kHeight = 150;
+
+struct Found {
+  float side;
+  std::vector<float> starts;  ///< of every pixel; infinite where it is in no block
+};
+
+Found find(const Field& field, const SurfaceView& view) {
+  const GridSpace space(field.data());
+  const RayGeometry rays(space, view.camera, kWidth, kHeight);
+  const SurfaceBlocks found = surfaceBlocks(field.data(), nodeBounds(field.data()), space, rays, view.offset);
+  Found result{found.side, std::vector<float>(std::size_t(kWidth) * kHeight, std::numeric_limits<float>::infinity())};
+  for (const Block& block : found.blocks)
+    for (int y = int(block.y); y < std::min(kHeight, int(block.y) + kBlock); ++y)
+      for (int x = int(block.x); x < std::min(kWidth, int(block.x) + kBlock); ++x) {
+        float& start = result.starts[std::size_t(y) * kWidth + x];
+        EXPECT_TRUE(std::isinf(start)) << "blocks overlap";
+        start = block.start;
+      }
+  return result;
+}
+
+/// No hit lies before its block's start, none outside of the blocks; and up to the start, or all along where there is
+/// no block, the bounds of the leaves that a ray passes say that the field is on the side.
+void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
+  const Found found = find(field, view);
+  const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
+  const GridSpace space(field.data());
+  const RayGeometry rays(space, view.camera, kWidth, kHeight);
+  const std::vector<NodeBounds> bounds = nodeBounds(field.data());
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const std::size_t i = std::size_t(y) * kWidth + x;
+      if (truth.hit(i)) {
+        ASSERT_LE(found.starts[i], truth.distance[i] * (1 + 1e-6F)) << x << ", " << y;
+      }
+      if (i % 11 != 0) continue;
+      const Vector3 direction = rays.direction(x, y);
+      const double farthest = (view.camera.eye - field.domain().center()).norm() + space.diagonal;
+      const double end = std::min<double>(found.starts[i], farthest);
+      if (end <= 1e-5) continue;
+      for (int step = 1; step <= 200; ++step) {
+        const Vector3 point = view.camera.eye + (end - 1e-5) * step / 200 * direction;
+        if (!field.domain().contains(point)) continue;
+        const NodeBounds& leaf = bounds[field.cellAt(point).id];
+        ASSERT_TRUE(found.side > 0 ? leaf.lo > view.offset : leaf.hi < view.offset) << x << ", " << y;
+      }
+    }
+}
+
+Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+  const Vector3 unit = forward.normalized();
+  const Vector3 right = unit.unitOrthogonal();
+  return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
+}
+
+TEST(SurfaceBlocks, LeaveNothingOutFromAnywhere) {
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    // an oblong domain, a field that jumps over the offset at faces
+    const Field field = randomField(seed, {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)),
+                                           .grid = {2, 3, 2},
+                                           .roughness = seed % 2 ? 1.0 : 0.1,
+                                           .maxDepth = 4,
+                                           .minDegree = 0});
+    for (int i = 0; i < 12; ++i) {
+      // from far away down to within the domain
+      const Vector3 eye = std::exp2(2 - i % 6) * Vector3(unit(random), unit(random), unit(random));
+      const Vector3 forward = i % 2 ? Vector3(unit(random), unit(random), unit(random)) : Vector3(-eye);
+      expectNothingLeftOut(field, {lookingAt(eye, forward, 0.3 + 0.5 * (i % 3)), 0.1 * unit(random)});
+    }
+  }
+}
+
+TEST(SurfaceBlocks, OfACameraWithoutWidthAreTheWholeView) {
+  const Field field = randomField(1);
+  const Pinhole flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
+  for (const float start : find(field, {flat, 0}).starts) EXPECT_LT(start, 3);
+}
+
+/// A sphere in small cells.
+Field sphere() { return randomField(3, {.roughness = 0.02, .refinement = 1, .maxDepth = 4}); }
+
+/// What the blocks are for: few pixels beside the surface are drawn, and rays start close to it.
+TEST(SurfaceBlocks, HugTheSurface) {
+  const Field field = sphere();
+  const SurfaceView view{pinhole({}, field.domain(), kWidth, kHeight), 0};
+  const Found found = find(field, view);
+  const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
+  int drawn = 0, hit = 0;
+  double ahead = 0;
+  for (std::size_t i = 0; i < found.starts.size(); ++i) {
+    drawn += std::isfinite(found.starts[i]);
+    if (!truth.hit(i)) continue;
+    ++hit;
+    ahead += truth.distance[i] - double(found.starts[i]);
+  }
+  EXPECT_EQ(found.side, 1);
+  EXPECT_GT(hit, 2000);
+  EXPECT_LT(drawn, 1.8 * hit);
+  EXPECT_LT(ahead / hit, 0.1 * field.domain().sizes().norm());
+}
+
+TEST(SurfaceBlocks, AreNoneWhereThereIsNothingToSee) {
+  const Field field = sphere();
+  const auto count = [&](const SurfaceView& view) {
+    const Found found = find(field, view);
+    return std::ranges::count_if(found.starts, [](float start) { return std::isfinite(start); });
+  };
+  const Pinhole away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
+  EXPECT_EQ(count({away, 0}), 0);
+  EXPECT_EQ(count({pinhole({}, field.domain(), kWidth, kHeight), 5}), 0);
+}
+
+}  // namespace
+}  // namespace hpsdf::render
