@@ -3,6 +3,7 @@
 
 layout(binding = 0) uniform usamplerBuffer nodes;        // see FieldUpload
 layout(binding = 1) uniform samplerBuffer coefficients;  // see FieldData
+layout(binding = 5) uniform samplerBuffer coefficientQuads;  // the same by four
 layout(location = 0) uniform uvec3 grid;
 
 const uint kNoCell = 0xffffffffu;
@@ -47,8 +48,59 @@ void advance(inout float value, inout float before, float x, float i) {
   value = next;
 }
 
+// Coefficients of a leaf up to degree 4: texels of the terms up to degree 3, then of degree 4, which are zero below it.
+// What llvmpipe pays for is loops, and loads one by one: all nine are loaded, and used in straight code.
+const int kStraight = 4;
+
+struct Straight {
+  vec4 a;  // c_000 to c_003
+  vec4 b;  // c_010, c_011, c_012, c_020
+  vec4 c;  // c_021, c_030, c_100, c_101
+  vec4 d;  // c_102, c_110, c_111, c_120
+  vec4 e;  // c_200, c_201, c_210, c_300
+  vec4 f;  // c_004, c_013, c_022, c_031
+  vec4 g;  // c_040, c_103, c_112, c_121
+  vec4 h;  // c_130, c_202, c_211, c_220
+  vec4 i;  // c_301, c_310, c_400
+};
+
+Straight fetchStraight(int offset, int degree) {
+  int first = offset / 4;
+  Straight s;
+  s.a = texelFetch(coefficientQuads, first);
+  s.b = texelFetch(coefficientQuads, first + 1);
+  s.c = texelFetch(coefficientQuads, first + 2);
+  s.d = texelFetch(coefficientQuads, first + 3);
+  s.e = texelFetch(coefficientQuads, first + 4);
+  s.f = s.g = s.h = s.i = vec4(0.0);
+  if (degree == kStraight) {
+    s.f = texelFetch(coefficientQuads, first + 5);
+    s.g = texelFetch(coefficientQuads, first + 6);
+    s.h = texelFetch(coefficientQuads, first + 7);
+    s.i = texelFetch(coefficientQuads, first + 8);
+  }
+  return s;
+}
+
+// L_2, L_3 and L_4 of each coordinate.
+vec3 legendre2(vec3 x) { return 1.5 * x * x - 0.5; }
+vec3 legendre3(vec3 x) { return (2.5 * x * x - 1.5) * x; }
+vec3 legendre4(vec3 x) { return (4.375 * x * x - 3.75) * x * x + 0.375; }
+
+float evaluateStraight(Straight s, vec3 one) {
+  vec3 two = legendre2(one), three = legendre3(one), four = legendre4(one);
+  float x0 = s.a.x + s.a.y * one.z + s.a.z * two.z + s.a.w * three.z + s.f.x * four.z +
+             (s.b.x + s.b.y * one.z + s.b.z * two.z + s.f.y * three.z) * one.y +
+             (s.b.w + s.c.x * one.z + s.f.z * two.z) * two.y + (s.c.y + s.f.w * one.z) * three.y + s.g.x * four.y;
+  float x1 = s.c.z + s.c.w * one.z + s.d.x * two.z + s.g.y * three.z +
+             (s.d.y + s.d.z * one.z + s.g.z * two.z) * one.y + (s.d.w + s.g.w * one.z) * two.y + s.h.x * three.y;
+  float x2 = s.e.x + s.e.y * one.z + s.h.y * two.z + (s.e.z + s.h.z * one.z) * one.y + s.h.w * two.y;
+  float x3 = s.e.w + s.i.x * one.z + s.i.y * one.y;
+  return x0 + x1 * one.x + x2 * two.x + x3 * three.x + s.i.z * four.x;
+}
+
 // The polynomial at local coordinates in [-1, 1]^3.
-float evaluate(int offset, int degree, vec3 local) {
+float evaluateAny(int offset, int degree, vec3 local) {
   float value = 0.0;
   float x = 1.0, xBefore = 0.0;
   for (int i = 0; i <= degree; ++i) {
@@ -68,4 +120,9 @@ float evaluate(int offset, int degree, vec3 local) {
     advance(x, xBefore, local.x, float(i));
   }
   return value;
+}
+
+float evaluate(int offset, int degree, vec3 local) {
+  if (degree > kStraight) return evaluateAny(offset, degree, local);
+  return evaluateStraight(fetchStraight(offset, degree), local);
 }

@@ -427,7 +427,7 @@ TEST_F(Gl, SlicesOfBuiltInShapes) {
 }
 
 TEST_F(Gl, SlicesOfDegreesUpTo30) {
-  for (const int degree : {0, 1, 2, 13, 30}) {
+  for (const int degree : {0, 1, 2, 3, 4, 5, 13, 30}) {
     const Field field = randomField(degree, {.roughness = 1, .maxDepth = 1, .minDegree = degree, .maxDegree = degree});
     const ViewBuffers buffers =
         makeCpuRenderer(field)->slice(axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), kWidth, kHeight);

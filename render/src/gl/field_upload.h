@@ -11,19 +11,20 @@ namespace hpsdf::render {
 ///
 /// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the first texel of coefficients; the rest
 /// are `NodeBounds`: y = upper halves of the floats hi (high) and lo (low), rounded outwards, or, of a leaf, rest;
-/// z = bend and w = curve, as bits of floats. coefficients, R32F: as in FieldData. linearParts, RGBA32F, of leaves:
+/// z = bend and w = curve, as bits of floats. coefficients, R32F: as in FieldData, but leaves up to
+/// degree 4 in the order of field.glsl's straight code, and all padded to a multiple of four; the same as RGBA32F. linearParts, RGBA32F, of leaves:
 /// c_100, c_010, c_001, c_000.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
   FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds);
 
-  /// To texture units 0 (nodes), 1 (coefficients) and 4 (linear parts).
+  /// To texture units 0 (nodes), 1 (coefficients), 4 (linear parts) and 5 (coefficients by four).
   void bind() const;
 
  private:
   GlBuffer nodeBuffer_, coefficientBuffer_, linearPartBuffer_;
-  GlBufferTexture nodes_, coefficients_, linearParts_;
+  GlBufferTexture nodes_, coefficients_, coefficientQuads_, linearParts_;
 };
 
 }  // namespace hpsdf::render
