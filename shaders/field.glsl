@@ -1,4 +1,4 @@
-// Lookup and evaluation of a field; the same steps under the same names as render/src/cpu/trace.cpp.
+// Lookup and evaluation of a field.
 // Positions are in grid coordinates: the domain is [0, grid], a base cell a unit cube.
 
 layout(binding = 0) uniform usamplerBuffer nodes;        // see FieldUpload

@@ -1,18 +1,18 @@
-// First pass of a surface: TraceField::trace up to the leaf and the bracket of the first crossing of f = offset.
+// First pass of a surface: up to the leaf and the bracket of the first crossing of f = offset (docs/rendering.md,
+// "Tracing"). llvmpipe runs both sides of a branch: what is dear stands in the loops once, and what is cheap before it.
 // After `mostSteps` a pixel is left under way and the pass drawn again: llvmpipe ends all loops of a shader without a
 // word once they have run 65535 times together.
 
 layout(location = 11) uniform int mostSteps;
-layout(location = 12) uniform bool resume;  // draw again: takes up the pixels under way, leaves the others
+layout(location = 12) uniform bool resume;      // draw again: takes up the pixels under way, leaves the others
+layout(location = 14) uniform float startSide;  // SurfaceBlocks::side
 
-layout(location = 14) uniform float startSide;
+layout(binding = 4) uniform samplerBuffer linearParts;  // of leaves: slopes in local x, y, z, value in the middle
 
-flat in float start;
+flat in float start;  // of the block: see SurfaceBlocks
 
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
-
-layout(binding = 4) uniform samplerBuffer linearParts;  // of leaves: slopes in x, y, z, value in the middle
 
 const float kNudge = 1e-6;  // in domain diagonals: beyond a face; also the shortest step; as in trace.cpp
 

@@ -17,9 +17,9 @@ struct NodeBounds {
   /// Leaves: the gradient in local coordinates differs from that of the polynomial's linear part by at most this.
   /// Internal nodes: −1.
   float bend;
-  float rest;   ///< leaves: the value differs from that of the polynomial's linear part by at most this
+  float rest;   ///< leaves: the value differs from the linear part's by at most this
   float curve;  ///< leaves: no second derivative in local coordinates, along any unit vector, is larger than this
-  /// Leaves: the linear part itself, c_100, c_010, c_001 and c_000.
+  /// Leaves: the linear part, c_100, c_010, c_001 and c_000.
   std::array<float, 4> linear;
 };
 

@@ -1,8 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. shaders/field.glsl,
-// shaders/surface.glsl and the two passes surface_march.frag and surface_hit.frag hold the same steps under the same
-// names in single precision. Lookup and evaluation repeat what core has, on purpose: this is the oracle, tested against
-// the field's own queries, and must not share their faults.
+// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. Lookup and evaluation repeat
+// what core has, on purpose: this is the oracle, tested against the field's own queries, and must not share their
+// faults. For the same reason it does without the short cuts of the shaders: every ray starts where it enters the
+// domain, and what `NodeBounds` say is asked for less.
 
 #include <optional>
 #include <vector>

@@ -6,14 +6,14 @@
 
 namespace hpsdf::render {
 
-/// A field on the device, as two buffer textures: Mesa's llvmpipe allows them 2^27 texels, a storage buffer only 128
-/// MiB.
+/// A field on the device, as buffer textures: Mesa's llvmpipe allows them 2^27 texels, a storage buffer only 128 MiB.
 ///
-/// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the first texel of coefficients; the rest
-/// are `NodeBounds`: y = upper halves of the floats hi (high) and lo (low), rounded outwards, or, of a leaf, rest;
-/// z = bend and w = curve, as bits of floats. coefficients, R32F: as in FieldData, but leaves up to
-/// degree 4 in the order of field.glsl's straight code, and all padded to a multiple of four; the same as RGBA32F. linearParts, RGBA32F, of leaves:
-/// c_100, c_010, c_001, c_000.
+/// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the leaf's first coefficient; the rest are `NodeBounds`:
+/// y = upper halves of the floats hi (high) and lo (low), rounded outwards, or, of a leaf, the bits of rest; z = bend
+/// and w = curve, as bits of floats.
+/// coefficients, R32F: as in FieldData, but those of leaves up to degree 4 in the order of field.glsl's straight code,
+/// and all leaves padded to a multiple of four; coefficientQuads: the same by four, RGBA32F.
+/// linearParts, RGBA32F: `NodeBounds::linear`.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
