@@ -1,6 +1,7 @@
 #include "surface_blocks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -77,12 +78,17 @@ class Finder {
     const BlockRect whole{0, 0, columns_, rows_};
     double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
     int behind = 0;
+    std::array<int, 4> beyond{};  // corners beyond each edge of the view, also behind the eye
     const Vector3 corner = viewFromGrid_ * (lo - rays_.eye);
     const Eigen::Matrix3d edges = viewFromGrid_ * size;
     for (int i = 0; i < 8; ++i) {
       Vector3 p = corner;
       for (int axis = 0; axis < 3; ++axis)
         if (i >> axis & 1) p += edges.col(axis);
+      beyond[0] += p.y() > p.x();
+      beyond[1] += -p.y() > p.x();
+      beyond[2] += p.z() > p.x();
+      beyond[3] += -p.z() > p.x();
       if (!(p.x() > near_)) {
         ++behind;
         continue;
@@ -92,7 +98,8 @@ class Finder {
       y0 = std::min(y0, -p.z() / p.x());
       y1 = std::max(y1, -p.z() / p.x());
     }
-    if (behind == 8 && corner.allFinite()) return {0, 0, 0, 0};
+    if (!corner.allFinite()) return whole;
+    if (behind == 8 || std::ranges::count(beyond, 8) > 0) return {0, 0, 0, 0};
     if (behind > 0) return whole;
     // the centre of pixel i is at 2i + 1 = (1 + x) · width; a pixel more on either side
     const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };

@@ -125,6 +125,9 @@ TEST(SurfaceBlocks, AreNoneWhereThereIsNothingToSee) {
   };
   const Pinhole away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
   EXPECT_EQ(count({away, 0}), 0);
+  // past the sphere, which lies to both sides of the plane through the eye
+  const Pinhole past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
+  EXPECT_EQ(count({past, 0}), 0);
   EXPECT_EQ(count({pinhole({}, field.domain(), kWidth, kHeight), 5}), 0);
 }
 
