@@ -220,6 +220,7 @@ TEST(Field, RefusesArraysThatAreNoField) {
   EXPECT_NO_THROW(Field{steps()});
   refuses([](FieldData& d) { d.domain.setEmpty(); });
   refuses([](FieldData& d) { d.domain.max().x() = std::numeric_limits<double>::infinity(); });
+  refuses([](FieldData& d) { d.domain = Box(Vector3::Constant(-1e308), Vector3::Constant(1e308)); });  // size overflows
   refuses([](FieldData& d) { d.grid = {0, 1, 1}; });
   refuses([](FieldData& d) { d.grid = {0xffffffff, 0xffffffff, 0xffffffff}; });
   refuses([](FieldData& d) { d.nodes.pop_back(); });

@@ -2,6 +2,7 @@
 // Descent to a leaf and evaluation of its polynomial: what every query shares.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <type_traits>
@@ -12,58 +13,46 @@
 
 namespace hpsdf {
 
-/// A point on its way down the octree.
-struct Location {
-  std::uint32_t node;  ///< index of the leaf's node
-  int depth;
-  std::array<std::uint32_t, 3> base;    ///< base cell
-  std::array<double, 3> fraction;       ///< within the cell, in [0, 1]
-  std::array<std::uint32_t, 3> path{};  ///< the cell's place within its base cell: `depth` bits an axis
+/// A point of the domain in units of base cells.
+struct GridPoint {
+  std::array<double, 3> coordinates;
+  std::array<std::int64_t, 3> fixed;  ///< the same with kMaxDepth binary digits after the point
+  std::uint64_t way;                  ///< those digits, 21 bits an axis: they name the children on its way down
+
+  /// The cell of a depth that holds it, in units of such cells.
+  std::int64_t cell(int axis, int depth) const { return fixed[axis] >> (kMaxDepth - depth); }
+
+  /// The number of that cell among its parent's children.
+  std::uint32_t child(int depth) const {
+    const std::uint64_t bits = (way >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
+    return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
+  }
 };
 
-/// Grid coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain
-/// then lands exactly on the face between two base cells. Points outside and NaN are clamped.
-inline std::array<double, 3> gridCoordinates(const FieldData& field, const Vector3& x) {
-  const Vector3 lo = field.domain.min();
-  const Vector3 size = field.domain.max() - lo;
-  std::array<double, 3> g;
+/// Coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain then
+/// lands exactly on the face between two base cells.
+inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
+  constexpr auto kOne = std::int64_t{1} << kMaxDepth;
+  GridPoint at;
+  at.way = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double cells = field.grid[axis];
-    g[axis] = std::min(std::max(0.0, ((x[axis] - lo[axis]) / size[axis]) * cells), cells);
+    at.coordinates[axis] = ((x[axis] - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
+    at.fixed[axis] = std::min(static_cast<std::int64_t>(at.coordinates[axis] * kOne), frame.last[axis]);
+    at.way |= static_cast<std::uint64_t>(at.fixed[axis] & (kOne - 1)) << (21 * axis);
   }
-  return g;
+  return at;
 }
 
-/// The number of the child that holds the point; `fraction` becomes its place within that child.
-inline std::uint32_t enterChild(std::array<double, 3>& fraction) {
-  std::uint32_t child = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double doubled = 2 * fraction[axis];
-    const std::uint32_t upper = doubled >= 1;
-    fraction[axis] = doubled - upper;
-    child |= upper << axis;
-  }
-  return child;
-}
+/// The leaf that holds a point.
+struct Location {
+  std::uint32_t node;
+  int depth;
+};
 
-/// The leaf that holds x.
-inline Location locate(const FieldData& field, const Vector3& x) {
-  Location at;
-  const std::array<double, 3> g = gridCoordinates(field, x);
-  for (int axis = 0; axis < 3; ++axis) {
-    at.base[axis] = std::min(static_cast<std::uint32_t>(g[axis]), field.grid[axis] - 1);
-    at.fraction[axis] = g[axis] - at.base[axis];
-  }
-  at.node = (at.base[2] * field.grid[1] + at.base[1]) * field.grid[0] + at.base[0];
-  at.depth = 0;
-  std::uint64_t bits = field.nodes[at.node];
-  while (!node::isLeaf(bits)) {
-    const std::uint32_t child = enterChild(at.fraction);
-    for (int axis = 0; axis < 3; ++axis) at.path[axis] = 2 * at.path[axis] + (child >> axis & 1);
-    at.node = node::firstChild(bits) + child;
-    ++at.depth;
-    bits = field.nodes[at.node];
-  }
+inline Location locate(const FieldData& field, const GridPoint& x) {
+  Location at{static_cast<std::uint32_t>((x.cell(2, 0) * field.grid[1] + x.cell(1, 0)) * field.grid[0] + x.cell(0, 0)),
+              0};
+  while (!node::isLeaf(field.nodes[at.node])) at.node = node::firstChild(field.nodes[at.node]) + x.child(++at.depth);
   return at;
 }
 
@@ -74,26 +63,18 @@ struct FoundLeaf {
   std::array<double, 3> local;  ///< in [-1, 1]
 };
 
-/// The same leaf as `locate` finds, by the directory.
+/// The same leaf as `locate` finds, by the directory. x lies in the domain.
 inline FoundLeaf find(const FieldData& field, const Directory& directory, const Vector3& x) {
-  const std::array<double, 3> g = gridCoordinates(field, x);
-  const std::uint32_t fine = std::uint32_t{1} << directory.depth;
-  std::array<std::uint32_t, 3> at;
-  for (int axis = 0; axis < 3; ++axis)
-    at[axis] = std::min(static_cast<std::uint32_t>(g[axis] * fine), field.grid[axis] * fine - 1);
-  const std::size_t row = std::size_t(at[2]) * (field.grid[1] * fine) + at[1];
+  const GridPoint at = gridPoint(directory.frame, x);
+  const int top = directory.depth;
   FoundLeaf found;
-  found.bits = directory.entries[row * (field.grid[0] * fine) + at[0]];
+  found.bits = directory.entries[at.cell(2, top) * directory.slab + at.cell(1, top) * directory.row + at.cell(0, top)];
   found.depth = Directory::depthOf(found.bits);
+  while (!node::isLeaf(found.bits)) found.bits = field.nodes[node::firstChild(found.bits) + at.child(++found.depth)];
   // scaling by a power of two and taking off the whole part are exact
-  const double scale = std::uint32_t{1} << found.depth;
-  std::array<double, 3> fraction;
-  for (int axis = 0; axis < 3; ++axis) fraction[axis] = g[axis] * scale - (at[axis] >> (directory.depth - found.depth));
-  while (!node::isLeaf(found.bits)) {
-    found.bits = field.nodes[node::firstChild(found.bits) + enterChild(fraction)];
-    ++found.depth;
-  }
-  for (int axis = 0; axis < 3; ++axis) found.local[axis] = 2 * fraction[axis] - 1;
+  const double scale = 1 << found.depth;
+  for (int axis = 0; axis < 3; ++axis)
+    found.local[axis] = 2 * (at.coordinates[axis] * scale - static_cast<double>(at.cell(axis, found.depth))) - 1;
   return found;
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 void checkDomain(const FieldData& data) {
   if (data.domain.isEmpty() || !data.domain.min().allFinite() || !data.domain.max().allFinite() ||
-      !((data.domain.max() - data.domain.min()).minCoeff() > 0))
+      !((data.domain.max() - data.domain.min()).minCoeff() > 0) || !(data.domain.max() - data.domain.min()).allFinite())
     notAField("its domain is empty or not finite");
 }
 
@@ -56,48 +56,59 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   }
 }
 
-/// The closest point of the domain; NaN stays NaN.
-Vector3 clampedTo(const Box& domain, const Vector3& x) { return x.cwiseMax(domain.min()).cwiseMin(domain.max()); }
+/// As one condition: six branches would cost more than the comparisons. NaN is not within.
+bool contains(const GridFrame& domain, const Vector3& x) {
+  bool within = true;
+  for (int axis = 0; axis < 3; ++axis) within &= (x[axis] >= domain.lower[axis]) & (x[axis] <= domain.upper[axis]);
+  return within;
+}
+
+/// The closest point of the domain; for NaN some point.
+Vector3 closestWithin(const GridFrame& domain, const Vector3& x) {
+  Vector3 closest;
+  for (int axis = 0; axis < 3; ++axis)
+    closest[axis] = x[axis] > domain.lower[axis] ? std::min(x[axis], domain.upper[axis]) : domain.lower[axis];
+  return closest;
+}
 
 /// Without squares, which overflow or vanish far from the domain or very close to it. (The hypot of three arguments
 /// of GCC 12 loses NaN and infinity.)
 double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
-/// Adds what lies outside of the domain to the value at the closest point within.
-void extend(const Box& domain, const Vector3& x, double& value) {
-  if (!domain.contains(x)) value += length(x - clampedTo(domain, x));
-}
+/// From f(q) at the closest point q of the domain to f(q) + |x - q|; `beyond` is x - q.
+void extend(const Vector3& beyond, double& value) { value += length(beyond); }
 
-void extend(const Box& domain, const Vector3& x, ValueAndGradient& result) {
-  if (domain.contains(x)) return;
-  // f(q) + |x - q|: along an axis on which x is clamped, f(q) does not change
-  const Vector3 beyond = x - clampedTo(domain, x);
+void extend(const Vector3& beyond, ValueAndGradient& result) {
   const double distance = length(beyond);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
-    if (beyond[axis] != 0) result.gradient[axis] = 0;
+    if (beyond[axis] != 0) result.gradient[axis] = 0;  // along an axis on which x is clamped, f(q) does not change
   result.gradient += beyond / distance;
 }
 
 template <typename T>
-void answer(const FieldData& field, const T* coefficients, const FoundLeaf& leaf, const Vector3& x, double& value) {
+void answer(const T* coefficients, const GridFrame&, const FoundLeaf& leaf, double& value) {
   value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-  extend(field.domain, x, value);
 }
 
 template <typename T>
-void answer(const FieldData& field, const T* coefficients, const FoundLeaf& leaf, const Vector3& x,
-            ValueAndGradient& result) {
+void answer(const T* coefficients, const GridFrame& frame, const FoundLeaf& leaf, ValueAndGradient& result) {
   result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-  result.gradient.array() *= 2 / cellSize(field, leaf.depth).array();
-  extend(field.domain, x, result);
+  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
+  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
 }
 
 template <typename Answer>
 Answer answerOne(const FieldData& field, const Directory& directory, const Vector3& x) {
-  const FoundLeaf leaf = find(field, directory, x);
   Answer result;
-  std::visit([&](const auto& c) { answer(field, c.data(), leaf, x, result); }, field.coefficients);
+  if (!contains(directory.frame, x)) [[unlikely]] {
+    const Vector3 closest = closestWithin(directory.frame, x);
+    result = answerOne<Answer>(field, directory, closest);
+    extend(x - closest, result);
+    return result;
+  }
+  const FoundLeaf leaf = find(field, directory, x);
+  std::visit([&](const auto& c) { answer(c.data(), directory.frame, leaf, result); }, field.coefficients);
   return result;
 }
 
@@ -115,7 +126,7 @@ void answerMany(const FieldData& field, const Directory& directory, std::span<co
           const std::size_t count = std::min(kBatch, points.size() - first);
           std::array<std::uint8_t, kMaxDegree + 2> place{};  // where each degree begins in `order`
           for (std::size_t i = 0; i < count; ++i) {
-            leaves[i] = find(field, directory, points[first + i]);
+            leaves[i] = find(field, directory, closestWithin(directory.frame, points[first + i]));
             const auto* begin = c.data() + node::offset(leaves[i].bits);
             const int degree = node::degree(leaves[i].bits);
             for (const auto* at = begin; at < begin + coefficientCount(degree); at += 64 / sizeof(*at))
@@ -127,8 +138,11 @@ void answerMany(const FieldData& field, const Directory& directory, std::span<co
             order[place[node::degree(leaves[i].bits)]++] = static_cast<std::uint8_t>(i);
           for (std::size_t n = 0; n < count; ++n) {
             const std::size_t i = order[n];
-            answer(field, c.data(), leaves[i], points[first + i], out[first + i]);
+            answer(c.data(), directory.frame, leaves[i], out[first + i]);
           }
+          for (std::size_t i = first; i < first + count; ++i)
+            if (!contains(directory.frame, points[i])) [[unlikely]]
+              extend(points[i] - closestWithin(directory.frame, points[i]), out[i]);
         }
       },
       field.coefficients);
@@ -139,7 +153,7 @@ struct Visited {
   std::uint32_t node;
   int depth;
   std::array<std::uint32_t, 3> base;  ///< base cell
-  std::array<std::uint32_t, 3> path;  ///< see `Location::path`
+  std::array<std::uint32_t, 3> path;  ///< its place within the base cell, in cells of its depth
 };
 
 /// Base cells first to last, children 0 to 7; below an internal node where `visit` returns true for it.
@@ -166,6 +180,18 @@ void visitNodes(const FieldData& field, Visit&& visit) {
       }
 }
 
+GridFrame gridFrame(const FieldData& field) {
+  GridFrame frame;
+  for (int axis = 0; axis < 3; ++axis) {
+    frame.lower[axis] = field.domain.min()[axis];
+    frame.upper[axis] = field.domain.max()[axis];
+    frame.size[axis] = field.domain.max()[axis] - field.domain.min()[axis];
+    frame.cells[axis] = field.grid[axis];
+    frame.last[axis] = (std::int64_t{field.grid[axis]} << kMaxDepth) - 1;
+  }
+  return frame;
+}
+
 /// As deep as a sixteenth of the field's own size allows.
 Directory makeDirectory(const FieldData& field) {
   Directory directory;
@@ -175,7 +201,9 @@ Directory makeDirectory(const FieldData& field) {
   const std::size_t most = bytes / 16 / sizeof(directory.entries[0]);
   while (directory.depth < kMaxDepth && base << (3 * (directory.depth + 1)) <= most) ++directory.depth;
   directory.entries.resize(base << (3 * directory.depth));
-  const std::size_t nx = field.grid[0] << directory.depth, ny = field.grid[1] << directory.depth;
+  directory.frame = gridFrame(field);
+  directory.row = std::int64_t{field.grid[0]} << directory.depth;
+  directory.slab = directory.row * (std::int64_t{field.grid[1]} << directory.depth);
   visitNodes(field, [&](const Visited& at) {
     if (!node::isLeaf(field.nodes[at.node]) && at.depth < directory.depth) return true;
     const std::size_t width = std::size_t{1} << (directory.depth - at.depth);
@@ -183,7 +211,7 @@ Directory makeDirectory(const FieldData& field) {
     for (int axis = 0; axis < 3; ++axis) first[axis] = ((at.base[axis] << at.depth) + at.path[axis]) * width;
     for (std::size_t z = first[2]; z < first[2] + width; ++z)
       for (std::size_t y = first[1]; y < first[1] + width; ++y)
-        std::fill_n(&directory.entries[(z * ny + y) * nx + first[0]], width,
+        std::fill_n(&directory.entries[z * directory.slab + y * directory.row + first[0]], width,
                     Directory::entry(field.nodes[at.node], at.depth));
     return false;
   });
@@ -254,8 +282,14 @@ void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueA
 }
 
 Cell Field::cellAt(const Vector3& x) const {
-  const Location at = locate(data_, x);
-  return makeCell(data_, at.node, at.depth, at.base, at.path);
+  const GridPoint point = gridPoint(directory_.frame, closestWithin(directory_.frame, x));
+  const Location at = locate(data_, point);
+  std::array<std::uint32_t, 3> base, path;
+  for (int axis = 0; axis < 3; ++axis) {
+    base[axis] = static_cast<std::uint32_t>(point.cell(axis, 0));
+    path[axis] = static_cast<std::uint32_t>(point.cell(axis, at.depth) - (point.cell(axis, 0) << at.depth));
+  }
+  return makeCell(data_, at.node, at.depth, base, path);
 }
 
 void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
