@@ -1,9 +1,13 @@
 #include "hpsdf/build.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <queue>
 #include <string>
 #include <utility>
@@ -136,14 +140,7 @@ class Construction {
       worst.push_back(queue_.top().node);
       queue_.pop();
     }
-    std::vector<Trial> trials(worst.size());
-    tbb::parallel_for(
-        std::size_t{0}, worst.size(),
-        [&](std::size_t w) {
-          const BuildNode& node = tree_.nodes[worst[w]];
-          trials[w] = fitter_.attempt(tree_.boxOf(node), node.fit, *allowed(node));
-        },
-        tbb::simple_partitioner{});
+    std::vector<Trial> trials = tryAll(worst);
     for (std::size_t w = 0; w < worst.size(); ++w) {
       if (totalError_ <= target_) {  // done, unless an exact sum says otherwise
         enqueue(worst[w]);
@@ -152,6 +149,25 @@ class Construction {
       refine(worst[w], std::move(trials[w]));
       if (++steps_ % kResum == 0) sumTotalError();
     }
+  }
+
+  /// In parallel, the dearest first, so that no thread is left with a long one at the end while the others wait.
+  std::vector<Trial> tryAll(const std::vector<std::uint32_t>& cells) const {
+    std::vector<std::size_t> order(cells.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, std::greater(), [&](std::size_t w) { return tree_.nodes[cells[w]].fit.degree; });
+    std::vector<Trial> trials(cells.size());
+    std::atomic<std::size_t> next = 0;
+    tbb::parallel_for(
+        0, tbb::this_task_arena::max_concurrency(),
+        [&](int) {
+          for (std::size_t taken = next++; taken < order.size(); taken = next++) {
+            const BuildNode& node = tree_.nodes[cells[order[taken]]];
+            trials[order[taken]] = fitter_.attempt(tree_.boxOf(node), node.fit, *allowed(node));
+          }
+        },
+        tbb::simple_partitioner{});
+    return trials;
   }
 
   void refine(std::uint32_t node, Trial&& trial) {
