@@ -1,7 +1,5 @@
 #include "hpsdf/exact_distance.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -36,24 +34,6 @@ void check(const TriangleMesh& mesh) {
                   " has a coordinate that is not a finite number; repair or export the mesh again");
 }
 
-std::vector<TriangleFrame> makeFrames(const TriangleMesh& mesh) {
-  std::vector<TriangleFrame> frames(mesh.triangles.size());
-  tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    frames[t] =
-        distance::makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, static_cast<std::uint32_t>(t));
-  });
-  return frames;
-}
-
-std::vector<Vector3> unitNormals(const std::vector<TriangleFrame>& frames) {
-  std::vector<Vector3> normals;
-  normals.reserve(frames.size());
-  for (const TriangleFrame& frame : frames)
-    normals.push_back(distance::hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()));
-  return normals;
-}
-
 /// The point of segment ab closest to x, as its parameter in [0, 1].
 double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
   const Vector3 direction = b - a;
@@ -64,11 +44,15 @@ double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
 }  // namespace
 
 struct ExactDistance::Data {
-  explicit Data(const TriangleMesh& mesh) : Data(mesh, makeFrames(mesh)) {}
+  explicit Data(const TriangleMesh& mesh)
+      : hierarchy(mesh),
+        normals(hierarchy),
+        source{mesh.name, fingerprint(mesh), mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {}
 
   /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0.
   ClosestPoint resolve(const Vector3& x, const distance::Nearest& nearest) const {
-    const TriangleFrame& frame = hierarchy.frameAt(nearest.place);
+    const std::uint32_t slot = hierarchy.slotAt(nearest.place);
+    const TriangleFrame& frame = hierarchy.frames()[slot];
     const FramePoint& point = nearest.point;
     std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
     if (point.side[2] < point.side[side]) side = 2;
@@ -79,30 +63,21 @@ struct ExactDistance::Data {
       return {x - frame.normal * point.height, point.height + 0.0, frame.triangle, Feature::face};
 
     const std::uint32_t from = (frame.firstCorner + side) % 3;
-    const std::array<std::uint32_t, 3>& corners = triangles[frame.triangle];
-    const Vector3& a = vertices[corners[from]];
-    const Vector3& b = vertices[corners[(from + 1) % 3]];
+    const std::uint32_t va = hierarchy.triangles()[slot][from], vb = hierarchy.triangles()[slot][(from + 1) % 3];
+    const Vector3& a = hierarchy.vertices()[va];
+    const Vector3& b = hierarchy.vertices()[vb];
     const double t = closestParameter(x, a, b);
-    if (t <= 0) return at(a, x - a, normals.vertices[corners[from]], frame.triangle, Feature::vertex);
-    if (t >= 1) return at(b, x - b, normals.vertices[corners[(from + 1) % 3]], frame.triangle, Feature::vertex);
-    const Vector3& normal = normals.edges[normals.triangleEdges[frame.triangle][from]];
+    if (t <= 0) return at(a, x - a, normals.ofVertex(va), frame.triangle, Feature::vertex);
+    if (t >= 1) return at(b, x - b, normals.ofVertex(vb), frame.triangle, Feature::vertex);
+    const Vector3 normal = normals.ofEdge(hierarchy, slot, from);
     return at(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
   distance::Hierarchy hierarchy;
   distance::Pseudonormals normals;
-  std::vector<Vector3> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
   Source source;
 
  private:
-  Data(const TriangleMesh& mesh, const std::vector<TriangleFrame>& frames)
-      : hierarchy(frames),
-        normals(distance::makePseudonormals(mesh, unitNormals(frames))),
-        vertices(mesh.vertices),
-        triangles(mesh.triangles),
-        source{mesh.name, fingerprint(mesh), mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {}
-
   /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.
   static ClosestPoint at(const Vector3& closest, const Vector3& difference, const Vector3& normal,
                          std::uint32_t triangle, Feature feature) {
@@ -143,10 +118,6 @@ std::string_view instructionSet() { return distance::instructionSet(); }
 
 const Source& ExactDistance::source() const { return data_->source; }
 
-std::size_t ExactDistance::bytes() const {
-  const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
-  return data_->hierarchy.bytes() + sizeOf(data_->normals.edges) + sizeOf(data_->normals.vertices) +
-         sizeOf(data_->normals.triangleEdges) + sizeOf(data_->vertices) + sizeOf(data_->triangles);
-}
+std::size_t ExactDistance::bytes() const { return data_->hierarchy.bytes() + data_->normals.bytes(); }
 
 }  // namespace hpsdf

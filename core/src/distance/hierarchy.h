@@ -3,9 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "distance/array.h"
 #include "distance/triangle_frame.h"
+#include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf::distance {
@@ -56,8 +59,8 @@ struct alignas(32) Block {
 /// instruction set.
 class Hierarchy {
  public:
-  /// At least one triangle, all coordinates finite; at most `kMaxTriangles`.
-  explicit Hierarchy(std::vector<TriangleFrame> triangles);
+  /// At least one triangle and at most `kMaxTriangles`, all indices valid, all coordinates finite.
+  explicit Hierarchy(const TriangleMesh& mesh);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
@@ -68,25 +71,36 @@ class Hierarchy {
   void nearest(const std::array<Vector3, kPacket>& points, std::array<Nearest, kPacket>& nearest) const;
 
   /// The triangle at a place: number `place % kWidth` of block `place / kWidth`.
-  const TriangleFrame& frameAt(std::uint32_t place) const {
-    return triangles_[blocks_[place / kWidth].first + place % kWidth];
-  }
+  const TriangleFrame& frameAt(std::uint32_t place) const { return frames_[slotAt(place)]; }
 
-  const std::vector<Node>& nodes() const { return nodes_; }
-  const std::vector<Block>& blocks() const { return blocks_; }
+  std::span<const Node> nodes() const { return nodes_; }
+  std::span<const Block> blocks() const { return blocks_; }
 
-  std::size_t bytes() const {
-    return triangles_.size() * sizeof(TriangleFrame) + nodes_.size() * sizeof(Node) + blocks_.size() * sizeof(Block);
-  }
+  /// A triangle's number in the hierarchy's order, in which a block's triangles follow one another.
+  std::uint32_t slotAt(std::uint32_t place) const { return blocks_[place / kWidth].first + place % kWidth; }
+
+  // By slot; neighbours on the surface are mostly neighbours in memory.
+  std::span<const TriangleFrame> frames() const { return frames_; }
+  std::span<const std::array<std::uint32_t, 3>> triangles() const { return triangles_; }  ///< indices of `vertices`
+  std::span<const Vector3> vertices() const { return vertices_; }  ///< those in use, in the order of their first use
+
+  std::size_t bytes() const;
 
   /// x in the boxes' coordinates.
   Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
   double scale() const { return scale_; }
 
  private:
-  std::vector<TriangleFrame> triangles_;  ///< a block's one after another
-  std::vector<Node> nodes_;
-  std::vector<Block> blocks_;
+  /// Makes triangles_ and vertices_.
+  void sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order);
+  /// The block of slots [begin, end).
+  void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
+
+  Array<TriangleFrame> frames_;
+  Array<Node> nodes_;
+  Array<Block> blocks_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_
   double scale_ = 1;  ///< 1/half of the longest side of the mesh's box
 };
