@@ -17,6 +17,8 @@ constexpr float kNarrowest = 1e-30f;  ///< extents below would give bins no widt
 /// (2^32 triangles, each level at least halves a range).
 constexpr int kMaxLevel = 32;
 
+constexpr std::uint32_t kSamples = 1024;  ///< of a range, enough to choose where to split it
+constexpr float kNoPart = std::numeric_limits<float>::infinity();  ///< cost of one without triangles
 constexpr std::uint32_t kWorthATask = 4096;  // triangles
 
 struct FloatBox {
@@ -59,7 +61,7 @@ struct Range {
 /// Where the centers of a range lie, as numbers from 0 to `count` along each axis.
 struct Bins {
   explicit Bins(const Range& range)
-      : count(static_cast<int>(std::min<std::uint32_t>(kBins, range.size()))), origin(range.centers.lower) {
+      : count(static_cast<int>(std::clamp<std::uint32_t>(range.size() / 2, 4, kBins))), origin(range.centers.lower) {
     const Eigen::Array4f extent = range.centers.upper - origin;
     perUnit = (extent > kNarrowest).select(static_cast<float>(count) / extent, 0);
   }
@@ -150,35 +152,42 @@ class Builder {
     return {below, above};
   }
 
+  struct Bin {
+    FloatBox box;
+    std::uint32_t count = 0;
+
+    void extend(const Bin& other) {
+      box.extend(other.box);
+      count += other.count;
+    }
+    float cost() const { return count > 0 ? box.area() * static_cast<float>(count) : kNoPart; }
+  };
+
   /// Axis, and the first bin of the upper part; 0 where all centers share one bin.
   std::pair<int, int> bestCut(const Range& range, const Bins& bins) const {
-    std::array<std::array<FloatBox, kBins>, 3> boxes;
-    std::array<std::array<std::uint32_t, kBins>, 3> counts{};
-    for (std::uint32_t i = range.begin; i < range.end; ++i) {
+    Bin filled[3][kBins];
+    const std::uint32_t step = 1 + range.size() / kSamples;
+    for (std::uint32_t i = range.begin; i < range.end; i += step) {
       const Eigen::Array4i bin = bins.at(items_[i]).cast<int>().min(bins.count - 1).max(0);
       for (int axis = 0; axis < 3; ++axis) {
-        boxes[axis][bin[axis]].extend(items_[i].box);
-        ++counts[axis][bin[axis]];
+        filled[axis][bin[axis]].box.extend(items_[i].box);
+        ++filled[axis][bin[axis]].count;
       }
     }
     std::pair<int, int> best{0, 0};
     float bestCost = std::numeric_limits<float>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
-      std::array<float, kBins> above{};  // cost of the part from a bin on
-      FloatBox box;
-      std::uint32_t count = 0;
+      if (bins.perUnit[axis] == 0) continue;
+      std::array<float, kBins> above;  // cost of the part from a bin on
+      Bin part;
       for (int bin = bins.count - 1; bin > 0; --bin) {
-        box.extend(boxes[axis][bin]);
-        count += counts[axis][bin];
-        above[bin] = count > 0 ? box.area() * static_cast<float>(count) : -1;
+        part.extend(filled[axis][bin]);
+        above[bin] = part.cost();
       }
-      box = FloatBox{};
-      count = 0;
-      for (int bin = 1; bin < bins.count && above[bin] >= 0; ++bin) {
-        box.extend(boxes[axis][bin - 1]);
-        count += counts[axis][bin - 1];
-        if (count == 0) continue;
-        const float cost = box.area() * static_cast<float>(count) + above[bin];
+      part = Bin();
+      for (int bin = 1; bin < bins.count; ++bin) {
+        part.extend(filled[axis][bin - 1]);
+        const float cost = part.cost() + above[bin];
         if (cost < bestCost) bestCost = cost, best = {axis, bin};
       }
     }
