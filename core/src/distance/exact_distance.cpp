@@ -1,5 +1,7 @@
 #include "hpsdf/exact_distance.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -45,9 +47,13 @@ double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
 
 struct ExactDistance::Data {
   explicit Data(const TriangleMesh& mesh)
-      : hierarchy(mesh),
-        normals(hierarchy),
-        source{mesh.name, fingerprint(mesh), mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {}
+      : source{mesh.name, 0, mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {
+    tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
+                         [&] {
+                           hierarchy = distance::Hierarchy(mesh, source.box);
+                           normals = distance::Pseudonormals(hierarchy);
+                         });
+  }
 
   /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0.
   ClosestPoint resolve(const Vector3& x, const distance::Nearest& nearest) const {
@@ -73,9 +79,9 @@ struct ExactDistance::Data {
     return at(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
+  Source source;
   distance::Hierarchy hierarchy;
   distance::Pseudonormals normals;
-  Source source;
 
  private:
   /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.

@@ -1,6 +1,7 @@
 #include "distance/hierarchy.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -50,39 +51,29 @@ struct OrientedBox {
   float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
 };
 
-/// The least and the greatest coordinates of points along three axes, given as columns. In float: the axes' and points'
-/// fourth lane is 0.
-class Extents {
- public:
-  explicit Extents(const Eigen::Matrix3d& axes) : axes_(axes.cast<float>()) {
-    for (int i = 0; i < 3; ++i) rows_[i] << axes_.row(i).transpose().array(), 0;
-  }
+/// The least and the greatest coordinates of points, in float, along three axes.
+struct Extents {
+  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Array4f high = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
 
   void add(const Eigen::Array4f& point) {
-    const Eigen::Array4f along = rows_[0] * point[0] + rows_[1] * point[1] + rows_[2] * point[2];
-    low_ = low_.min(along);
-    high_ = high_.max(along);
+    low = low.min(point);
+    high = high.max(point);
   }
-
-  OrientedBox box() const {
-    // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
-    constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
-    const Eigen::Matrix3d axes = axes_.cast<double>();
-    const Vector3 low = low_.head<3>().cast<double>(), high = high_.head<3>().cast<double>();
-    OrientedBox box;
-    box.axes = axes_;
-    box.center = (axes * ((low + high) / 2)).cast<float>();
-    const Vector3 middle = axes.transpose() * box.center.cast<double>();
-    box.half = ((high - middle).cwiseMax(middle - low).array() + kRounding).cast<float>();
-    return box;
-  }
-
- private:
-  Eigen::Matrix3f axes_;  ///< as rounded: what the extents are measured along
-  std::array<Eigen::Array4f, 3> rows_;
-  Eigen::Array4f low_ = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Array4f high_ = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
 };
+
+OrientedBox boxFrom(const Eigen::Matrix3f& axes, const Extents& extents) {
+  // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
+  constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
+  const Eigen::Matrix3d asRounded = axes.cast<double>();
+  const Vector3 low = extents.low.head<3>().cast<double>(), high = extents.high.head<3>().cast<double>();
+  OrientedBox box;
+  box.axes = axes;
+  box.center = (asRounded * ((low + high) / 2)).cast<float>();
+  const Vector3 middle = asRounded.transpose() * box.center.cast<double>();
+  box.half = ((high - middle).cwiseMax(middle - low).array() + kRounding).cast<float>();
+  return box;
+}
 
 /// Fits the boxes of nodes to triangles that lie in the tree's order.
 class BoxFitter {
@@ -103,17 +94,21 @@ class BoxFitter {
   }
 
  private:
-  static constexpr std::uint32_t kSamples = 512;
+  static constexpr std::uint32_t kSamples = 128;
 
   OrientedBox boxAround(const Branch::Part& part) const {
-    Extents upright(Eigen::Matrix3d::Identity());
-    Extents leaning(axesOf(part));
+    const Eigen::Matrix3f axes = axesOf(part).cast<float>();
+    std::array<Eigen::Array4f, 3> rows;
+    for (int i = 0; i < 3; ++i) rows[i] << axes.row(i).transpose().array(), 0;
+    Extents upright, leaning;
     for (std::uint32_t slot = part.begin; slot < part.end; ++slot)
       for (const std::uint32_t vertex : triangles_[slot]) {
-        upright.add(points_[vertex]);
-        leaning.add(points_[vertex]);
+        const Eigen::Array4f point = points_[vertex];
+        upright.add(point);
+        leaning.add(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]);
       }
-    const OrientedBox uprightBox = upright.box(), leaningBox = leaning.box();
+    const OrientedBox uprightBox = boxFrom(Eigen::Matrix3f::Identity(), upright);
+    const OrientedBox leaningBox = boxFrom(axes, leaning);
     return leaningBox.area() < uprightBox.area() ? leaningBox : uprightBox;
   }
 
@@ -161,23 +156,26 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::v
 
 }  // namespace
 
-Hierarchy::Hierarchy(const TriangleMesh& mesh) {
-  const Box box = boundingBox(mesh);
+Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
   center_ = box.center();
   const double half = box.sizes().maxCoeff() / 2;
   scale_ = half > 0 ? 1 / half : 1;
 
   const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
-  sortSurface(mesh, tree.order);
-
-  frames_ = Array<TriangleFrame>(triangles_.size());
-  tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t slot) {
-    const auto& [a, b, c] = triangles_[slot];
-    frames_[slot] = makeFrame({vertices_[a], vertices_[b], vertices_[c]}, tree.order[slot]);
-  });
-
+  frames_ = Array<TriangleFrame>(mesh.triangles.size());
   Numbered numbered;
-  numbered.add(*tree.root);
+  tbb::parallel_invoke(
+      [&] {
+        sortSurface(mesh, tree.order);
+        numbered.add(*tree.root);
+      },
+      [&] {
+        tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t slot) {
+          const auto& [a, b, c] = mesh.triangles[tree.order[slot]];
+          frames_[slot] = makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, tree.order[slot]);
+        });
+      });
+
   const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
   const BoxFitter fitter(triangles_, points);
   nodes_ = Array<Node>(numbered.nodes.size());

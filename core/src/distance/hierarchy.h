@@ -59,8 +59,10 @@ struct alignas(32) Block {
 /// instruction set.
 class Hierarchy {
  public:
-  /// At least one triangle and at most `kMaxTriangles`, all indices valid, all coordinates finite.
-  explicit Hierarchy(const TriangleMesh& mesh);
+  Hierarchy() = default;
+
+  /// At least one triangle and at most `kMaxTriangles`, all indices valid, all coordinates finite. `box`: the mesh's.
+  Hierarchy(const TriangleMesh& mesh, const Box& box);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <tuple>
 #include <utility>
 
 namespace hpsdf::distance {
 namespace {
 
-/// The corners of all triangles by their vertex, as numbers 3·slot + k: those of v are [first[v], first[v + 1]).
+/// The corners of all triangles by their vertex, as numbers 3·slot + k: those of v are [first[v], first[v + 1]), in the
+/// order of the mesh's triangles.
 struct CornersByVertex {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> corners;
@@ -20,15 +20,18 @@ struct CornersByVertex {
 
 CornersByVertex groupCorners(const Hierarchy& hierarchy) {
   const auto triangles = hierarchy.triangles();
+  std::vector<std::uint32_t> slots(triangles.size());  // of the mesh's triangles
+  tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t slot) {
+    slots[hierarchy.frames()[slot].triangle] = static_cast<std::uint32_t>(slot);
+  });
   CornersByVertex grouped{std::vector<std::uint32_t>(hierarchy.vertices().size() + 1, 0),
                           std::vector<std::uint32_t>(3 * triangles.size())};
   for (const auto& triangle : triangles)
     for (const std::uint32_t v : triangle) ++grouped.first[v];
   for (std::size_t v = 1; v < grouped.first.size(); ++v) grouped.first[v] += grouped.first[v - 1];
-  // backwards, so that each group ends up ascending and `first` at its beginning
-  for (std::size_t slot = triangles.size(); slot-- > 0;)
-    for (std::uint32_t k = 3; k-- > 0;)
-      grouped.corners[--grouped.first[triangles[slot][k]]] = static_cast<std::uint32_t>(3 * slot + k);
+  // backwards, so that `first` ends up at each group's beginning
+  for (std::size_t t = slots.size(); t-- > 0;)
+    for (std::uint32_t k = 3; k-- > 0;) grouped.corners[--grouped.first[triangles[slots[t]][k]]] = 3 * slots[t] + k;
   return grouped;
 }
 
@@ -37,58 +40,54 @@ Vector3 unitNormal(const TriangleFrame& frame) { return hasArea(frame) ? frame.n
 /// What happens at one vertex after another; keeps its memory from one to the next.
 class AtVertex {
  public:
-  explicit AtVertex(const Hierarchy& hierarchy) : hierarchy_(hierarchy) {}
+  AtVertex(const Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
+      : frames_(hierarchy.frames()),
+        triangles_(hierarchy.triangles()),
+        vertices_(hierarchy.vertices()),
+        nextSide_(nextSide) {}
 
-  /// Comes to a vertex, where all these corners are.
-  void visit(std::span<const std::uint32_t> corners) {
-    corners_.clear();
-    for (const std::uint32_t corner : corners) corners_.emplace_back(triangleOf(corner), corner);
-    std::sort(corners_.begin(), corners_.end());  // sums in the order of the mesh do not depend on the hierarchy
-  }
-
-  Vector3 sum() const {
-    Vector3 total = Vector3::Zero();
-    for (const auto& [triangle, corner] : corners_) {
-      const Vector3& at = vertex(corner / 3, corner % 3);
-      const Vector3 next = vertex(corner / 3, (corner + 1) % 3) - at;
-      const Vector3 previous = vertex(corner / 3, (corner + 2) % 3) - at;
-      const double angle = std::atan2(next.cross(previous).norm(), next.dot(previous));
-      total += angle * unitNormal(hierarchy_.frames()[corner / 3]);
-    }
-    return total;
-  }
-
-  /// Links those sides of the triangles here whose other end is no lower vertex than this one, `self`, edge by edge.
-  void link(std::uint32_t self, std::vector<std::uint32_t>& nextSide) {
+  /// Returns the vertex's pseudonormal and links the sides that run from it to no lower vertex. `corners`: all at this
+  /// vertex.
+  Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
     sides_.clear();
-    for (const auto& [triangle, corner] : corners_) {
-      const std::uint32_t slot = corner / 3, k = corner % 3;
-      const std::uint32_t next = hierarchy_.triangles()[slot][(k + 1) % 3];
-      const std::uint32_t previous = hierarchy_.triangles()[slot][(k + 2) % 3];
-      if (next >= self) sides_.push_back({next, triangle, corner});
-      if (previous > self) sides_.push_back({previous, triangle, 3 * slot + (k + 2) % 3});
+    numbers_.clear();
+    Vector3 sum = Vector3::Zero();
+    for (const std::uint32_t corner : corners) {
+      const std::uint32_t slot = corner / 3, k = corner % 3, before = (k + 2) % 3;
+      const std::uint32_t next = triangles_[slot][(k + 1) % 3], previous = triangles_[slot][before];
+      const Vector3 toNext = vertices_[next] - vertices_[vertex];
+      const Vector3 toPrevious = vertices_[previous] - vertices_[vertex];
+      sum += std::atan2(toNext.cross(toPrevious).norm(), toNext.dot(toPrevious)) * unitNormal(frames_[slot]);
+      if (next >= vertex) addSide(next, corner);
+      if (previous > vertex) addSide(previous, 3 * slot + before);
     }
-    std::sort(sides_.begin(), sides_.end());
-    for (std::size_t begin = 0, end = 0; begin < sides_.size(); begin = end) {
-      while (end < sides_.size() && sides_[end].other == sides_[begin].other) ++end;
-      for (std::size_t i = begin; i < end; ++i) nextSide[sides_[i].number] = sides_[i + 1 < end ? i + 1 : begin].number;
-    }
+    linkSides();
+    return sum;
   }
 
  private:
-  struct Side {
-    std::uint32_t other, triangle, number;
-    auto operator<=>(const Side&) const = default;
-  };
-
-  std::uint32_t triangleOf(std::uint32_t corner) const { return hierarchy_.frames()[corner / 3].triangle; }
-  const Vector3& vertex(std::uint32_t slot, std::uint32_t k) const {
-    return hierarchy_.vertices()[hierarchy_.triangles()[slot][k]];
+  void addSide(std::uint32_t otherVertex, std::uint32_t number) {
+    sides_.push_back(std::uint64_t{otherVertex} << 32 | numbers_.size());
+    numbers_.push_back(number);
   }
 
-  const Hierarchy& hierarchy_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> corners_;  ///< triangle in the mesh, number
-  std::vector<Side> sides_;
+  void linkSides() {
+    std::sort(sides_.begin(), sides_.end());
+    std::size_t first = 0;  // of those at the same edge
+    for (std::size_t i = 0; i < sides_.size(); ++i) {
+      const bool last = i + 1 == sides_.size() || sides_[i + 1] >> 32 != sides_[i] >> 32;
+      nextSide_[numberOf(sides_[i])] = numberOf(sides_[last ? first : i + 1]);
+      if (last) first = i + 1;
+    }
+  }
+  std::uint32_t numberOf(std::uint64_t side) const { return numbers_[static_cast<std::uint32_t>(side)]; }
+
+  std::span<const TriangleFrame> frames_;
+  std::span<const std::array<std::uint32_t, 3>> triangles_;
+  std::span<const Vector3> vertices_;
+  std::vector<std::uint32_t>& nextSide_;
+  std::vector<std::uint64_t> sides_;  ///< other vertex, place in numbers_
+  std::vector<std::uint32_t> numbers_;
 };
 
 }  // namespace
@@ -97,12 +96,11 @@ Pseudonormals::Pseudonormals(const Hierarchy& hierarchy)
     : vertices_(hierarchy.vertices().size()), nextSide_(3 * hierarchy.triangles().size()) {
   const CornersByVertex grouped = groupCorners(hierarchy);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size()), [&](const auto& range) {
-    AtVertex at(hierarchy);
-    for (std::size_t v = range.begin(); v < range.end(); ++v) {
-      at.visit(std::span(grouped.corners).subspan(grouped.first[v], grouped.first[v + 1] - grouped.first[v]));
-      vertices_[v] = at.sum();
-      at.link(static_cast<std::uint32_t>(v), nextSide_);
-    }
+    AtVertex at(hierarchy, nextSide_);
+    for (std::size_t v = range.begin(); v < range.end(); ++v)
+      vertices_[v] =
+          at.visit(static_cast<std::uint32_t>(v),
+                   std::span(grouped.corners).subspan(grouped.first[v], grouped.first[v + 1] - grouped.first[v]));
   });
 }
 

@@ -15,6 +15,7 @@ namespace hpsdf::distance {
 /// nearest, and the search has just visited them.
 class Pseudonormals {
  public:
+  Pseudonormals() = default;
   explicit Pseudonormals(const Hierarchy& hierarchy);
 
   /// Sum of corner angle times unit normal.

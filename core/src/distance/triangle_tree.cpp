@@ -17,9 +17,9 @@ constexpr float kNarrowest = 1e-30f;  ///< extents below would give bins no widt
 /// (2^32 triangles, each level at least halves a range).
 constexpr int kMaxLevel = 32;
 
-constexpr std::uint32_t kSamples = 1024;  ///< of a range, enough to choose where to split it
+constexpr std::uint32_t kSamples = 1024;                           ///< of a range, enough to choose where to split it
 constexpr float kNoPart = std::numeric_limits<float>::infinity();  ///< cost of one without triangles
-constexpr std::uint32_t kWorthATask = 4096;  // triangles
+constexpr std::uint32_t kWorthATask = 4096;                        // triangles
 
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());

@@ -1,7 +1,10 @@
 #include "hpsdf/triangle_mesh.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 #include <xxhash.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <memory>
@@ -25,20 +28,30 @@ class Hasher {
   void add(std::uint32_t bits) { addBytes(bits, 4); }
   void add(double x) { add(std::bit_cast<std::uint64_t>(x + 0.0)); }  // + 0.0 turns -0.0 into 0.0
 
-  std::uint64_t digest() const { return XXH3_64bits_digest(state_.get()); }
+  std::uint64_t digest() {
+    flush();
+    return XXH3_64bits_digest(state_.get());
+  }
 
  private:
   struct Free {
     void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
   };
 
-  void addBytes(std::uint64_t bits, int count) {
-    std::array<unsigned char, 8> bytes;
-    for (int i = 0; i < count; ++i) bytes[i] = static_cast<unsigned char>(bits >> (8 * i));
-    XXH3_64bits_update(state_.get(), bytes.data(), static_cast<std::size_t>(count));
+  void addBytes(std::uint64_t bits, std::size_t count) {
+    if (filled_ + count > buffer_.size()) flush();
+    for (std::size_t i = 0; i < count; ++i) buffer_[filled_ + i] = static_cast<unsigned char>(bits >> (8 * i));
+    filled_ += count;
+  }
+
+  void flush() {
+    XXH3_64bits_update(state_.get(), buffer_.data(), filled_);
+    filled_ = 0;
   }
 
   std::unique_ptr<XXH3_state_t, Free> state_;
+  std::array<unsigned char, 4096> buffer_;  ///< to come: a call for each number would take longer than the hash
+  std::size_t filled_ = 0;
 };
 
 /// Throws `Error`, its message after `prefix`, for a surface without finite extent.
@@ -61,10 +74,15 @@ void requireValidIndices(const TriangleMesh& mesh) {
 }
 
 Box boundingBox(const TriangleMesh& mesh) {
-  Box box;
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t v : triangle) box.extend(mesh.vertices[v]);
-  return box;
+  using Range = tbb::blocked_range<std::size_t>;
+  return tbb::parallel_reduce(
+      Range(0, mesh.triangles.size(), 10'000), Box(),
+      [&](const Range& range, Box box) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t)
+          for (const std::uint32_t v : mesh.triangles[t]) box.extend(mesh.vertices[v]);
+        return box;
+      },
+      [](const Box& a, const Box& b) { return a.merged(b); });
 }
 
 double signedVolume(const TriangleMesh& mesh) {
