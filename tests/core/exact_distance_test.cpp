@@ -420,6 +420,15 @@ TEST(ExactDistance, ClustersTooSmallForAnyBin) {
   }
 }
 
+TEST(ExactDistance, AnyFiniteCoordinatesAreTakenWithoutHarm) {
+  for (const double size : {1e-320, 1e-310, 1e300, 1e307})
+    for (const double at : {0.0, 1.6e308}) {
+      TriangleMesh mesh = sphere(2);
+      for (Vector3& vertex : mesh.vertices) vertex = vertex * size + Vector3(at, -at, 0);
+      EXPECT_EQ(ExactDistance(mesh).source().faces, mesh.triangles.size());
+    }
+}
+
 TEST(ExactDistance, SignedDistanceOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const ExactDistance distance(box(half));

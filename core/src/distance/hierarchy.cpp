@@ -157,9 +157,10 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::v
 }  // namespace
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
-  center_ = box.center();
-  const double half = box.sizes().maxCoeff() / 2;
-  scale_ = half > 0 ? 1 / half : 1;
+  // halved first: the box of any finite mesh has a finite center, size and scale
+  center_ = box.min() / 2 + box.max() / 2;
+  const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
+  scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
 
   const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
   frames_ = Array<TriangleFrame>(mesh.triangles.size());
