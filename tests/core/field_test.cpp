@@ -222,6 +222,8 @@ TEST(Field, RefusesArraysThatAreNoField) {
   refuses([](FieldData& d) { d.domain.max().x() = std::numeric_limits<double>::infinity(); });
   refuses([](FieldData& d) { d.domain = Box(Vector3::Constant(-1e308), Vector3::Constant(1e308)); });  // size overflows
   refuses([](FieldData& d) { d.grid = {0, 1, 1}; });
+  refuses([](FieldData& d) { d.nodes.back() |= std::uint64_t{30} << 40; });
+  refuses([](FieldData& d) { d.nodes.front() |= std::uint64_t{1} << (node::isLeaf(d.nodes.front()) ? 62 : 32); });
   refuses([](FieldData& d) { d.grid = {0xffffffff, 0xffffffff, 0xffffffff}; });
   refuses([](FieldData& d) { d.nodes.pop_back(); });
   refuses([](FieldData& d) { d.nodes[0] = node::internal(2); });  // children of two nodes

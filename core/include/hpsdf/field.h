@@ -46,6 +46,7 @@ struct FieldMetadata {
 /// is
 ///   internal: bit 63 clear, low 32 bits the index of the first of its 8 children (child number = x + 2y + 4z);
 ///   leaf:     bit 63 set, bits 32..39 the degree p, low 32 bits the offset of its n(p) coefficients.
+/// All other bits are 0.
 /// Coefficients c_ijk of a cell stand in lexicographic order of (i, j, k), i+j+k ≤ p, k fastest; they multiply plain
 /// Legendre polynomials L_i(u) L_j(v) L_k(w), local coordinates in [-1, 1], so that they are in units of length.
 struct FieldData {
@@ -66,13 +67,16 @@ constexpr int degree(std::uint64_t n) { return static_cast<int>((n >> 32) & 0xff
 constexpr std::uint64_t leaf(int degree, std::uint32_t offset) {
   return kLeafBit | (std::uint64_t(degree) << 32) | offset;
 }
+constexpr bool hasOnlyKnownBits(std::uint64_t n) {
+  return (n & ~(isLeaf(n) ? leaf(0xff, 0xffffffff) : 0xffffffff)) == 0;
+}
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
 /// A leaf of the octree.
 struct Cell {
   std::uint32_t id;  ///< its node's index: names the cell within its field
-  Box box;           ///< half-open: [min, max)
+  Box box;           ///< half-open but for rounding: [min, max)
   int degree;
   int depth;     ///< 0 for a base cell
   double error;  ///< ε_e: squared error that the top degree stands for, in units^5, without nearness (paper, eq. 6)
@@ -109,7 +113,7 @@ struct Directory {
 /// point has exactly one. The field jumps slightly from leaf to leaf. Outside the domain it is f(q) + |x - q| with q
 /// the closest point of the domain, with the matching gradient: continuous across the domain's boundary, though jumps
 /// between two leaves there go on outwards. It is an upper bound of a 1-Lipschitz field, so that outside a value is no
-/// safe length for a step of sphere tracing.
+/// safe length for a step of sphere tracing. Of infinite points the value is infinite and the gradient NaN.
 class Field {
  public:
   /// Takes finished arrays; throws `Error` when they do not make a field (see `FieldData`).

@@ -38,7 +38,10 @@ void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& poin
   intoGroups(order.subspan(middle), points);
 }
 
+/// Empty, for the order that they have, where they are so many that eight in a row lie close together anyway.
 std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
+  constexpr std::size_t kMost = 8 * 1000;
+  if (points.size() > kMost) return {};
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   intoGroups(order, points);
@@ -80,6 +83,7 @@ const CellFitter::Rules& CellFitter::rules(int degree) const {
   std::call_once(rulesMade_[degree], [&] {
     auto projection = makeProjection(degree, options_);
     std::vector<Vector3> ofChildren;
+    ofChildren.reserve(8 * projection->points().size());
     for (int child = 0; child < 8; ++child) {
       const Box box = childBox(Box(-Vector3::Ones(), Vector3::Ones()), child);
       for (const Vector3& point : projection->points()) ofChildren.push_back(box.center() + point / 2);
@@ -94,19 +98,20 @@ const CellFitter::Rules& CellFitter::rules(int degree) const {
 std::vector<double> CellFitter::sample(std::span<const Box> cells, const Projection& projection,
                                        std::span<const std::uint32_t> order) const {
   const std::vector<Vector3>& places = projection.points();
-  std::vector<double> samples(order.size());
+  std::vector<double> samples(cells.size() * places.size());
   std::array<Vector3, kBatch> points;
   std::array<double, kBatch> values;
-  for (std::size_t first = 0; first < order.size(); first += kBatch) {
+  for (std::size_t first = 0; first < samples.size(); first += kBatch) {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-    const auto batch = order.subspan(first, std::min(kBatch, order.size() - first));
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const Box& cell = cells[batch[i] / places.size()];
-      points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(places[batch[i] % places.size()]);
+    const std::size_t count = std::min(kBatch, samples.size() - first);
+    const auto sampleAt = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
+    for (std::size_t i = 0; i < count; ++i) {
+      const Box& cell = cells[sampleAt(i) / places.size()];
+      points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(places[sampleAt(i) % places.size()]);
     }
-    distance_(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
-    checkFinite(std::span(points).first(batch.size()), std::span(values).first(batch.size()));
-    for (std::size_t i = 0; i < batch.size(); ++i) samples[batch[i]] = values[i];
+    distance_(std::span(points).first(count), std::span(values).first(count));
+    checkFinite(std::span(points).first(count), std::span(values).first(count));
+    for (std::size_t i = 0; i < count; ++i) samples[sampleAt(i)] = values[i];
   }
   evaluations_ += samples.size();
   return samples;

@@ -47,7 +47,7 @@ class CellFitter {
   /// What all cells of one degree p share.
   struct Rules {
     std::unique_ptr<const Projection> projection;  ///< onto degree p+1, whose lower coefficients are those of degree p
-    std::vector<std::uint32_t> orderOfOne;         ///< in which a cell's samples are taken
+    std::vector<std::uint32_t> orderOfOne;         ///< in which a cell's samples are taken; empty: as they are
     std::vector<std::uint32_t> orderOfEight;       ///< the same of eight children, number · points + point
   };
 

@@ -40,6 +40,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   std::fill_n(depth.begin(), baseCells, std::uint8_t{0});
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (depth[n] == 0xff) notAField("node " + std::to_string(n) + " is nobody's child");
+    if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isLeaf(nodes[n])) {
       const int degree = node::degree(nodes[n]);
       if (degree > kMaxDegree) notAField("a cell has degree " + std::to_string(degree));

@@ -7,7 +7,7 @@
 namespace hpsdf::render {
 namespace {
 
-// All lengths in domain diagonals, the same as in shaders/surface_march.frag.
+// All lengths in domain diagonals; kNudge and kPastFace are the same in the shaders.
 constexpr double kNudge = 1e-6;      // beyond a face; also the shortest step
 constexpr double kPastFace = 4e-7;   // of the grid: how far past a face of a node, at most, its neighbour is entered
 constexpr double kConverged = 1e-8;  // change of the root between two steps of its refinement
