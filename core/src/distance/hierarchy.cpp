@@ -10,6 +10,7 @@
 #include <memory>
 #include <utility>
 
+#include "distance/float_box.h"
 #include "distance/search.h"
 #include "distance/triangle_tree.h"
 
@@ -51,22 +52,12 @@ struct OrientedBox {
   float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
 };
 
-/// The least and the greatest coordinates of points, in float, along three axes.
-struct Extents {
-  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Array4f high = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
-
-  void add(const Eigen::Array4f& point) {
-    low = low.min(point);
-    high = high.max(point);
-  }
-};
-
-OrientedBox boxFrom(const Eigen::Matrix3f& axes, const Extents& extents) {
+/// `extents`: along the axes.
+OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
   // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
   constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
   const Eigen::Matrix3d asRounded = axes.cast<double>();
-  const Vector3 low = extents.low.head<3>().cast<double>(), high = extents.high.head<3>().cast<double>();
+  const Vector3 low = extents.lower.head<3>().cast<double>(), high = extents.upper.head<3>().cast<double>();
   OrientedBox box;
   box.axes = axes;
   box.center = (asRounded * ((low + high) / 2)).cast<float>();
@@ -100,12 +91,12 @@ class BoxFitter {
     const Eigen::Matrix3f axes = axesOf(part).cast<float>();
     std::array<Eigen::Array4f, 3> rows;
     for (int i = 0; i < 3; ++i) rows[i] << axes.row(i).transpose().array(), 0;
-    Extents upright, leaning;
+    FloatBox upright, leaning;
     for (std::uint32_t slot = part.begin; slot < part.end; ++slot)
       for (const std::uint32_t vertex : triangles_[slot]) {
         const Eigen::Array4f point = points_[vertex];
-        upright.add(point);
-        leaning.add(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]);
+        upright.extend(point);
+        leaning.extend(Eigen::Array4f(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]));
       }
     const OrientedBox uprightBox = boxFrom(Eigen::Matrix3f::Identity(), upright);
     const OrientedBox leaningBox = boxFrom(axes, leaning);

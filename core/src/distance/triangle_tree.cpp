@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "distance/float_box.h"
+
 namespace hpsdf::distance {
 namespace {
 
@@ -20,24 +22,6 @@ constexpr int kMaxLevel = 32;
 constexpr std::uint32_t kSamples = 1024;                           ///< of a range, enough to choose where to split it
 constexpr float kNoPart = std::numeric_limits<float>::infinity();  ///< cost of one without triangles
 constexpr std::uint32_t kWorthATask = 4096;                        // triangles
-
-struct FloatBox {
-  Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
-
-  void extend(const FloatBox& other) {
-    lower = lower.min(other.lower);
-    upper = upper.max(other.upper);
-  }
-  void extend(const Eigen::Array4f& point) {
-    lower = lower.min(point);
-    upper = upper.max(point);
-  }
-  float area() const {
-    const Eigen::Array4f size = upper - lower;
-    return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
-  }
-};
 
 struct Item {
   FloatBox box;

@@ -168,34 +168,31 @@ ValueAndGradient evaluateWithGradientAt(const T* c, Degree degree, const std::ar
   return {value, {gx, gy, gz}};
 }
 
+/// f(degree), the common degrees as constants.
+template <typename F>
+auto withDegree(int degree, const F& f) {
+  switch (degree) {
+    case 2:
+      return f(Constant<2>());
+    case 3:
+      return f(Constant<3>());
+    case 4:
+      return f(Constant<4>());
+    default:
+      return f(degree);
+  }
+}
+
 /// The polynomial at local coordinates in [-1, 1]³.
 template <typename T>
 double evaluate(const T* c, int degree, const std::array<double, 3>& local) {
-  switch (degree) {  // the common ones
-    case 2:
-      return evaluateAt(c, Constant<2>(), local);
-    case 3:
-      return evaluateAt(c, Constant<3>(), local);
-    case 4:
-      return evaluateAt(c, Constant<4>(), local);
-    default:
-      return evaluateAt(c, degree, local);
-  }
+  return withDegree(degree, [&](auto known) { return evaluateAt(c, known, local); });
 }
 
 /// Also the gradient with respect to the local coordinates.
 template <typename T>
 ValueAndGradient evaluateWithGradient(const T* c, int degree, const std::array<double, 3>& local) {
-  switch (degree) {
-    case 2:
-      return evaluateWithGradientAt(c, Constant<2>(), local);
-    case 3:
-      return evaluateWithGradientAt(c, Constant<3>(), local);
-    case 4:
-      return evaluateWithGradientAt(c, Constant<4>(), local);
-    default:
-      return evaluateWithGradientAt(c, degree, local);
-  }
+  return withDegree(degree, [&](auto known) { return evaluateWithGradientAt(c, known, local); });
 }
 
 }  // namespace hpsdf
