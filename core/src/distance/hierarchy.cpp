@@ -52,6 +52,13 @@ struct OrientedBox {
   float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
 };
 
+/// Out of any reach: √kOutOfReach less than nothing along each axis.
+OrientedBox nothing() {
+  OrientedBox box;
+  box.half.setConstant(-2 * std::sqrt(kOutOfReach));
+  return box;
+}
+
 /// `extents`: along the axes.
 OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
   // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
@@ -75,7 +82,7 @@ class BoxFitter {
 
   void fit(Node& node, const Branch& branch) const {
     for (int lane = 0; lane < kWidth; ++lane) {
-      const OrientedBox box = lane < branch.count ? boxAround(branch.parts[lane]) : OrientedBox{};
+      const OrientedBox box = lane < branch.count ? boxAround(branch.parts[lane]) : nothing();
       for (int i = 0; i < 3; ++i) {
         node.field[Node::center + i][lane] = box.center[i];
         node.field[Node::half + i][lane] = box.half[i];

@@ -32,6 +32,9 @@ struct alignas(64) Node {
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
+/// Square of a distance beyond those of all points that are searched by float. The boxes of empty children are farther.
+constexpr float kOutOfReach = 1e33f;
+
 /// Up to four triangles as float, in the same coordinates: a `TriangleFrame` without its normal. Unused lanes repeat
 /// the last triangle.
 struct alignas(32) Block {

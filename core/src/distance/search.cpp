@@ -23,7 +23,7 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// A level leaves at most three children waiting; see kMaxLevel in hierarchy.cpp.
-constexpr std::size_t kStackSize = 3 * 64 + 4;
+constexpr std::size_t kStackSize = 3 * 64 + 8;
 
 template <class V>
 struct Point {
@@ -193,26 +193,31 @@ HWY_INLINE void fetch(const Node* nodes, const Block* blocks, std::uint32_t chil
   for (std::size_t line = 0; line < sizeof(Node); line += 64) hwy::Prefetch(from + line);
 }
 
-/// Children that wait for their visit. `Entry` has a key, by which those of one node lie farthest first, so that the
-/// nearest comes off next, and a child.
+/// Children that wait for their visit, those of one node farthest first, so that the nearest comes off next.
 template <class Entry>
 class Stack {
  public:
   bool empty() const { return top_ == 0; }
-  std::size_t size() const { return top_; }
   const Entry& pop() { return entries_[--top_]; }
 
-  /// A new entry's place among those from `bottom` on.
-  HWY_INLINE Entry& insert(std::size_t bottom, float key) {
-    std::size_t place = top_++;
-    for (; place > bottom && entries_[place - 1].key < key; --place) entries_[place] = entries_[place - 1];
-    return entries_[place];
-  }
+  /// Room for four entries; the first `count` of them stay.
+  Entry* room() { return entries_.data() + top_; }
+  void grow(int count) { top_ += count; }
 
  private:
   std::array<Entry, kStackSize> entries_;
   std::size_t top_ = 0;
 };
+
+/// Where four children go in a stack's room: by descending key, and behind those in reach what is not (key < 0).
+/// Comparing all with all takes no branch, of which most would be mispredicted.
+HWY_INLINE std::array<int, kWidth> placesOf(const float* key) {
+  static_assert(kWidth == 4);
+  const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
+             over31 = key[3] > key[1], over32 = key[3] > key[2];
+  return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32,
+          !over30 + !over31 + !over32};
+}
 
 /// Visits the seeds and then what is within reach when its turn comes; settles the search.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
@@ -235,7 +240,7 @@ HWY_INLINE void walk(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& vis
 }
 
 struct Waiting {
-  float key;
+  float lower;
   std::uint32_t child;
 };
 
@@ -267,12 +272,17 @@ void runOne(Search<1>& s) {
   const auto visitNode = [&](const Node& node) HWY_ATTR {
     for (std::size_t at = 0; at < kWidth; at += kStep)
       hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, node.field[f] + at); }), d, lower + at);
-    const std::size_t bottom = stack.size();
-    for (int child = 0; child < kWidth; ++child)
-      if (lower[child] <= s.limit[0] && node.child[child] != kEmpty)
-        stack.insert(bottom, lower[child]) = {lower[child], node.child[child]};
+    Waiting* const room = stack.room();
+    int hits = 0;
+    for (float& key : lower) {
+      hits += key <= s.limit[0];
+      key = key <= s.limit[0] ? key : -1;
+    }
+    const std::array<int, kWidth> places = placesOf(lower);
+    for (int child = 0; child < kWidth; ++child) room[places[child]] = {lower[child], node.child[child]};
+    stack.grow(hits);
   };
-  walk(s, stack, visitNode, visitBlock, [&](const Waiting& next) HWY_ATTR { return next.key <= s.limit[0]; });
+  walk(s, stack, visitNode, visitBlock, [&](const Waiting& next) HWY_ATTR { return next.lower <= s.limit[0]; });
 }
 
 using PacketTag = hn::CappedTag<float, kPacket>;
@@ -280,14 +290,19 @@ constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
 
 struct PacketWaiting {
   alignas(32) float lower[kPacket];
-  float key;
   std::uint32_t child;
 };
 
-HWY_INLINE float least(PacketTag d, const float* lower) {
-  auto all = hn::Load(d, lower);
-  for (std::size_t at = kLanes; at < kPacket; at += kLanes) all = hn::Min(all, hn::Load(d, lower + at));
-  return hn::GetLane(hn::MinOfLanes(d, all));
+/// The least of the lower bounds that are within their limit; -1 if none is.
+HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
+  const auto none = hn::Set(d, kOutOfReach);
+  auto all = none;
+  for (std::size_t at = 0; at < kPacket; at += kLanes) {
+    const auto bound = hn::Load(d, lower + at);
+    all = hn::Min(all, hn::IfThenElse(bound <= hn::Load(d, limit + at), bound, none));
+  }
+  all = hn::MinOfLanes(d, all);
+  return hn::GetLane(hn::IfThenElse(all < none, all, hn::Set(d, -1.0f)));
 }
 
 void runPacket(Search<kPacket>& s) {
@@ -300,24 +315,30 @@ void runPacket(Search<kPacket>& s) {
   const auto pointAt = [&](std::size_t at) HWY_ATTR {
     return Point<V>{hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
   };
-  // Both loops compute all first and branch after: what comes out is hard to predict.
+  // All is computed first, and without branches: what comes out is hard to predict.
   const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
     const Block& block = blocks[place];
-    if (s.count + kWidth > s.kCapacity) settle(s);
-    for (std::uint32_t i = 0; i < block.count; ++i) {
-      float* lower = s.lower[s.count];
-      for (std::size_t at = 0; at < kPacket; at += kLanes) {
-        const auto bounds =
-            triangleDistance(d, pointAt(at), [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
-        hn::Store(bounds.lower, d, lower + at);
-        hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, bounds.upper, s.delta)), d, s.limit + at);
+    HWY_ALIGN float lower[kWidth][kPacket];
+    for (std::size_t at = 0; at < kPacket; at += kLanes) {
+      const Point<V> point = pointAt(at);
+      auto upper = hn::Set(d, kOutOfReach);
+      HWY_UNROLL(4)
+      for (int i = 0; i < kWidth; ++i) {
+        const auto bounds = triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
+        hn::Store(bounds.lower, d, lower[i] + at);
+        upper = hn::Min(upper, bounds.upper);
       }
+      hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, upper, s.delta)), d, s.limit + at);
+    }
+    if (s.count + kWidth > s.kCapacity) settle(s);
+    for (std::uint32_t i = 0; i < kWidth; ++i) {
+      std::copy_n(lower[i], kPacket, s.lower[s.count]);
       s.candidates[s.count] = place * kWidth + i;
-      s.count += anyInReach<kPacket>(lower, s.limit);
+      s.count += anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
-    alignas(64) float lower[kWidth][kPacket];
+    HWY_ALIGN float lower[kWidth][kPacket];
     for (std::size_t at = 0; at < kPacket; at += kLanes) {
       const Point<V> point = pointAt(at);
       HWY_UNROLL(4)
@@ -325,19 +346,22 @@ void runPacket(Search<kPacket>& s) {
         hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); }), d,
                   lower[child] + at);
     }
-    unsigned hits = 0;
-    for (int child = 0; child < kWidth; ++child)
-      hits |= unsigned{anyInReach<kPacket>(lower[child], s.limit) && node.child[child] != kEmpty} << child;
-    const std::size_t bottom = stack.size();
-    for (; hits != 0; hits &= hits - 1) {
-      const int child = std::countr_zero(hits);
-      const float key = least(d, lower[child]);
-      PacketWaiting& waiting = stack.insert(bottom, key);
+    float key[kWidth];
+    HWY_UNROLL(4)
+    for (int child = 0; child < kWidth; ++child) key[child] = leastInReach(d, lower[child], s.limit);
+    PacketWaiting* const room = stack.room();
+    const std::array<int, kWidth> places = placesOf(key);
+    int hits = 0;
+    HWY_UNROLL(4)
+    for (int child = 0; child < kWidth; ++child) {
+      PacketWaiting& waiting = room[places[child]];
       std::copy_n(lower[child], kPacket, waiting.lower);
-      waiting.key = key;
       waiting.child = node.child[child];
-      fetch(nodes, blocks, node.child[child]);
+      const bool hit = key[child] >= 0;
+      hits += hit;
+      fetch(nodes, blocks, hit ? node.child[child] : 0);
     }
+    stack.grow(hits);
   };
   walk(s, stack, visitNode, visitBlock,
        [&](const PacketWaiting& next) HWY_ATTR { return anyInReach<kPacket>(next.lower, s.limit); });
@@ -374,7 +398,7 @@ Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& p
       point[axis][lane] = static_cast<float>(local[axis]);
       if (!(std::abs(local[axis]) <= reach)) reach = std::abs(local[axis]);
     }
-    limit[lane] = std::numeric_limits<float>::infinity();
+    limit[lane] = kOutOfReach;
     squared[lane] = kInfinity;
     triangle[lane] = kInfinity;
   }
