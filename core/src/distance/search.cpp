@@ -311,6 +311,7 @@ void runPacket(Search<kPacket>& s) {
   using V = hn::Vec<PacketTag>;
   const Node* nodes = s.hierarchy.nodes().data();
   const Block* blocks = s.hierarchy.blocks().data();
+  const TriangleFrame* frames = s.hierarchy.frames().data();
   Stack<PacketWaiting> stack;
   const auto pointAt = [&](std::size_t at) HWY_ATTR {
     return Point<V>{hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
@@ -334,7 +335,10 @@ void runPacket(Search<kPacket>& s) {
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       std::copy_n(lower[i], kPacket, s.lower[s.count]);
       s.candidates[s.count] = place * kWidth + i;
-      s.count += anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
+      const bool kept = anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
+      s.count += kept;
+      const char* frame = reinterpret_cast<const char*>(frames + block.first + (kept ? i : 0));
+      hwy::Prefetch(frame); hwy::Prefetch(frame + 64); hwy::Prefetch(frame + 128);
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
