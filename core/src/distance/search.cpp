@@ -22,7 +22,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// A level leaves at most three children waiting; see kMaxLevel in hierarchy.cpp.
+/// A level leaves at most three children waiting (see kMaxLevel in triangle_tree.cpp); four more are written at its
+/// end.
 constexpr std::size_t kStackSize = 3 * 64 + 8;
 
 template <class V>
@@ -186,11 +187,15 @@ HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
   return false;
 }
 
-/// Brings what waits next into the cache while other work goes on.
-HWY_INLINE void fetch(const Node* nodes, const Block* blocks, std::uint32_t child) {
-  const char* from = child & kBlockBit ? reinterpret_cast<const char*>(blocks + (child & ~kBlockBit))
-                                       : reinterpret_cast<const char*>(nodes + child);
-  for (std::size_t line = 0; line < sizeof(Node); line += 64) hwy::Prefetch(from + line);
+/// Brings what is needed next into the cache while other work goes on.
+template <class T>
+HWY_INLINE void fetch(const T* what) {
+  for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(what) + line);
+}
+
+HWY_INLINE void fetchChild(const Node* nodes, const Block* blocks, std::uint32_t child) {
+  static_assert(sizeof(Node) == sizeof(Block));
+  fetch(child & kBlockBit ? reinterpret_cast<const Node*>(blocks + (child & ~kBlockBit)) : nodes + child);
 }
 
 /// Children that wait for their visit, those of one node farthest first, so that the nearest comes off next.
@@ -215,8 +220,7 @@ HWY_INLINE std::array<int, kWidth> placesOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
              over31 = key[3] > key[1], over32 = key[3] > key[2];
-  return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32,
-          !over30 + !over31 + !over32};
+  return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
 /// Visits the seeds and then what is within reach when its turn comes; settles the search.
@@ -337,8 +341,7 @@ void runPacket(Search<kPacket>& s) {
       s.candidates[s.count] = place * kWidth + i;
       const bool kept = anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
       s.count += kept;
-      const char* frame = reinterpret_cast<const char*>(frames + block.first + (kept ? i : 0));
-      hwy::Prefetch(frame); hwy::Prefetch(frame + 64); hwy::Prefetch(frame + 128);
+      fetch(frames + block.first + (kept ? i : 0));
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
@@ -363,7 +366,7 @@ void runPacket(Search<kPacket>& s) {
       waiting.child = node.child[child];
       const bool hit = key[child] >= 0;
       hits += hit;
-      fetch(nodes, blocks, hit ? node.child[child] : 0);
+      fetchChild(nodes, blocks, hit ? node.child[child] : 0);
     }
     stack.grow(hits);
   };
