@@ -1,7 +1,9 @@
 #include "hpsdf/field.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -209,6 +211,102 @@ TEST(Field, BatchesAndThreadsGiveTheSameBits) {
     EXPECT_EQ(both[i].value, values[i]);
     EXPECT_EQ(both[i].gradient, field.valueAndGradient(points[i]).gradient);
   }
+}
+
+/// Cells of depths 0 to 5 and degrees 0 to 6, at random; the last one's coefficients end the array.
+template <typename T>
+Field mixedField() {
+  std::mt19937_64 random(5);
+  FieldData data;
+  data.domain = Box(Vector3(-1, -0.3, 0), Vector3(1, 0.9, 0.7));
+  data.grid = {3, 2, 1};
+  std::vector<int> depths(6, 0);
+  std::vector<T> coefficients;
+  std::uniform_real_distribution<T> coefficient(-1, 1);
+  data.nodes.resize(6);
+  for (std::size_t n = 0; n < data.nodes.size(); ++n) {
+    if (depths[n] < 5 && random() % 8 < 3) {
+      data.nodes[n] = node::internal(static_cast<std::uint32_t>(data.nodes.size()));
+      data.nodes.resize(data.nodes.size() + 8);
+      depths.resize(data.nodes.size(), depths[n] + 1);
+    } else {
+      const int degree = static_cast<int>(random() % 7);
+      data.nodes[n] = node::leaf(degree, static_cast<std::uint32_t>(coefficients.size()));
+      for (int k = 0; k < coefficientCount(degree); ++k) coefficients.push_back(coefficient(random));
+    }
+  }
+  data.coefficients = coefficients;
+  return Field(std::move(data));
+}
+
+/// Inside, on faces and edges of cells, on the domain's border, outside, and no numbers.
+std::vector<Vector3> trickyPoints(const Field& field, std::size_t count) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> inside(0, 1);
+  std::uniform_int_distribution<int> place(0, 32);
+  std::vector<Vector3> points(count);
+  for (Vector3& x : points)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lower = field.domain().min()[axis], upper = field.domain().max()[axis];
+      const std::array special = {lower,     std::nextafter(lower, -9),
+                                  -0.0,      lower - inside(random),
+                                  upper,     std::nextafter(upper, 9),
+                                  infinity,  upper + inside(random),
+                                  1e-310,    1e300,
+                                  -infinity, std::nan("")};
+      switch (random() % 64) {
+        case 0:
+          x[axis] = special[random() % special.size()];
+          break;
+        case 1:
+        case 2:
+        case 3:
+          x[axis] = lower + (upper - lower) * (place(random) / (32.0 * field.grid()[axis]));
+          break;
+        default:
+          x[axis] = lower + (upper - lower) * inside(random);
+      }
+    }
+  return points;
+}
+
+bool sameBits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) || (std::isnan(a) && std::isnan(b));
+}
+
+void expectBatchesAsSingleQueries(const Field& field, std::span<const Vector3> points) {
+  std::vector<double> values(points.size());
+  std::vector<ValueAndGradient> both(points.size());
+  field.values(points, values);
+  field.valuesAndGradients(points, both);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ValueAndGradient single = field.valueAndGradient(points[i]);
+    ASSERT_TRUE(sameBits(values[i], field.value(points[i]))) << points[i].transpose();
+    ASSERT_TRUE(sameBits(both[i].value, single.value)) << points[i].transpose();
+    for (int axis = 0; axis < 3; ++axis)
+      ASSERT_TRUE(sameBits(both[i].gradient[axis], single.gradient[axis])) << points[i].transpose();
+  }
+}
+
+/// Every instruction set that this processor has, down to none at all.
+TEST(Field, BatchesGiveTheSameBitsOnEveryInstructionSet) {
+  for (const Field& field : {mixedField<double>(), mixedField<float>()}) {
+    const FieldStatistics found = statistics(field);
+    ASSERT_EQ(found.degreeLeaves.size(), 7u);
+    ASSERT_EQ(found.depthLeaves.size(), 6u);
+    const std::vector<Vector3> points = trickyPoints(field, 20011);
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      hwy::SetSupportedTargetsForTest(target);
+      hwy::GetChosenTarget().Update(target);
+      expectBatchesAsSingleQueries(field, points);
+      for (std::size_t count = 0; count < 300; count += count < 12 ? 1 : 29)
+        expectBatchesAsSingleQueries(field, std::span(points).subspan(count, count));
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(Field, RefusesArraysThatAreNoField) {

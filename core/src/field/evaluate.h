@@ -21,13 +21,13 @@ struct GridPoint {
 
   /// The cell of a depth that holds it, in units of such cells.
   std::int64_t cell(int axis, int depth) const { return fixed[axis] >> (kMaxDepth - depth); }
-
-  /// The number of that cell among its parent's children.
-  std::uint32_t child(int depth) const {
-    const std::uint64_t bits = (way >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
-    return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
-  }
 };
+
+/// The number of the cell of a depth on a point's way, among its parent's children.
+inline std::uint32_t childOnWay(std::uint64_t way, int depth) {
+  const std::uint64_t bits = (way >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
+  return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
+}
 
 /// Coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain then
 /// lands exactly on the face between two base cells.
@@ -52,7 +52,8 @@ struct Location {
 inline Location locate(const FieldData& field, const GridPoint& x) {
   Location at{static_cast<std::uint32_t>((x.cell(2, 0) * field.grid[1] + x.cell(1, 0)) * field.grid[0] + x.cell(0, 0)),
               0};
-  while (!node::isLeaf(field.nodes[at.node])) at.node = node::firstChild(field.nodes[at.node]) + x.child(++at.depth);
+  while (!node::isLeaf(field.nodes[at.node]))
+    at.node = node::firstChild(field.nodes[at.node]) + childOnWay(x.way, ++at.depth);
   return at;
 }
 
@@ -70,7 +71,8 @@ inline FoundLeaf find(const FieldData& field, const Directory& directory, const 
   FoundLeaf found;
   found.bits = directory.entries[at.cell(2, top) * directory.slab + at.cell(1, top) * directory.row + at.cell(0, top)];
   found.depth = Directory::depthOf(found.bits);
-  while (!node::isLeaf(found.bits)) found.bits = field.nodes[node::firstChild(found.bits) + at.child(++found.depth)];
+  while (!node::isLeaf(found.bits))
+    found.bits = field.nodes[node::firstChild(found.bits) + childOnWay(at.way, ++found.depth)];
   // scaling by a power of two and taking off the whole part are exact
   const double scale = 1 << found.depth;
   for (int axis = 0; axis < 3; ++axis)
@@ -96,77 +98,13 @@ constexpr Constant<A - B> minus(Constant<A>, Constant<B>) {
   return {};
 }
 
-/// Calls f(0) to f(last).
-template <typename F>
-[[gnu::always_inline]] inline void upTo(int last, F&& f) {
-  for (int i = 0; i <= last; ++i) f(i);
-}
-template <int Last, typename F>
-[[gnu::always_inline]] inline void upTo(Constant<Last>, F&& f) {
-  [&]<int... I>(std::integer_sequence<int, I...>) __attribute__((always_inline)) { (f(Constant<I>()), ...); }
-  (std::make_integer_sequence<int, Last + 1>());
-}
-
 /// Room for a number a degree up to this one.
 template <typename Degree>
 constexpr int kRoom = kMaxDegree + 1;
 template <int P>
 constexpr int kRoom<Constant<P>> = P + 1;
 
-template <typename T, typename Degree>
-double evaluateAt(const T* c, Degree degree, const std::array<double, 3>& local) {
-  double x[kRoom<Degree>], y[kRoom<Degree>], z[kRoom<Degree>];
-  legendreValues(local[0], degree, x);
-  legendreValues(local[1], degree, y);
-  legendreValues(local[2], degree, z);
-  double value = 0;
-  upTo(
-      degree, [&](auto i) __attribute__((always_inline)) {
-        double plane = 0;
-        upTo(
-            minus(degree, i), [&](auto j) __attribute__((always_inline)) {
-              double line = 0;
-              upTo(
-                  minus(minus(degree, i), j), [&](auto k)
-                                                  __attribute__((always_inline)) { line += double(*c++) * z[k]; });
-              plane += line * y[j];
-            });
-        value += plane * x[i];
-      });
-  return value;
-}
-
-template <typename T, typename Degree>
-ValueAndGradient evaluateWithGradientAt(const T* c, Degree degree, const std::array<double, 3>& local) {
-  double x[kRoom<Degree>], y[kRoom<Degree>], z[kRoom<Degree>];
-  double dx[kRoom<Degree>], dy[kRoom<Degree>], dz[kRoom<Degree>];
-  legendreValuesAndDerivatives(local[0], degree, x, dx);
-  legendreValuesAndDerivatives(local[1], degree, y, dy);
-  legendreValuesAndDerivatives(local[2], degree, z, dz);
-  double value = 0, gx = 0, gy = 0, gz = 0;
-  upTo(
-      degree, [&](auto i) __attribute__((always_inline)) {
-        double plane = 0, planeDy = 0, planeDz = 0;
-        upTo(
-            minus(degree, i), [&](auto j) __attribute__((always_inline)) {
-              double line = 0, lineDz = 0;
-              upTo(
-                  minus(minus(degree, i), j), [&](auto k) __attribute__((always_inline)) {
-                    const double coefficient = *c++;
-                    line += coefficient * z[k];
-                    lineDz += coefficient * dz[k];
-                  });
-              plane += line * y[j];
-              planeDy += line * dy[j];
-              planeDz += lineDz * y[j];
-            });
-        value += plane * x[i];
-        gx += plane * dx[i];
-        gy += planeDy * x[i];
-        gz += planeDz * x[i];
-      });
-  return {value, {gx, gy, gz}};
-}
+#include "field/polynomial-inl.h"
 
 /// f(degree), the common degrees as constants.
 template <typename F>
@@ -192,7 +130,50 @@ double evaluate(const T* c, int degree, const std::array<double, 3>& local) {
 /// Also the gradient with respect to the local coordinates.
 template <typename T>
 ValueAndGradient evaluateWithGradient(const T* c, int degree, const std::array<double, 3>& local) {
-  return withDegree(degree, [&](auto known) { return evaluateWithGradientAt(c, known, local); });
+  const auto [value, x, y, z] = withDegree(degree, [&](auto known) { return evaluateWithGradientAt(c, known, local); });
+  return {value, {x, y, z}};
+}
+
+/// As one condition: six branches would cost more than the comparisons. NaN is not within.
+inline bool contains(const GridFrame& domain, const Vector3& x) {
+  bool within = true;
+  for (int axis = 0; axis < 3; ++axis) within &= (x[axis] >= domain.lower[axis]) & (x[axis] <= domain.upper[axis]);
+  return within;
+}
+
+/// The closest point of the domain; for NaN some point.
+inline Vector3 closestWithin(const GridFrame& domain, const Vector3& x) {
+  Vector3 closest;
+  for (int axis = 0; axis < 3; ++axis)
+    closest[axis] = x[axis] > domain.lower[axis] ? std::min(x[axis], domain.upper[axis]) : domain.lower[axis];
+  return closest;
+}
+
+/// Without squares, which overflow or vanish far from the domain or very close to it. (The hypot of three arguments
+/// of GCC 12 loses NaN and infinity.)
+inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
+
+/// From f(q) at the closest point q of the domain to f(q) + |x - q|; `beyond` is x - q.
+inline void extend(const Vector3& beyond, double& value) { value += length(beyond); }
+
+inline void extend(const Vector3& beyond, ValueAndGradient& result) {
+  const double distance = length(beyond);
+  result.value += distance;
+  for (int axis = 0; axis < 3; ++axis)
+    if (beyond[axis] != 0) result.gradient[axis] = 0;  // along an axis on which x is clamped, f(q) does not change
+  result.gradient += beyond / distance;
+}
+
+template <typename T>
+void answer(const T* coefficients, const GridFrame&, const FoundLeaf& leaf, double& value) {
+  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+}
+
+template <typename T>
+void answer(const T* coefficients, const GridFrame& frame, const FoundLeaf& leaf, ValueAndGradient& result) {
+  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
+  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
 }
 
 }  // namespace hpsdf

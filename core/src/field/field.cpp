@@ -8,6 +8,7 @@
 
 #include "basis/projection.h"
 #include "field/evaluate.h"
+#include "field/evaluate_batch.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -57,48 +58,6 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   }
 }
 
-/// As one condition: six branches would cost more than the comparisons. NaN is not within.
-bool contains(const GridFrame& domain, const Vector3& x) {
-  bool within = true;
-  for (int axis = 0; axis < 3; ++axis) within &= (x[axis] >= domain.lower[axis]) & (x[axis] <= domain.upper[axis]);
-  return within;
-}
-
-/// The closest point of the domain; for NaN some point.
-Vector3 closestWithin(const GridFrame& domain, const Vector3& x) {
-  Vector3 closest;
-  for (int axis = 0; axis < 3; ++axis)
-    closest[axis] = x[axis] > domain.lower[axis] ? std::min(x[axis], domain.upper[axis]) : domain.lower[axis];
-  return closest;
-}
-
-/// Without squares, which overflow or vanish far from the domain or very close to it. (The hypot of three arguments
-/// of GCC 12 loses NaN and infinity.)
-double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
-
-/// From f(q) at the closest point q of the domain to f(q) + |x - q|; `beyond` is x - q.
-void extend(const Vector3& beyond, double& value) { value += length(beyond); }
-
-void extend(const Vector3& beyond, ValueAndGradient& result) {
-  const double distance = length(beyond);
-  result.value += distance;
-  for (int axis = 0; axis < 3; ++axis)
-    if (beyond[axis] != 0) result.gradient[axis] = 0;  // along an axis on which x is clamped, f(q) does not change
-  result.gradient += beyond / distance;
-}
-
-template <typename T>
-void answer(const T* coefficients, const GridFrame&, const FoundLeaf& leaf, double& value) {
-  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-}
-
-template <typename T>
-void answer(const T* coefficients, const GridFrame& frame, const FoundLeaf& leaf, ValueAndGradient& result) {
-  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
-  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
-}
-
 template <typename Answer>
 Answer answerOne(const FieldData& field, const Directory& directory, const Vector3& x) {
   Answer result;
@@ -111,42 +70,6 @@ Answer answerOne(const FieldData& field, const Directory& directory, const Vecto
   const FoundLeaf leaf = find(field, directory, x);
   std::visit([&](const auto& c) { answer(c.data(), directory.frame, leaf, result); }, field.coefficients);
   return result;
-}
-
-/// Finds the leaves of many points, has their coefficients fetched meanwhile, and evaluates degree by degree: no point
-/// waits for memory, nor the processor for a branch that it could not foresee.
-template <typename Answer>
-void answerMany(const FieldData& field, const Directory& directory, std::span<const Vector3> points,
-                std::span<Answer> out) {
-  constexpr std::size_t kBatch = 64;
-  std::array<FoundLeaf, kBatch> leaves;
-  std::array<std::uint8_t, kBatch> order;
-  std::visit(
-      [&](const auto& c) {
-        for (std::size_t first = 0; first < points.size(); first += kBatch) {
-          const std::size_t count = std::min(kBatch, points.size() - first);
-          std::array<std::uint8_t, kMaxDegree + 2> place{};  // where each degree begins in `order`
-          for (std::size_t i = 0; i < count; ++i) {
-            leaves[i] = find(field, directory, closestWithin(directory.frame, points[first + i]));
-            const auto* begin = c.data() + node::offset(leaves[i].bits);
-            const int degree = node::degree(leaves[i].bits);
-            for (const auto* at = begin; at < begin + coefficientCount(degree); at += 64 / sizeof(*at))
-              __builtin_prefetch(at);
-            ++place[degree + 1];
-          }
-          for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) place[degree + 1] += place[degree];
-          for (std::size_t i = 0; i < count; ++i)
-            order[place[node::degree(leaves[i].bits)]++] = static_cast<std::uint8_t>(i);
-          for (std::size_t n = 0; n < count; ++n) {
-            const std::size_t i = order[n];
-            answer(c.data(), directory.frame, leaves[i], out[first + i]);
-          }
-          for (std::size_t i = first; i < first + count; ++i)
-            if (!contains(directory.frame, points[i])) [[unlikely]]
-              extend(points[i] - closestWithin(directory.frame, points[i]), out[i]);
-        }
-      },
-      field.coefficients);
 }
 
 /// A node on a way through the whole octree.
@@ -274,12 +197,12 @@ ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
 
 void Field::values(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  answerMany(data_, directory_, points, out);
+  answerBatch(data_, directory_, points, out);
 }
 
 void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const {
   assert(points.size() == out.size());
-  answerMany(data_, directory_, points, out);
+  answerBatch(data_, directory_, points, out);
 }
 
 Cell Field::cellAt(const Vector3& x) const {
