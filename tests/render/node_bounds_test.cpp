@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "random_field.h"
+#include "support/random_field.h"
 
 namespace hpsdf::render {
 namespace {

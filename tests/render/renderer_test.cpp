@@ -17,7 +17,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "random_field.h"
+#include "support/random_field.h"
 #include "support/require_gl.h"
 
 namespace hpsdf::render {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "hpsdf/render/renderer.h"
-#include "random_field.h"
+#include "support/random_field.h"
 
 namespace hpsdf::render {
 namespace {

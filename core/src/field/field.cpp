@@ -9,6 +9,7 @@
 #include "basis/projection.h"
 #include "field/evaluate.h"
 #include "field/evaluate_batch.h"
+#include "field/visit_nodes.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -70,38 +71,6 @@ Answer answerOne(const FieldData& field, const Directory& directory, const Vecto
   const FoundLeaf leaf = find(field, directory, x);
   std::visit([&](const auto& c) { answer(c.data(), directory.frame, leaf, result); }, field.coefficients);
   return result;
-}
-
-/// A node on a way through the whole octree.
-struct Visited {
-  std::uint32_t node;
-  int depth;
-  std::array<std::uint32_t, 3> base;  ///< base cell
-  std::array<std::uint32_t, 3> path;  ///< its place within the base cell, in cells of its depth
-};
-
-/// Base cells first to last, children 0 to 7; below an internal node where `visit` returns true for it.
-template <typename Visit>
-void visitNodes(const FieldData& field, Visit&& visit) {
-  std::vector<Visited> stack;
-  std::uint32_t root = 0;
-  for (std::uint32_t z = 0; z < field.grid[2]; ++z)
-    for (std::uint32_t y = 0; y < field.grid[1]; ++y)
-      for (std::uint32_t x = 0; x < field.grid[0]; ++x) {
-        stack.push_back({root++, 0, {x, y, z}, {0, 0, 0}});
-        while (!stack.empty()) {
-          const Visited at = stack.back();
-          stack.pop_back();
-          const std::uint64_t bits = field.nodes[at.node];
-          if (!visit(at) || node::isLeaf(bits)) continue;
-          for (std::uint32_t child = 8; child-- > 0;)
-            stack.push_back(
-                {node::firstChild(bits) + child,
-                 at.depth + 1,
-                 at.base,
-                 {2 * at.path[0] + (child & 1), 2 * at.path[1] + (child >> 1 & 1), 2 * at.path[2] + (child >> 2)}});
-        }
-      }
 }
 
 GridFrame gridFrame(const FieldData& field) {

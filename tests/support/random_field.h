@@ -9,7 +9,7 @@
 
 #include "hpsdf/field.h"
 
-namespace hpsdf::render {
+namespace hpsdf {
 
 struct RandomFieldOptions {
   Box domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
@@ -83,4 +83,4 @@ inline Field randomField(unsigned seed, const RandomFieldOptions& options = {}) 
   return Field(std::move(data));
 }
 
-}  // namespace hpsdf::render
+}  // namespace hpsdf

@@ -1,0 +1,250 @@
+#include "hpsdf/jumps.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "basis/legendre.h"
+#include "field/evaluate.h"
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "support/random_field.h"
+
+namespace hpsdf {
+namespace {
+
+/// Base cells in a row along x, one unit apart; the last one may be divided once.
+FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<std::vector<double>>& children = {}) {
+  FieldData data;
+  data.grid = {static_cast<std::uint32_t>(cells.size() + !children.empty()), 1, 1};
+  data.domain = Box(Vector3(0, 0, 0), Vector3(data.grid[0], 1, 1));
+  std::vector<double> coefficients;
+  const auto add = [&](const std::vector<double>& polynomial) {
+    int degree = 0;
+    while (coefficientCount(degree) < static_cast<int>(polynomial.size())) ++degree;
+    data.nodes.push_back(node::leaf(degree, static_cast<std::uint32_t>(coefficients.size())));
+    coefficients.insert(coefficients.end(), polynomial.begin(), polynomial.end());
+  };
+  for (const auto& cell : cells) add(cell);
+  if (!children.empty()) {
+    data.nodes.push_back(node::internal(data.grid[0]));
+    for (const auto& child : children) add(child);
+  }
+  data.coefficients = coefficients;
+  return data;
+}
+
+// Degree 1: 1, w, v, u in local coordinates, which are 2·(world − cell) − 1 in a unit cell.
+
+TEST(Jumps, EqualCellsWithKnownJumps) {
+  // f = 1 + w against f = 3 + 2v: the jump is 2 + 2v − w
+  const Jumps jumps = findJumps(Field(row({{1, 1, 0, 0}, {3, 0, 2, 0}})));
+  ASSERT_EQ(jumps.interfaces.size(), 1u);
+  const Interface& face = jumps.interfaces[0];
+  EXPECT_EQ(face.axis, 0);
+  EXPECT_EQ(face.cells, (std::array<std::uint32_t, 2>{0, 1}));
+  EXPECT_FALSE(face.hanging());
+  EXPECT_DOUBLE_EQ(face.area, 1);
+  EXPECT_NEAR(face.value.rms, std::sqrt(4 + 4.0 / 3 + 1.0 / 3), 1e-14);
+  EXPECT_NEAR(face.value.max, 5, 1e-14);
+  EXPECT_TRUE(face.worst.isApprox(Vector3(1, 1, 0), 1e-14)) << face.worst.transpose();
+  EXPECT_TRUE(face.center.isApprox(Vector3(1, 0.5, 0.5), 1e-14));
+  // world gradients (0, 0, 2) and (0, 4, 0)
+  EXPECT_NEAR(face.gradient.rms, std::sqrt(20.0), 1e-14);
+  EXPECT_NEAR(face.gradient.max, std::sqrt(20.0), 1e-14);
+  EXPECT_EQ(jumps.hanging, 0u);
+  EXPECT_DOUBLE_EQ(jumps.area, 1);
+  EXPECT_NEAR(jumps.value.rms, face.value.rms, 1e-15);
+}
+
+TEST(Jumps, CurvedPolynomialsOfUnequalDegree) {
+  // L2(v) against 0 of degree 0: ∫ L2²/2 = 1/5, greatest at the edges; gradient (0, 2·3v, 0)
+  std::vector<double> quadratic(10, 0.0);
+  quadratic[5] = 1;  // 000 001 002 010 011 020
+  const Jumps jumps = findJumps(Field(row({quadratic, {0}})));
+  ASSERT_EQ(jumps.interfaces.size(), 1u);
+  EXPECT_EQ(jumps.interfaces[0].degrees, (std::array<std::uint8_t, 2>{2, 0}));
+  EXPECT_NEAR(jumps.value.rms, std::sqrt(1.0 / 5), 1e-14);
+  EXPECT_NEAR(jumps.value.max, 1, 1e-14);
+  EXPECT_NEAR(jumps.gradient.rms, 6 / std::sqrt(3.0), 1e-13);
+  EXPECT_NEAR(jumps.gradient.max, 6, 1e-13);
+}
+
+TEST(Jumps, HangingFacesWithKnownJumps) {
+  // left 10 + u + v: 11 + v on the face; right the constants 0 to 7
+  std::vector<std::vector<double>> children;
+  for (double child = 0; child < 8; ++child) children.push_back({child});
+  const Jumps jumps = findJumps(Field(row({{10, 0, 1, 1}}, children)));
+  ASSERT_EQ(jumps.interfaces.size(), 16u) << "four hanging faces and twelve inner ones";
+  EXPECT_EQ(jumps.hanging, 4u);
+  EXPECT_DOUBLE_EQ(jumps.area, 1 + 3);
+  int hanging = 0, inner = 0;
+  for (const Interface& face : jumps.interfaces) {
+    if (face.hanging()) {
+      ++hanging;
+      EXPECT_EQ(face.axis, 0);
+      EXPECT_EQ(face.cells[0], 0u);
+      EXPECT_EQ(face.depths, (std::array<std::uint8_t, 2>{0, 1}));
+      const int child = static_cast<int>(face.cells[1]) - 2;
+      const double middle = 11 + (child & 2 ? 0.5 : -0.5) - child;
+      EXPECT_NEAR(face.value.rms, std::sqrt(middle * middle + 0.25 / 3), 1e-13);
+      EXPECT_NEAR(face.value.max, middle + 0.5, 1e-13);
+      EXPECT_NEAR(face.worst.y(), child & 2 ? 1 : 0.5, 1e-14);
+      EXPECT_NEAR(face.gradient.rms, std::sqrt(8.0), 1e-13);
+      EXPECT_DOUBLE_EQ(face.area, 0.25);
+    } else {
+      ++inner;
+      EXPECT_EQ(face.value.max, 1 << face.axis);
+      EXPECT_NEAR(face.value.rms, 1 << face.axis, 1e-14);
+      EXPECT_EQ(face.gradient.max, 0);
+    }
+  }
+  EXPECT_EQ(hanging, 4);
+  EXPECT_EQ(inner, 12);
+}
+
+/// Slow and plain: every pair of leaves whose boxes share a piece of a plane, by a rule of much higher order.
+struct PlainJump {
+  Jump value, gradient;
+};
+std::map<std::array<std::uint32_t, 2>, PlainJump> plainJumps(const Field& field) {
+  std::vector<Cell> cells;
+  field.forEachCell([&](const Cell& cell) { cells.push_back(cell); });
+  const QuadratureRule rule = gaussLegendre(24);
+  const auto at = [&](const Cell& cell, const Vector3& x) {
+    const Vector3 half = cell.box.sizes() / 2, u = (x - cell.box.center()).cwiseQuotient(half);
+    return std::visit(
+        [&](const auto& c) {
+          ValueAndGradient result = evaluateWithGradient(c.data() + node::offset(field.data().nodes[cell.id]),
+                                                         cell.degree, {u.x(), u.y(), u.z()});
+          result.gradient = result.gradient.cwiseQuotient(half);
+          return result;
+        },
+        field.data().coefficients);
+  };
+  std::map<std::array<std::uint32_t, 2>, PlainJump> found;
+  for (const Cell& below : cells)
+    for (const Cell& above : cells)
+      for (int axis = 0; axis < 3; ++axis) {
+        if (std::abs(below.box.max()[axis] - above.box.min()[axis]) > 1e-9) continue;
+        Vector3 lo = below.box.min().cwiseMax(above.box.min()), hi = below.box.max().cwiseMin(above.box.max());
+        lo[axis] = hi[axis] = above.box.min()[axis];
+        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+        if (hi[b] - lo[b] < 1e-9 || hi[c] - lo[c] < 1e-9) continue;
+        PlainJump& jump = found[{below.id, above.id}];
+        for (std::size_t i = 0; i < rule.points.size(); ++i)
+          for (std::size_t j = 0; j < rule.points.size(); ++j) {
+            Vector3 x = lo;
+            x[b] += (hi[b] - lo[b]) * (rule.points[i] + 1) / 2;
+            x[c] += (hi[c] - lo[c]) * (rule.points[j] + 1) / 2;
+            const ValueAndGradient one = at(below, x), other = at(above, x);
+            const double weight = rule.weights[i] * rule.weights[j] / 4;
+            const double value = std::abs(one.value - other.value), gradient = (one.gradient - other.gradient).norm();
+            jump.value.rms += weight * value * value;
+            jump.gradient.rms += weight * gradient * gradient;
+            jump.value.max = std::max(jump.value.max, value);
+            jump.gradient.max = std::max(jump.gradient.max, gradient);
+          }
+        jump.value.rms = std::sqrt(jump.value.rms);
+        jump.gradient.rms = std::sqrt(jump.gradient.rms);
+      }
+  return found;
+}
+
+TEST(Jumps, EveryInterfaceOfARudeFieldOnceAndRight) {
+  for (const bool single : {false, true}) {
+    RandomFieldOptions options;
+    options.domain = Box(Vector3(-1, 2, -3), Vector3(2, 4, 1));
+    options.grid = {3, 2, 1};
+    options.maxDepth = 3;
+    options.refinement = 0.3;
+    options.minDegree = 0;
+    options.single = single;
+    const Field field = randomField(7, options);
+    const Jumps jumps = findJumps(field);
+    const auto plain = plainJumps(field);
+    ASSERT_GT(jumps.hanging, 20u);
+    ASSERT_EQ(jumps.interfaces.size(), plain.size());
+    for (const Interface& face : jumps.interfaces) {
+      ASSERT_TRUE(plain.contains(face.cells));
+      const PlainJump& expected = plain.at(face.cells);
+      EXPECT_NEAR(face.value.rms, expected.value.rms, 1e-12);
+      EXPECT_NEAR(face.gradient.rms, expected.gradient.rms, 1e-11);
+      EXPECT_GE(face.value.max, 0.9 * expected.value.max) << "sampled as densely as the degree asks";
+      EXPECT_GE(face.gradient.max, 0.9 * expected.gradient.max);
+      EXPECT_GE(face.value.max, face.value.rms);
+    }
+  }
+}
+
+TEST(Jumps, ASmoothFieldHasNone) {
+  // one linear function, written down in each cell's coordinates: 1 + x + 2y + 3z
+  std::vector<std::vector<double>> cells, children;
+  for (int n = 0; n < 2; ++n) cells.push_back({1 + n + 0.5 + 1 + 1.5, 1.5, 1, 0.5});
+  for (int n = 0; n < 8; ++n)
+    children.push_back(
+        {1 + 2.25 + (n & 1) * 0.5 + 2 * (0.25 + (n >> 1 & 1) * 0.5) + 3 * (0.25 + (n >> 2) * 0.5), 0.75, 0.5, 0.25});
+  const Jumps jumps = findJumps(Field(row(cells, children)));
+  EXPECT_LT(jumps.value.max, 1e-14);
+  EXPECT_LT(jumps.gradient.max, 1e-14);
+}
+
+TEST(Jumps, ThreadsDoNotChangeTheResult) {
+  const Field field = randomField(8, {.grid = {4, 4, 4}, .maxDepth = 3});
+  const Jumps one = findJumps(field, 1), two = findJumps(field, 2);
+  ASSERT_EQ(one.interfaces.size(), two.interfaces.size());
+  ASSERT_GT(one.interfaces.size(), 2000u);
+  const auto same = [](double a, double b) {
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+  };
+  for (std::size_t n = 0; n < one.interfaces.size(); ++n) {
+    const Interface &a = one.interfaces[n], &b = two.interfaces[n];
+    ASSERT_EQ(a.cells, b.cells);
+    ASSERT_TRUE(same(a.value.rms, b.value.rms) && same(a.value.max, b.value.max));
+    ASSERT_TRUE(same(a.gradient.rms, b.gradient.rms) && same(a.gradient.max, b.gradient.max));
+  }
+  EXPECT_TRUE(same(one.value.rms, two.value.rms));
+}
+
+TEST(Jumps, WorstFirstPerCellAndAsAHistogram) {
+  const Field field = randomField(9, {.grid = {3, 3, 3}, .maxDepth = 2});
+  const Jumps jumps = findJumps(field);
+  for (const JumpKind kind : {JumpKind::value, JumpKind::gradient}) {
+    const auto worst = worstInterfaces(jumps, kind, 10);
+    ASSERT_EQ(worst.size(), 10u);
+    EXPECT_EQ(jumpOf(jumps.interfaces[worst[0]], kind).max,
+              kind == JumpKind::value ? jumps.value.max : jumps.gradient.max);
+    for (std::size_t n = 1; n < worst.size(); ++n)
+      EXPECT_LE(jumpOf(jumps.interfaces[worst[n]], kind).max, jumpOf(jumps.interfaces[worst[n - 1]], kind).max);
+    const auto ofCells = worstJumpOfCells(field, jumps, kind);
+    for (const Interface& face : jumps.interfaces)
+      for (const std::uint32_t cell : face.cells) EXPECT_GE(ofCells[cell], jumpOf(face, kind).max);
+    EXPECT_EQ(*std::max_element(ofCells.begin(), ofCells.end()), jumpOf(jumps.interfaces[worst[0]], kind).max);
+    std::size_t counted = 0;
+    for (const auto& [decade, bin] : jumpHistogram(jumps, kind)) counted += bin.interfaces;
+    EXPECT_EQ(counted, jumps.interfaces.size());
+  }
+  EXPECT_EQ(worstInterfaces(jumps, JumpKind::value, 1u << 30).size(), jumps.interfaces.size());
+}
+
+TEST(Jumps, OneCellHasNoInterfaces) {
+  const Jumps jumps = findJumps(Field(row({{1}})));
+  EXPECT_TRUE(jumps.interfaces.empty());
+  EXPECT_EQ(jumps.value.rms, 0);
+  EXPECT_TRUE(worstInterfaces(jumps, JumpKind::value, 3).empty());
+}
+
+TEST(Jumps, CanBeCancelled) {
+  const Field field = randomField(8, {.grid = {4, 4, 4}, .maxDepth = 3});
+  std::atomic<int> asked = 0;
+  EXPECT_THROW(findJumps(field, 2, {.report = {}, .cancelled = [&] { return ++asked > 3; }}), Cancelled);
+  double last = 0;
+  findJumps(field, 2, {.report = [&](std::string_view, double fraction) { last = fraction; }, .cancelled = {}});
+  EXPECT_EQ(last, 1);
+}
+
+}  // namespace
+}  // namespace hpsdf
