@@ -8,7 +8,7 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
-#include "interrupt.h"
+#include "long_work.h"
 #include "progress_line.h"
 #include "summaries.h"
 
@@ -69,15 +69,8 @@ void warnOfCutSurface(const Console& console, const Box& surface, const Box& dom
 Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments) {
   const Box domain = domainOf(arguments, distance.source().box);
   warnOfCutSurface(console, distance.source().box, domain);
-  const InterruptGuard guard;
-  ProgressLine line(console.err, console.redrawsProgress);
-  const Progress progress{
-      .report = [&line](std::string_view task, double fraction) { line.report(task, fraction); },
-      .cancelled = &InterruptGuard::interrupted,
-  };
-  Field field = build(distance, domain, buildOptions(arguments), progress);
-  if (InterruptGuard::interrupted()) throw Cancelled();  // asked for in the very last moment
-  return field;
+  const BuildOptions options = buildOptions(arguments);
+  return withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); });
 }
 
 /// Errors of the construction speak of options; the user thinks of the mesh.

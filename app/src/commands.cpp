@@ -7,6 +7,7 @@ namespace hpsdf::app {
 Registry makeRegistry() {
   Registry registry;
   addFieldCommands(registry);
+  addJumpsCommand(registry);
   addPictureCommands(registry);
   addReportCommand(registry);
   addToolCommands(registry);

@@ -7,7 +7,8 @@ namespace hpsdf::app {
 /// All commands of the program.
 Registry makeRegistry();
 
-void addFieldCommands(Registry& registry);    ///< build, load, save, info, query
+void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
+void addJumpsCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render
 void addReportCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, set, mesh, shapes, doctor, help

@@ -3,11 +3,13 @@
 #include <utility>
 
 #include "hpsdf/error.h"
+#include "long_work.h"
 
 namespace hpsdf::app {
 
 void Session::setField(CurrentField field) {
   renderer_.reset();
+  jumps_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
 }
 
@@ -17,6 +19,12 @@ const CurrentField& Session::current() const {
 }
 
 void Session::setFileBytes(std::uintmax_t bytes) { field_->fileBytes = bytes; }
+
+const Jumps& Session::jumps() {
+  const Field& field = current().field;
+  if (!jumps_) jumps_ = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
+  return *jumps_;
+}
 
 render::Renderer& Session::renderer(const Backend& backend) {
   const Field& field = current().field;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "hpsdf/field.h"
+#include "hpsdf/jumps.h"
 #include "hpsdf/render/renderer.h"
 #include "registry.h"
 
@@ -56,6 +57,9 @@ class Session {
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);
 
+  /// The current field's jumps: measured when first asked for. Throws `Cancelled` after Ctrl-C.
+  const Jumps& jumps();
+
   /// The renderer of the current field: kept, since its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
 
@@ -64,6 +68,7 @@ class Session {
   Console console_;
   bool json_ = false;
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
+  std::optional<Jumps> jumps_;           // of the current field
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
 };

@@ -10,7 +10,6 @@ namespace {
 
 constexpr int kBarCells = 40;
 
-Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 Json boxJson(const Box& box) { return Json::array({vectorJson(box.min()), vectorJson(box.max())}); }
 
 template <typename Value>
@@ -19,10 +18,6 @@ Json levelsJson(const std::map<int, Value>& levels) {
   for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
   return json;
 }
-
-std::string row(std::string_view label, const std::string& value) { return fmt::format("  {:<22} {}\n", label, value); }
-
-std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
 
 /// A row a level: share of the volume, number of leaves, a bar as long as the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
@@ -46,6 +41,14 @@ std::string faultyEdges(const MeshReport& report) {
 }
 
 }  // namespace
+
+Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
+
+std::string summaryRow(std::string_view label, const std::string& value) {
+  return fmt::format("  {:<22} {}\n", label, value);
+}
 
 void printJson(std::ostream& out, const Json& json) {
   out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
@@ -109,21 +112,22 @@ Json meshJson(const std::string& name, const MeshReport& report) {
 
 std::string meshText(const std::string& name, const MeshReport& report) {
   std::string text = name + "\n";
-  text += row("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
-  text += row("parts", grouped(report.parts));
-  text += row("surface", report.closed() ? "closed" : "not closed: " + faultyEdges(report));
-  text += row("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
-  text += row("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
+  text += summaryRow("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
+  text += summaryRow("parts", grouped(report.parts));
+  text += summaryRow("surface", report.closed() ? "closed" : "not closed: " + faultyEdges(report));
+  text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
+  text += summaryRow("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
   if (report.weldedVertices > 0)
-    text +=
-        row("welded", grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
+    text += summaryRow("welded",
+                       grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
-    text += row("unused", grouped(report.unreferencedVertices) + " vertices dropped");
-  if (report.degenerateFaces > 0) text += row("degenerate", grouped(report.degenerateFaces) + " faces dropped");
+    text += summaryRow("unused", grouped(report.unreferencedVertices) + " vertices dropped");
+  if (report.degenerateFaces > 0) text += summaryRow("degenerate", grouped(report.degenerateFaces) + " faces dropped");
   if (report.flippedFaces > 0)
-    text += row("flipped", grouped(report.flippedFaces) + " edges of faces without area that hold their neighbours");
-  if (report.duplicateFaces > 0) text += row("duplicate", grouped(report.duplicateFaces) + " faces dropped");
-  if (report.turned) text += row("turned", "the whole mesh: its faces looked inward");
+    text +=
+        summaryRow("flipped", grouped(report.flippedFaces) + " edges of faces without area that hold their neighbours");
+  if (report.duplicateFaces > 0) text += summaryRow("duplicate", grouped(report.duplicateFaces) + " faces dropped");
+  if (report.turned) text += summaryRow("turned", "the whole mesh: its faces looked inward");
   return text;
 }
 
@@ -194,29 +198,30 @@ std::string fieldText(const CurrentField& current) {
   const auto& grid = field.grid();
   const bool fromMesh = metadata.source.faces > 0;
   std::string text = current.name + "\n";
-  text += row("made from", metadata.source.name.empty() ? "a function" : metadata.source.name);
+  text += summaryRow("made from", metadata.source.name.empty() ? "a function" : metadata.source.name);
   if (fromMesh) {
-    text += row("vertices, faces",
-                fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
-    text += row("fingerprint", fingerprintText(metadata.source.fingerprint));
+    text += summaryRow("vertices, faces",
+                       fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
+    text += summaryRow("fingerprint", fingerprintText(metadata.source.fingerprint));
   }
   if (const Normalization& n = metadata.source.normalization; n.scale != 1 || !n.center.isZero(0))
-    text += row("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
-  text += row("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
-  text += row("leaves", grouped(figures.leaves));
-  text += row("coefficients",
-              fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
-  text += row("memory", bytesText(double(figures.bytes)));
-  if (current.fileBytes) text += row("file", bytesText(double(*current.fileBytes)));
-  text += row("error, target", fmt::format("{}, {} (at the scale where the longest side is 2)",
-                                           shortNumber(metadata.totalError), shortNumber(metadata.targetError)));
-  text += row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
-  if (field.singlePrecision()) text += row("change by float", shortNumber(metadata.roundingRms) + " RMS");
-  text += row("exact distances", grouped(metadata.exactEvaluations));
-  text += row("settings", fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
-                                      strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
-                                      metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
-  if (metadata.band > 0) text += row("narrow band", fmt::format("{}", metadata.band));
+    text += summaryRow("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
+  text += summaryRow("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
+  text += summaryRow("leaves", grouped(figures.leaves));
+  text += summaryRow("coefficients", fmt::format("{} ({})", grouped(figures.coefficients),
+                                                 field.singlePrecision() ? "float" : "double"));
+  text += summaryRow("memory", bytesText(double(figures.bytes)));
+  if (current.fileBytes) text += summaryRow("file", bytesText(double(*current.fileBytes)));
+  text += summaryRow("error, target", fmt::format("{}, {} (at the scale where the longest side is 2)",
+                                                  shortNumber(metadata.totalError), shortNumber(metadata.targetError)));
+  text += summaryRow("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
+  if (field.singlePrecision()) text += summaryRow("change by float", shortNumber(metadata.roundingRms) + " RMS");
+  text += summaryRow("exact distances", grouped(metadata.exactEvaluations));
+  text += summaryRow("settings",
+                     fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
+                                 strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
+                                 metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
+  if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

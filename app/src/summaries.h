@@ -39,6 +39,13 @@ std::string bytesText(double bytes);
 /// Three digits, and a short exponent where it saves zeros: 1e-6, 3.06e-4, 0.125
 std::string shortNumber(double number);
 
+Json vectorJson(const Vector3& v);
+/// "(0.1, 0.2, 0.3)"
+std::string vectorText(const Vector3& v);
+
+/// An indented line of a summary.
+std::string summaryRow(std::string_view label, const std::string& value);
+
 std::string strategyName(Strategy strategy);
 
 }  // namespace hpsdf::app

@@ -24,6 +24,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/jumps.h"
 #include "hpsdf/render/image.h"
 #include "point_query.h"
 #include "progress_line.h"
@@ -39,10 +40,12 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;  // keys sorted: equality of what is read, whatever its order
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::StartsWith;
 using Clock = std::chrono::steady_clock;
 
@@ -372,6 +375,33 @@ TEST_F(Cli, infoTellsWhatTheFieldHolds) {
   const Outcome text = run({{"info", field()}});
   EXPECT_THAT(text.out, HasSubstr("leaves"));
   EXPECT_THAT(text.out, HasSubstr("▇"));
+}
+
+TEST_F(Cli, jumpsAreReportedAndListed) {
+  const Outcome outcome = run({{"jumps", field(), "--json", "--worst", "3", "-o", at("jumps.csv")}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  const Jumps jumps = findJumps(load(field()));
+  EXPECT_EQ(json.at("interfaces"), jumps.interfaces.size());
+  EXPECT_EQ(json.at("hanging"), jumps.hanging);
+  EXPECT_EQ(json.at("value").at("rms"), jumps.value.rms);
+  EXPECT_EQ(json.at("gradient").at("max"), jumps.gradient.max);
+  ASSERT_EQ(json.at("worst").size(), 3u);
+  EXPECT_EQ(json.at("worst")[0].at("value").at("max"), jumps.value.max);
+  std::size_t counted = 0;
+  for (const Json& bin : json.at("value_histogram")) counted += bin.at("interfaces").get<std::size_t>();
+  EXPECT_EQ(counted, jumps.interfaces.size());
+  const std::string table = readFile(at("jumps.csv"));
+  EXPECT_EQ(lineCount(table), jumps.interfaces.size() + 1);
+  EXPECT_THAT(table, StartsWith("cell0,cell1,"));
+
+  const Outcome byGradient = run({{"jumps", field(), "--json", "--worst", "1", "--by", "gradient"}});
+  EXPECT_EQ(Json::parse(byGradient.out).at("worst")[0].at("gradient").at("max"), jumps.gradient.max);
+  const Outcome text = run({{"jumps", field()}});
+  EXPECT_THAT(text.out, AllOf(HasSubstr("value jump"), HasSubstr("▇"), HasSubstr("degrees, depths")));
+  EXPECT_THAT(run({{"jumps", field(), "--worst", "0"}}).out, Not(HasSubstr("degrees, depths")));
+  expectRefused({{"jumps", field(), "--by", "valeu"}}, "value");
+  expectRefused({{"jumps", field(), "-o", field()}}, field(), {"jumps.csv"});
 }
 
 TEST_F(Cli, everyCommandSpeaksJson) {
@@ -717,6 +747,7 @@ TEST_F(Cli, unwritableOutputsAreRefusedBeforeTheWork) {
   expectRefused({{"slice", field(), "-o", at("none/s.csv"), "--cpu"}}, "none/s.csv");
   expectRefused({{"render", field(), "-o", at("none/s.png"), "--cpu"}}, "none/s.png");
   expectRefused({{"query", field(), "-o", at("none/q.csv")}}, "none/q.csv");
+  expectRefused({{"jumps", field(), "-o", at("none/j.csv")}}, "none/j.csv");
   expectRefused({{"report", field(), "-o", at("file")}}, "file");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
