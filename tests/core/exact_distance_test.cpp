@@ -678,6 +678,30 @@ TEST(ExactDistance, NonFinitePointsAreAnsweredWithoutHarm) {
   EXPECT_FALSE(std::isfinite(values[2]));
   EXPECT_FALSE(std::isfinite(values[3]));
   EXPECT_EQ(values[4], 2);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double bad : {nan, infinity, -infinity}) {
+      Vector3 x(0.1, 0.2, 0.3);
+      x[axis] = bad;
+      EXPECT_FALSE(std::isfinite(distance(x))) << x.transpose();
+    }
+}
+
+/// Points near, far and too far for float share packets with no numbers.
+TEST(ExactDistance, NonFinitePointsLeaveTheirNeighboursAlone) {
+  const ExactDistance distance(sphere(2));
+  std::vector<Vector3> points;
+  for (const double far : {1e-3, 1e10, 1e20})
+    for (int nan = 0; nan < 8; ++nan) {
+      for (int lane = 0; lane < 8; ++lane) points.push_back(Vector3(0.3 - 0.1 * lane, 0.2 + 0.1 * nan, 0.5));
+      points[points.size() - 8 + nan][nan % 3] = std::numeric_limits<double>::quiet_NaN();
+      points[points.size() - 1 - nan] *= -far;
+    }
+  std::vector<double> values(points.size());
+  distance(points, values);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].allFinite()) continue;
+    EXPECT_EQ(values[i], distance(points[i])) << points[i].transpose();
+  }
 }
 
 // --- the object

@@ -403,13 +403,13 @@ Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& p
     for (int axis = 0; axis < 3; ++axis) {
       exact[axis][lane] = points[lane][axis];
       point[axis][lane] = static_cast<float>(local[axis]);
-      if (!(std::abs(local[axis]) <= reach)) reach = std::abs(local[axis]);
+      tooFar |= !(std::abs(local[axis]) < 1e15);  // also for NaN, which `reach` passes over
+      reach = std::max(reach, std::abs(local[axis]));
     }
     limit[lane] = kOutOfReach;
     squared[lane] = kInfinity;
     triangle[lane] = kInfinity;
   }
-  tooFar = !(reach < 1e15);
   delta = 32 * std::numeric_limits<float>::epsilon() * static_cast<float>(reach);
 }
 
