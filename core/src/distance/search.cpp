@@ -205,7 +205,7 @@ class Stack {
   bool empty() const { return top_ == 0; }
   const Entry& pop() { return entries_[--top_]; }
 
-  /// Room for four entries; the first `count` of them stay.
+  /// Room for four entries more, of which `grow` lets the first `count` stay.
   Entry* room() { return entries_.data() + top_; }
   void grow(int count) { top_ += count; }
 

@@ -153,10 +153,10 @@ void sortByDegree(const T* coefficients, Batch& batch) {
   for (std::size_t i = 0; i < batch.count; ++i) {
     const int degree = node::degree(batch.bits[i]);
     const T* first = coefficients + node::offset(batch.bits[i]);
-    const T* last = first + coefficientCount(degree) - 1;
+    const std::size_t last = coefficientCount(degree) - 1;
     // for all leaves what the common ones take at most: as many as each takes would be mispredicted
     for (std::size_t at = 0; at < coefficientCount(kMostCommon); at += 64 / sizeof(T))
-      __builtin_prefetch(std::min(first + at, last));
+      __builtin_prefetch(first + std::min(at, last));
     for (std::size_t k = 0; k < kLists; ++k) batch.list[k][listed[k]] = static_cast<std::uint8_t>(i);
     for (std::size_t k = 0; k + 1 < kLists; ++k) listed[k] += degree == kLeastCommon + int(k);
     listed[kLists - 1] += degree < kLeastCommon || degree > kMostCommon;
