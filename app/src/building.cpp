@@ -80,6 +80,38 @@ Field construct(const Console& console, const DistanceFunction& distance, const 
   throw Error(surface + ": " + message);
 }
 
+/// A surface as a field is made from it.
+struct PreparedSurface {
+  std::optional<DistanceFunction> analytic;  ///< else the mesh
+  TriangleMesh mesh;
+  std::optional<MeshReport> report;
+  Normalization normalization;
+};
+
+PreparedSurface prepare(const Console& console, const std::string& surface, bool toNormalize) {
+  PreparedSurface prepared;
+  if (surface.starts_with(kAnalytic)) {
+    prepared.analytic = shapes::analytic(surface);
+    if (toNormalize) prepared.analytic = normalizedFunction(*prepared.analytic);
+    return prepared;
+  }
+  ImportedMesh imported = importSurface(surface);
+  if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
+    console.err << "hpsdf: warning: " << warning << std::endl;
+  prepared.report = imported.report;
+  if (toNormalize) prepared.normalization = normalizing(boundingBox(imported.mesh));
+  prepared.mesh = toNormalize ? normalized(imported.mesh) : std::move(imported.mesh);
+  return prepared;
+}
+
+std::shared_ptr<const DistanceFunction> distanceTo(const PreparedSurface& surface, int threads) {
+  if (surface.analytic) return std::make_shared<const DistanceFunction>(*surface.analytic);
+  ExactDistance exact(surface.mesh, threads);
+  Source source = exact.source();
+  source.normalization = surface.normalization;
+  return std::make_shared<const DistanceFunction>(std::move(exact), std::move(source));  // moved: kept, not referred to
+}
+
 }  // namespace
 
 std::vector<Parameter> buildParameters() {
@@ -217,29 +249,29 @@ BuildOptions buildOptions(const Arguments& arguments) {
 
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
   try {
-    if (surface.starts_with(kAnalytic)) {
-      DistanceFunction distance = shapes::analytic(surface);
-      if (wantsNormalized(arguments)) distance = normalizedFunction(distance);
-      const auto start = std::chrono::steady_clock::now();
-      Field field = construct(console, distance, arguments);
-      return {std::move(field), std::nullopt,
-              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
-    }
-    ImportedMesh imported = importSurface(surface);
-    if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
-      console.err << "hpsdf: warning: " << warning << std::endl;
-    Normalization normalization;
-    if (wantsNormalized(arguments)) {
-      normalization = normalizing(boundingBox(imported.mesh));
-      imported.mesh = normalized(imported.mesh);
-    }
+    const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
-    const ExactDistance distance(imported.mesh, arguments.whole("threads"));
-    Source source = distance.source();
-    source.normalization = normalization;
-    Field field = construct(console, DistanceFunction(distance, std::move(source)), arguments);
-    return {std::move(field), imported.report,
+    auto exact = distanceTo(prepared, arguments.whole("threads"));
+    Field field = construct(console, *exact, arguments);
+    return {std::move(field), std::move(exact), prepared.report,
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
+
+std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
+                                                      const Source& source) {
+  try {
+    const bool normalized = source.normalization.scale != 1 || !source.normalization.center.isZero(0);
+    auto exact = distanceTo(prepare(console, surface, normalized), 0);
+    const Source& given = exact->source();
+    if (given.fingerprint != source.fingerprint || (source.fingerprint == 0 && given.name != source.name))
+      console.err << "hpsdf: warning: " << surface << " is not what the field was made from ("
+                  << (source.name.empty() ? "unknown" : source.name) << ")" << std::endl;
+    return exact;
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }

@@ -1,8 +1,10 @@
 #pragma once
 // From a mesh file or a shape's name to a field, as `build` and `report` do it.
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hpsdf/build.h"
@@ -19,12 +21,21 @@ BuildOptions buildOptions(const Arguments& arguments);
 
 struct BuiltField {
   Field field;
-  std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
-  double seconds = 0;              ///< of the construction, with the hierarchy over the triangles
+  std::shared_ptr<const DistanceFunction> exact;  ///< what it was made from
+  std::optional<MeshReport> mesh;                 ///< nothing for an analytic shape
+  double seconds = 0;                             ///< of the construction, with the hierarchy over the triangles
 };
 
 /// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments);
+
+/// Whether it names a shape rather than a file: builtin:… or analytic:…
+bool isShape(std::string_view surface);
+
+/// The exact distance of a mesh file or a shape, in the units of a field that was made from `source`. Warns when the
+/// surface is another one. Throws `Error` naming `surface`.
+std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
+                                                      const Source& source);
 
 /// The report of a mesh file or a built-in shape; throws `Error` for an analytic one.
 MeshReport inspectSurface(const std::string& surface);

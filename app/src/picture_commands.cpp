@@ -34,23 +34,27 @@ SliceFormat sliceFormat(const std::string& file) {
                           file, kind));
 }
 
-float valueOrNan(const render::ViewBuffers& buffers, render::SliceColor what, std::size_t pixel) {
-  if (!buffers.hit(pixel)) return std::numeric_limits<float>::quiet_NaN();
-  return what == render::SliceColor::degree  ? buffers.degree[pixel]
-         : what == render::SliceColor::depth ? buffers.depth[pixel]
-                                             : buffers.value[pixel];
+/// What the colours of a slice would stand for; NaN outside the domain.
+std::vector<float> rawValues(const Field& field, const render::SliceView& view, const render::ViewBuffers& buffers,
+                             render::ColorBy what, const render::Evidence& evidence) {
+  if (render::isQuantity(what)) return render::quantityAt(field, view, buffers, what, evidence);
+  std::vector<float> values(buffers.cell.size(), std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (buffers.hit(i))
+      values[i] = what == render::ColorBy::degree  ? buffers.degree[i]
+                  : what == render::ColorBy::depth ? buffers.depth[i]
+                                                   : buffers.value[i];
+  return values;
 }
 
 /// Portable float map: one channel, little-endian (the negative scale says so), rows bottom to top; NaN outside the
 /// domain.
-void writePfm(const render::ViewBuffers& buffers, render::SliceColor what, OutputFile& out) {
+void writePfm(const render::ViewBuffers& buffers, std::span<const float> values, OutputFile& out) {
   static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
   out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
-  std::vector<float> row(static_cast<std::size_t>(buffers.width));
-  for (int y = buffers.height; y-- > 0;) {
-    for (std::size_t x = 0; x < row.size(); ++x) row[x] = valueOrNan(buffers, what, std::size_t(y) * row.size() + x);
-    out.write(std::as_bytes(std::span(row)));
-  }
+  const auto width = static_cast<std::size_t>(buffers.width);
+  for (auto y = static_cast<std::size_t>(buffers.height); y-- > 0;)
+    out.write(std::as_bytes(values.subspan(y * width, width)));
 }
 
 /// A row a pixel inside the domain: its point in world units, the value there, degree and depth of its cell.
@@ -87,18 +91,23 @@ void runSlice(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
+  const render::Evidence evidence =
+      session.evidence(picture.color, arguments.given("mesh") ? arguments.text("mesh") : "");
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
     plane->offset = defaultOffset(field.domain(), plane->axis);
   if (format == SliceFormat::png) {
-    savePng(render::draw(renderer, field, picture), file);
+    savePng(render::draw(renderer, field, picture, evidence), file);
   } else {
     const render::SliceView view = render::sliceView(field, picture, picture.width, picture.height);
     const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
     OutputFile out(file);
     if (format == SliceFormat::pfm)
-      writePfm(buffers, arguments.given("color") ? picture.color : render::SliceColor::distance, out);
+      writePfm(buffers,
+               rawValues(field, view, buffers, arguments.given("color") ? picture.color : render::ColorBy::distance,
+                         evidence),
+               out);
     else
       writeCsv(view, buffers, out);
     out.commit();
@@ -123,9 +132,11 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
+  const render::Evidence evidence =
+      session.evidence(picture.color, arguments.given("mesh") ? arguments.text("mesh") : "");
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  const render::DrawnSurface drawn = render::drawSurface(renderer, field, picture);
+  const render::DrawnSurface drawn = render::drawSurface(renderer, field, picture, evidence);
   savePng(drawn.image, file);
   noteOddSurface(session.console(), field, picture.offset, drawn.seen);
   report(session, arguments, picture.width, picture.height, renderer);
@@ -149,6 +160,11 @@ std::vector<Parameter> pictureParameters() {
                                         .maximum = 8}};
   for (Parameter& parameter : backendParameters()) parameters.push_back(std::move(parameter));
   return parameters;
+}
+
+std::vector<Parameter> joined(std::vector<Parameter> first, std::vector<Parameter> more) {
+  for (Parameter& parameter : more) first.push_back(std::move(parameter));
+  return first;
 }
 
 Command withParameters(Command command, std::vector<Parameter> more) {
@@ -183,6 +199,75 @@ Backend backend(const Arguments& arguments) {
   return {arguments.flag("cpu"), glChoice(arguments)};
 }
 
+namespace {
+
+using render::ColorBy;
+constexpr std::pair<std::string_view, ColorBy> kColors[] = {
+    {"normal", ColorBy::normal},     {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
+    {"distance", ColorBy::distance}, {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
+    {"slope", ColorBy::slope},       {"error", ColorBy::error},          {"cell-error", ColorBy::cellError}};
+
+std::vector<std::string> colorNames(ColorBy without) {
+  std::vector<std::string> names;
+  for (const auto& [name, color] : kColors)
+    if (color != without) names.emplace_back(name);
+  return names;
+}
+
+/// One of the names above: the registry has seen to that.
+ColorBy colorNamed(std::string_view name) {
+  return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
+}
+
+render::ScaleOptions scaleOptions(const Arguments& arguments) {
+  render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
+  const ColorBy color = colorNamed(arguments.text("color"));
+  for (const char* name : {"range", "scale"})
+    if (arguments.given(name) && !render::isQuantity(color))
+      throw Error(
+          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error and "
+                      "cell-error",
+                      name, arguments.text("color")));
+  if (arguments.given("mesh") && color != ColorBy::error)
+    throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
+  if (arguments.given("range")) {
+    const auto limits = arguments.numbers("range");
+    options.limits = {limits[0], limits[1]};
+  }
+  return options;
+}
+
+std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCells, const std::string& standard) {
+  return {
+      {.name = "color",
+       .type = ParameterType::choice,
+       .help = ofCells +
+               " value-jump and gradient-jump show the greatest jump at a cell's faces, slope how far the gradient's "
+               "length is from 1, error the difference from the exact distance, cell-error what the construction "
+               "thinks of a cell's RMS error.",
+       .defaultText = standard,
+       .choices = colorNames(without)},
+      {.name = "range",
+       .type = ParameterType::numbers,
+       .help = "Which values the darkest and the lightest colour of a jump, slope or error stand for, so that "
+               "pictures can be compared; when left out, chosen from the values.",
+       .valueName = "LOW,HIGH",
+       .counts = {2}},
+      {.name = "scale",
+       .type = ParameterType::choice,
+       .help = "How such colours run between them.",
+       .defaultText = "log",
+       .choices = {"log", "linear"}},
+      {.name = "mesh",
+       .type = ParameterType::text,
+       .help = "For color error: what the field was made from. A built-in or analytic shape is known; a mesh file "
+               "must be given, unless it was built in the same script.",
+       .defaultText = "",
+       .valueName = "MESH"}};
+}
+
+}  // namespace
+
 render::SlicePicture slicePicture(const Arguments& arguments) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
@@ -194,10 +279,8 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
     picture.plane =
         render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
   }
-  const std::string color = arguments.text("color");
-  picture.color = color == "depth"      ? render::SliceColor::depth
-                  : color == "distance" ? render::SliceColor::distance
-                                        : render::SliceColor::degree;
+  picture.color = colorNamed(arguments.text("color"));
+  picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
@@ -214,10 +297,8 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   picture.camera.distance = camera[2];
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
-  const std::string color = arguments.text("color");
-  picture.color = color == "degree"  ? render::SurfaceColor::degree
-                  : color == "depth" ? render::SurfaceColor::depth
-                                     : render::SurfaceColor::normal;
+  picture.color = colorNamed(arguments.text("color"));
+  picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
@@ -231,7 +312,7 @@ double defaultOffset(const Box& domain, int axis) {
 void addPictureCommands(Registry& registry) {
   registry.add(withParameters(
       {.name = "slice",
-       .summary = "Draw a plane through a field, coloured by degree, depth or distance.",
+       .summary = "Draw a plane through a field, coloured by degree, depth, distance, jumps or errors.",
        .help =
            "The plane is axis = offset, or any plane given by a point and a normal. degree and depth show the cells "
            "with their outlines; distance shows iso-lines, the surface as a heavy line.\n"
@@ -242,37 +323,36 @@ void addPictureCommands(Registry& registry) {
        .examples = {"hpsdf slice bunny.hpsdf -o degree.png",
                     "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
                     "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",
+                    "hpsdf slice bunny.hpsdf -o error.png --color error --mesh bunny.obj --range 1e-6,1e-3",
                     "hpsdf slice bunny.hpsdf -o values.csv --size 64x64"},
-       .parameters = {fieldParameter(),
-                      {.name = "output",
-                       .type = ParameterType::outputPath,
-                       .help = "*.png, *.pfm or *.csv.",
-                       .alias = 'o',
-                       .need = Need::always},
-                      {.name = "axis",
-                       .type = ParameterType::choice,
-                       .help = "The plane is perpendicular to this axis.",
-                       .defaultText = "z",
-                       .choices = {"x", "y", "z"}},
-                      {.name = "offset",
-                       .type = ParameterType::number,
-                       .help =
-                           "Where the plane crosses that axis; when left out, at 0, or in the domain's middle where 0 "
-                           "lies outside.",
-                       .unit = "world units"},
-                      {.name = "plane",
-                       .type = ParameterType::numbers,
-                       .help = "A point of the plane and its normal, instead of axis and offset.",
-                       .valueName = "PX,PY,PZ,NX,NY,NZ",
-                       .unit = "world units",
-                       .counts = {6}},
-                      {.name = "color",
-                       .type = ParameterType::choice,
-                       .help = "What the colours mean.",
-                       .defaultText = "degree",
-                       .choices = {"degree", "depth", "distance"}}},
+       .parameters =
+           {
+               fieldParameter(),
+               {.name = "output",
+                .type = ParameterType::outputPath,
+                .help = "*.png, *.pfm or *.csv.",
+                .alias = 'o',
+                .need = Need::always},
+               {.name = "axis",
+                .type = ParameterType::choice,
+                .help = "The plane is perpendicular to this axis.",
+                .defaultText = "z",
+                .choices = {"x", "y", "z"}},
+               {.name = "offset",
+                .type = ParameterType::number,
+                .help = "Where the plane crosses that axis; when left out, at 0, or in the domain's middle where 0 "
+                        "lies outside.",
+                .unit = "world units"},
+               {.name = "plane",
+                .type = ParameterType::numbers,
+                .help = "A point of the plane and its normal, instead of axis and offset.",
+                .valueName = "PX,PY,PZ,NX,NY,NZ",
+                .unit = "world units",
+                .counts = {6}},
+           },
        .action = runSlice},
-      pictureParameters()));
+      joined(colorParameters(ColorBy::normal, "degree and depth show the cells, distance iso-lines.", "degree"),
+             pictureParameters())));
   registry.add(withParameters(
       {.name = "render",
        .summary = "Draw the surface of a field by sphere tracing.",
@@ -284,11 +364,6 @@ void addPictureCommands(Registry& registry) {
        .parameters =
            {fieldParameter(),
             {.name = "output", .type = ParameterType::outputPath, .help = "*.png.", .alias = 'o', .need = Need::always},
-            {.name = "color",
-             .type = ParameterType::choice,
-             .help = "normal lights the surface; degree and depth show the cells that hold it.",
-             .defaultText = "normal",
-             .choices = {"normal", "degree", "depth"}},
             {.name = "camera",
              .type = ParameterType::numbers,
              .help = "Azimuth and elevation in degrees, and the eye's distance from the centre in diagonals of "
@@ -307,7 +382,9 @@ void addPictureCommands(Registry& registry) {
              .defaultText = "0",
              .unit = "world units"}},
        .action = runRender},
-      pictureParameters()));
+      joined(colorParameters(ColorBy::distance,
+                             "normal lights the surface; degree and depth show the cells that hold it.", "normal"),
+             pictureParameters())));
 }
 
 }  // namespace hpsdf::app

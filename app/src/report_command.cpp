@@ -112,24 +112,24 @@ struct Drawing {
   std::string title;
   std::string caption;
   std::string command;  ///< what follows the field's file
-  std::variant<render::SliceColor, render::SurfaceColor> color;
+  bool slice;
+  render::ColorBy color;
 };
 
 std::vector<Drawing> drawings() {
-  using render::SliceColor;
-  using render::SurfaceColor;
+  using render::ColorBy;
   return {
-      {"surface.png", "Surface", "Sphere-traced, lit by the field's own gradient.", "render {} -o surface.png",
-       SurfaceColor::normal},
+      {"surface.png", "Surface", "Sphere-traced, lit by the field's own gradient.", "render {} -o surface.png", false,
+       ColorBy::normal},
       {"degree.png", "Degree", "The polynomial degree of each cell in the plane through the middle.",
-       "slice {} --color degree -o degree.png", SliceColor::degree},
+       "slice {} --color degree -o degree.png", true, ColorBy::degree},
       {"depth.png", "Depth", "How often the octree has halved the base cells, in the same plane.",
-       "slice {} --color depth -o depth.png", SliceColor::depth},
+       "slice {} --color depth -o depth.png", true, ColorBy::depth},
       {"distance.png", "Distance",
        "The signed distance: iso-lines, and the surface as the heavy line where it is zero.",
-       "slice {} --color distance -o distance.png", SliceColor::distance},
+       "slice {} --color distance -o distance.png", true, ColorBy::distance},
       {"surface-degree.png", "Degree on the surface", "The degree of the cells that hold the surface.",
-       "render {} --color degree -o surface-degree.png", SurfaceColor::degree},
+       "render {} --color degree -o surface-degree.png", false, ColorBy::degree},
   };
 }
 
@@ -138,15 +138,15 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
   const Field& field = session.current().field;
   std::string command = "hpsdf " + fmt::format(fmt::runtime(drawing.command), fieldFile);
   render::Image image;
-  if (const auto* color = std::get_if<render::SliceColor>(&drawing.color)) {
+  if (drawing.slice) {
     const double offset = defaultOffset(field.domain(), 2);
     if (offset != 0) command += fmt::format(" --offset={}", offset);
-    image =
-        render::draw(renderer, field,
-                     render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = *color, .samples = samples});
+    image = render::draw(
+        renderer, field,
+        render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = drawing.color, .samples = samples});
   } else {
     render::SurfacePicture picture;
-    picture.color = std::get<render::SurfaceColor>(drawing.color);
+    picture.color = drawing.color;
     picture.samples = samples;
     image = render::draw(renderer, field, picture);
   }

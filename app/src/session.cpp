@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "building.h"
 #include "hpsdf/error.h"
 #include "long_work.h"
 
@@ -10,6 +11,7 @@ namespace hpsdf::app {
 void Session::setField(CurrentField field) {
   renderer_.reset();
   jumps_.reset();
+  exact_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
 }
 
@@ -24,6 +26,24 @@ const Jumps& Session::jumps() {
   const Field& field = current().field;
   if (!jumps_) jumps_ = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
   return *jumps_;
+}
+
+const DistanceFunction& Session::exact(const std::string& surface) {
+  const Source& source = current().field.metadata().source;
+  if (exact_ && (surface.empty() || surface == exactSurface_)) return *exact_;
+  if (surface.empty() && !isShape(source.name))
+    throw Error("color error needs the mesh that the field was made from: give mesh=" +
+                (source.name.empty() ? "FILE" : source.name));
+  exact_ = exactDistance(console_, surface.empty() ? source.name : surface, source);
+  exactSurface_ = surface;
+  return *exact_;
+}
+
+render::Evidence Session::evidence(render::ColorBy color, const std::string& surface) {
+  render::Evidence evidence;
+  if (color == render::ColorBy::valueJump || color == render::ColorBy::gradientJump) evidence.jumps = &jumps();
+  if (color == render::ColorBy::error) evidence.exact = &exact(surface);
+  return evidence;
 }
 
 render::Renderer& Session::renderer(const Backend& backend) {

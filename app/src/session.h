@@ -10,6 +10,7 @@
 
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/render/picture.h"
 #include "hpsdf/render/renderer.h"
 #include "registry.h"
 
@@ -60,6 +61,14 @@ class Session {
   /// The current field's jumps: measured when first asked for. Throws `Cancelled` after Ctrl-C.
   const Jumps& jumps();
 
+  /// The exact distance that the current field was made from: of `surface`, or, where that is empty, of the shape that
+  /// the field names or the mesh that it was built from just now. Kept. Throws `Error` when it is not to be had.
+  const DistanceFunction& exact(const std::string& surface);
+  void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
+
+  /// What pictures with these colours need.
+  render::Evidence evidence(render::ColorBy color, const std::string& surface);
+
   /// The renderer of the current field: kept, since its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
 
@@ -69,6 +78,8 @@ class Session {
   bool json_ = false;
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
+  std::shared_ptr<const DistanceFunction> exact_;
+  std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
 };

@@ -293,8 +293,8 @@ struct Lights {
 
 class SurfaceShader {
  public:
-  SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color)
-      : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), map_(map), color_(color) {}
+  SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color)
+      : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), color_(color) {}
   SurfaceShader(const SurfaceShader&) = delete;  // openness_ refers to frame_
 
   LinearColor operator()(int x, int y) const {
@@ -302,20 +302,18 @@ class SurfaceShader {
     const Eigen::Vector3f toEye = -frame_.ray(x, y);
     const Eigen::Vector3f n = frame_.normal(x, y, toEye);
     const float open = openness_(x, y, frame_.position(x, y), n);
-    if (color_ == SurfaceColor::normal)
-      return clay_.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
-    const LinearColor& level = map_(color_ == SurfaceColor::degree ? buffers_.degree[i] : buffers_.depth[i]);
+    if (!color_) return clay_.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
     // Softer than clay, and without colour of its own: the legend's colour must stay recognisable.
     const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
-    return level * light * (0.35F + 0.65F * open) + LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
+    return color_(i) * light * (0.35F + 0.65F * open) +
+           LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
   }
 
  private:
   const ViewBuffers& buffers_;
   CameraFrame frame_;
   Openness openness_;
-  const LevelMap& map_;
-  SurfaceColor color_;
+  const SampleColor& color_;
   Lights lights_;
   LinearColor clay_ = decodeSrgb(kClay);
 };
@@ -328,10 +326,19 @@ LinearColor backdropColor(double fromTop) {
   return fromOklab({0.975 - 0.06 * fromTop * fromTop, -0.003, -0.006 - 0.004 * fromTop});
 }
 
-Image colorLevelSlice(const ViewBuffers& buffers, const LevelMap& map, SliceColor color, const Sampling& sampling) {
+SampleColor levelColors(const ViewBuffers& buffers, const LevelMap& map, ColorBy color) {
+  if (color == ColorBy::normal) return {};
+  const std::vector<std::uint8_t>& levels = color == ColorBy::degree ? buffers.degree : buffers.depth;
+  return [&map, &levels](std::size_t i) { return map(levels[i]); };
+}
+
+SampleColor quantityColors(const std::vector<float>& quantity, const ColorScale& scale) {
+  return [&quantity, &scale](std::size_t i) { return scale(quantity[i]); };
+}
+
+Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
   const CellOutlines outlines(buffers, sampling);
   const Contours contours(buffers, sampling.sampleSize);
-  const std::vector<std::uint8_t>& levels = color == SliceColor::degree ? buffers.degree : buffers.depth;
   const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
   const LinearColor line = decodeSrgb(kSurfaceLine), casing = decodeSrgb(kSurfaceCasing);
   const double thin = sampling.lineWidth * sampling.samples;
@@ -339,7 +346,7 @@ Image colorLevelSlice(const ViewBuffers& buffers, const LevelMap& map, SliceColo
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t i = std::size_t(y) * buffers.width + x;
       LinearColor& sample = row[x];
-      sample = buffers.hit(i) ? map(levels[i]) : paper;
+      sample = buffers.hit(i) ? color(i) : paper;
       sample = mix(sample, outline, float(kOutlineStrength) * outlines(x, y));
       if (!buffers.hit(i)) continue;
       const double toSurface = contours.toZero(x, y, contours.slope(x, y));
@@ -376,9 +383,8 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color,
-                   int samples) {
-  const SurfaceShader shader(buffers, camera, map, color);
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color, int samples) {
+  const SurfaceShader shader(buffers, camera, color);
   return average(buffers, samples, [&](int y, std::vector<LinearColor>& row) {
     const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
     for (int x = 0; x < buffers.width; ++x)

@@ -2,6 +2,9 @@
 // From the buffers of a view to the colours of its pixels. Reads nothing but the buffers, so that OpenGL and the oracle
 // are coloured alike.
 
+#include <functional>
+#include <vector>
+
 #include "colormap.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/render/view.h"
@@ -15,15 +18,22 @@ struct Sampling {
   double sampleSize = 1;  ///< between neighbouring samples of a slice, world units
 };
 
-/// Cells in the colour of their level under thin outlines, the surface as a white line. `color`: degree or depth.
-Image colorLevelSlice(const ViewBuffers& buffers, const LevelMap& map, SliceColor color, const Sampling& sampling);
+/// The colour of a sample of some buffers, by its index.
+using SampleColor = std::function<LinearColor(std::size_t)>;
+
+/// The colours of degrees or depths; empty for `ColorBy::normal`. Refers to both arguments.
+SampleColor levelColors(const ViewBuffers& buffers, const LevelMap& map, ColorBy color);
+/// Of a quantity. Refers to both arguments.
+SampleColor quantityColors(const std::vector<float>& quantity, const ColorScale& scale);
+
+/// Coloured samples under thin outlines of the cells, the surface as a white line.
+Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
 
 /// The diverging map under iso-lines, the zero line heavy.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// A lit surface before the backdrop: one material for `normal`, else the level's colour, softly shaded.
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const LevelMap& map, SurfaceColor color,
-                   int samples);
+/// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded.
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color, int samples);
 
 /// What is drawn where a slice leaves the domain, and under legend and caption.
 Color paperColor();

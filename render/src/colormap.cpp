@@ -8,8 +8,6 @@ namespace {
 
 constexpr double kIsoLines = 12;
 
-double powerOfTenBelow(double x) { return std::pow(10.0, std::floor(std::log10(x))); }
-
 double niceCeil(double x) {
   const double power = powerOfTenBelow(x);
   for (double digits : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0})
@@ -18,8 +16,8 @@ double niceCeil(double x) {
 }
 
 // The step whose number of lines is nearest to the wanted one, as a ratio.
-double niceStep(double span) {
-  const double ideal = span / kIsoLines;
+double niceStep(double span, double lines) {
+  const double ideal = span / lines;
   const double power = powerOfTenBelow(ideal);
   double best = power;
   for (double digits : {2.0, 5.0, 10.0})
@@ -28,6 +26,8 @@ double niceStep(double span) {
 }
 
 }  // namespace
+
+double powerOfTenBelow(double x) { return std::pow(10.0, std::floor(std::log10(x) + 1e-12)); }
 
 LinearColor orderedColor(double t) {
   t = std::clamp(t, 0.0, 1.0);
@@ -46,6 +46,41 @@ LevelMap::LevelMap(std::span<const int> levels) : levels_(levels.begin(), levels
   for (std::size_t i = 0; i < levels_.size(); ++i)
     colors_[static_cast<std::uint8_t>(levels_[i])] =
         orderedColor(levels_.size() == 1 ? 0.5 : double(i) / double(levels_.size() - 1));
+}
+
+ColorScale::ColorScale(double low, double high, bool logarithmic)
+    : low_(low), high_(high), logarithmic_(logarithmic), table_(kSteps + 1) {
+  for (int i = 0; i <= kSteps; ++i) table_[i] = orderedColor(double(i) / kSteps);
+}
+
+ColorScale ColorScale::around(double least, double greatest, bool logarithmic) {
+  constexpr double kMostDecades = 6;
+  if (!(greatest > 0)) return logarithmic ? ColorScale(0.1, 1, true) : ColorScale(0, 1, false);
+  if (!logarithmic) return {0, niceCeil(greatest), false};
+  const double top = std::ceil(std::log10(greatest) - 1e-9);
+  const double bottom = std::clamp(std::floor(std::log10(least) + 1e-9), top - kMostDecades, top - 1);
+  return {std::pow(10.0, bottom), std::pow(10.0, top), true};
+}
+
+double ColorScale::place(double value) const {
+  const double t = logarithmic_ ? std::log(value / low_) / std::log(high_ / low_) : (value - low_) / (high_ - low_);
+  return t > 0 ? std::min(t, 1.0) : 0.0;
+}
+
+std::vector<double> scaleMarks(const ColorScale& scale) {
+  std::vector<double> marks;
+  constexpr double kTolerance = 1e-9;
+  if (scale.logarithmic()) {
+    for (int n = static_cast<int>(std::ceil(std::log10(scale.low()) - kTolerance));
+         n <= std::floor(std::log10(scale.high()) + kTolerance); ++n)
+      marks.push_back(std::pow(10.0, n));
+    if (marks.size() >= 2) return marks;
+    marks.clear();
+  }
+  const double step = niceStep(scale.high() - scale.low(), 5);
+  for (double n = std::ceil(scale.low() / step - kTolerance); n * step <= scale.high() + kTolerance * step; ++n)
+    marks.push_back(n * step);
+  return marks;
 }
 
 LinearColor divergingColor(double t) {
@@ -70,7 +105,7 @@ DistanceScale distanceScale(double minimum, double maximum) {
     scale.range = niceCeil(largest);
     // A section that one value fills has no span to draw lines over; then the range serves.
     const double span = maximum - minimum;
-    scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range);
+    scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range, kIsoLines);
   }
   return scale;
 }

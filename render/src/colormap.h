@@ -25,6 +25,38 @@ class LevelMap {
   std::array<LinearColor, 256> colors_;
 };
 
+/// From a quantity that is not negative to the ordered map: `low` and less is its dark end, `high` and more its light
+/// one.
+class ColorScale {
+ public:
+  /// low < high; above 0 when logarithmic.
+  ColorScale(double low, double high, bool logarithmic);
+
+  /// For values of which the least above 0 that counts and the greatest are given: whole powers of ten when logarithmic
+  /// (six of them at most), else from 0 to a number of one or two digits. Where nothing is above 0, up to 1.
+  static ColorScale around(double least, double greatest, bool logarithmic);
+
+  LinearColor operator()(double value) const { return table_[static_cast<std::size_t>(place(value) * kSteps + 0.5)]; }
+  /// 0 at `low`, 1 at `high`; 0 for NaN.
+  double place(double value) const;
+
+  double low() const { return low_; }
+  double high() const { return high_; }
+  bool logarithmic() const { return logarithmic_; }
+
+ private:
+  static constexpr int kSteps = 1024;
+  double low_, high_;
+  bool logarithmic_;
+  std::vector<LinearColor> table_;
+};
+
+/// Values to mark on a scale, ascending: powers of ten, where there are two of them, else some five even steps.
+std::vector<double> scaleMarks(const ColorScale& scale);
+
+/// The largest power of ten that is not above x > 0.
+double powerOfTenBelow(double x);
+
 /// The diverging map for distances: −1 deep blue (inside), 0 white, 1 deep red (outside).
 LinearColor divergingColor(double t);
 

@@ -251,6 +251,40 @@ void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScal
   }
 }
 
+void addScaleBar(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                 const ColorScale& scale) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  addTitle(furniture, column, titles, em);
+
+  const double left = std::round(column.left), right = left + std::round(1.7 * em);
+  const double top = std::round(column.top + 0.5 * em), bottom = std::round(column.bottom - 0.8 * em);
+  for (double y = top; y < bottom; ++y) {
+    const double place = 1 - (y + 0.5 - top) / (bottom - top);
+    furniture.boxes.push_back({left, y, right, y + 1, colorOf(orderedColor(place))});
+  }
+
+  const double size = std::min(em, 0.9 * em + 1), thin = std::max(1.0, em / 15);
+  double lastLabel = std::numeric_limits<double>::infinity();  // its baseline; going upwards
+  const auto mark = [&](double value, bool labelled) {
+    const double y = bottom - (bottom - top) * scale.place(value);
+    labelled = labelled && y + 1.6 * size <= lastLabel;
+    furniture.boxes.push_back({labelled ? left : right - 0.4 * em, y - 0.5 * thin, right + (labelled ? 0.35 * em : 0),
+                               y + 0.5 * thin, kTick});
+    const std::string label = value == 0 ? "0" : formatNumber(value, 3);
+    const double x = right + 0.6 * em;
+    if (!labelled || x + advanceOf(label, size) > column.right) return;
+    addText(furniture, label, size, x, y + capHeight(size) / 2, kInk);
+    lastLabel = y;
+  };
+  for (const double value : scaleMarks(scale)) mark(value, true);
+  if (!scale.logarithmic()) return;
+  for (double decade = powerOfTenBelow(scale.low()); decade < scale.high(); decade *= 10)
+    for (int digit = 2; digit < 10; ++digit)
+      if (digit * decade > scale.low() && digit * decade < scale.high()) mark(digit * decade, false);
+}
+
 void addAxes(Furniture& furniture, const Frame& frame, const PixelRect& section, char right, char up) {
   const double em = frame.textSize, size = std::max(kSmallestText, 0.85 * em), thin = std::max(1.0, em / 15);
   const double length = std::round(1.8 * em), gap = std::round(0.5 * em);

@@ -51,6 +51,10 @@ void addLevelLegend(Furniture& furniture, const Frame& frame, std::span<const st
 /// A vertical colour bar with the iso-lines of the picture and their values.
 void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScale& scale);
 
+/// A vertical colour bar of a quantity's scale, its high end on top, with marks at powers of ten or at even steps.
+void addScaleBar(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                 const ColorScale& scale);
+
 /// Which axes lie to the right and upwards: a pair of arrows left of the lower left corner of the slice's section with
 /// the domain, or below it, where the view is free there, else on a plate in that corner. Nothing where the section is
 /// too small for it.

@@ -11,6 +11,7 @@
 #include "color_view.h"
 #include "hpsdf/error.h"
 #include "legend.h"
+#include "quantity.h"
 
 namespace hpsdf::render {
 namespace {
@@ -142,6 +143,69 @@ LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatisti
   return map;
 }
 
+// What a quantity is called: the first that fits stands above its colour bar, the last in the caption.
+std::span<const std::string> titlesOf(ColorBy quantity) {
+  static const std::string valueJump[] = {"worst jump of the value", "jump of value", "value jump"};
+  static const std::string gradientJump[] = {"worst jump of the gradient", "jump of gradient", "gradient jump"};
+  static const std::string slope[] = {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"};
+  static const std::string error[] = {"error |f − exact|", "error"};
+  static const std::string cellError[] = {"estimated cell error", "cell error"};
+  switch (quantity) {
+    case ColorBy::valueJump:
+      return valueJump;
+    case ColorBy::gradientJump:
+      return gradientJump;
+    case ColorBy::slope:
+      return slope;
+    case ColorBy::error:
+      return error;
+    default:
+      return cellError;
+  }
+}
+
+void checkColor(ColorBy color, ColorBy inapplicable, const Evidence& evidence) {
+  if (color == inapplicable)
+    throw Error(color == ColorBy::normal ? "a slice has no normals to light: choose another colour"
+                                         : "distances are one and the same on a surface: choose another colour");
+  requireEvidence(color, evidence);
+}
+
+// A quantity of a view, and the scale of its colours.
+struct Measured {
+  std::vector<float> values;
+  ColorScale scale;
+};
+
+Measured measure(const Field& field, const ViewBuffers& buffers, const std::function<Vector3(int, int)>& pointAt,
+                 ColorBy quantity, const ScaleOptions& options, const Evidence& evidence) {
+  const std::vector<double> ofCells = quantityOfCells(field, quantity, evidence);
+  std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, evidence, ofCells);
+  const ColorScale scale = colorScale(options, ofCells, values);
+  return {std::move(values), scale};
+}
+
+std::string describeGreatest(const std::vector<float>& values) {
+  float greatest = -1;
+  for (const float value : values)
+    if (value > greatest) greatest = value;
+  return greatest < 0 ? "nothing shown" : "up to " + formatNumber(greatest, 3);
+}
+
+std::function<Vector3(int, int)> pointsOf(const SliceView& view, const ViewBuffers& buffers) {
+  return [&](int x, int y) -> Vector3 {
+    return view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
+  };
+}
+
+std::function<Vector3(int, int)> pointsOf(const SurfaceView& view, const ViewBuffers& buffers) {
+  return [&](int x, int y) -> Vector3 {
+    const Vector3 ray = view.camera.forward + view.camera.right * (2 * (x + 0.5) / buffers.width - 1) +
+                        view.camera.up * (1 - 2 * (y + 0.5) / buffers.height);
+    return view.camera.eye + ray.normalized() * buffers.distance[std::size_t(y) * buffers.width + x];
+  };
+}
+
 void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
   const std::pair<std::string, std::string> facts[] = {
@@ -175,8 +239,9 @@ SliceView sliceView(const Field& field, const SlicePicture& picture) {
   return sliceView(field, picture, view.width(), view.height());
 }
 
-Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) {
+Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence) {
   Frame frame = frameOf(picture);
+  checkColor(picture.color, ColorBy::normal, evidence);
   const SliceView view = sliceView(field, picture);
   const int samples = picture.samples;
   const ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
@@ -189,16 +254,21 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) 
   Furniture furniture;
   Image image(picture.width, picture.height, paperColor());
   std::vector<std::string> details;
-  if (picture.color == SliceColor::distance) {
+  if (picture.color == ColorBy::distance) {
     const DistanceScale scale = scaleOf(buffers);
     addDistanceBar(furniture, frame, scale);
     place(image, colorDistanceSlice(buffers, scale, sampling));
     details = {"distance", describePlane(picture), formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
                "lines every " + formatNumber(scale.step)};
+  } else if (isQuantity(picture.color)) {
+    const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
+    addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    place(image, colorCellSlice(buffers, quantityColors(measured.values, measured.scale), sampling));
+    details = {titlesOf(picture.color).back(), describePlane(picture), describeGreatest(measured.values)};
   } else {
-    const bool degree = picture.color == SliceColor::degree;
+    const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree);
-    place(image, colorLevelSlice(buffers, map, picture.color, sampling));
+    place(image, colorCellSlice(buffers, levelColors(buffers, map, picture.color), sampling));
     details = {degree ? "degree" : "depth", describePlane(picture)};
   }
   addAxesOf(furniture, frame, view, section);
@@ -209,12 +279,14 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture) 
   return image;
 }
 
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture) {
-  return drawSurface(renderer, field, picture).image;
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
+  return drawSurface(renderer, field, picture, evidence).image;
 }
 
-DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture) {
+DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
+                         const Evidence& evidence) {
   const Frame frame = frameOf(picture);
+  checkColor(picture.color, ColorBy::distance, evidence);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset};
   const ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
@@ -224,23 +296,45 @@ DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePi
   Image image(picture.width, picture.height, paperColor());
   for (int y = 0; y < height; ++y)
     std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
-  LevelMap map({});
-  if (picture.color == SurfaceColor::normal)
-    addFieldFacts(furniture, frame, field, figures);
-  else
-    map = addLevels(furniture, frame, figures, picture.color == SurfaceColor::degree);
-  place(image, colorSurface(buffers, view.camera, map, picture.color, samples));
-
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
-  static const char* const colors[] = {"", "degree on the ", "depth on the "};
-  const std::vector<std::string> details = {colors[static_cast<int>(picture.color)] + surface,
-                                            "camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
-                                                formatNumber(picture.camera.elevationDegrees) + "°",
-                                            formatCount(figures.leaves) + " cells", describeTarget(field)};
+  std::vector<std::string> details;
+  if (isQuantity(picture.color)) {
+    const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
+    addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    place(image, colorSurface(buffers, view.camera, quantityColors(measured.values, measured.scale), samples));
+    details = {titlesOf(picture.color).back() + " on the " + surface, describeGreatest(measured.values)};
+  } else if (picture.color == ColorBy::normal) {
+    addFieldFacts(furniture, frame, field, figures);
+    place(image, colorSurface(buffers, view.camera, {}, samples));
+    details = {surface};
+  } else {
+    const bool degree = picture.color == ColorBy::degree;
+    const LevelMap map = addLevels(furniture, frame, figures, degree);
+    place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), samples));
+    details = {(degree ? "degree on the " : "depth on the ") + surface};
+  }
+  details.push_back("camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
+                    formatNumber(picture.camera.elevationDegrees) + "°");
+  details.push_back(formatCount(figures.leaves) + " cells");
+  details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
   const bool seen = std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; });
   return {std::move(image), seen};
+}
+
+std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
+                              const Evidence& evidence) {
+  requireEvidence(quantity, evidence);
+  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
+                           quantityOfCells(field, quantity, evidence));
+}
+
+std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
+                              const Evidence& evidence) {
+  requireEvidence(quantity, evidence);
+  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
+                           quantityOfCells(field, quantity, evidence));
 }
 
 bool meetsWalls(const Field& field, double offset) {

@@ -550,6 +550,50 @@ TEST_F(Cli, rawSlicesHoldTheFieldsValues) {
   EXPECT_EQ(inside, values);
 }
 
+TEST_F(Cli, quantitiesColourSlicesAndSurfaces) {
+  for (const char* color : {"value-jump", "gradient-jump", "slope", "error", "cell-error"}) {
+    EXPECT_EQ(run({{"slice", field(), "-o", at("s.png"), "--color", color, "--cpu", "--size", "200x150"}}).status, 0);
+    EXPECT_EQ(run({{"render", field(), "-o", at("r.png"), "--color", color, "--cpu", "--size", "200x150"}}).status, 0);
+    EXPECT_GT(render::loadPng(at("s.png")).width, 0);
+  }
+  // raw values are what the field says
+  ASSERT_EQ(run({{"slice", field(), "-o", at("e.pfm"), "--color", "error", "--cpu", "--size", "16x16"}}).status, 0);
+  const std::string pfm = readFile(at("e.pfm"));
+  std::array<float, 256> values{};
+  ASSERT_GE(pfm.size(), sizeof values);
+  std::memcpy(values.data(), pfm.data() + pfm.size() - sizeof values, sizeof values);
+  float greatest = 0;
+  for (const float value : values) greatest = std::max(greatest, value);
+  EXPECT_GT(greatest, 1e-6F);
+  EXPECT_LT(greatest, 0.1F);
+
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--range", "1,2"}}, "range", namesIn(folder_.path()));
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--color", "slope", "--range", "2,1", "--cpu"}}, "range",
+                namesIn(folder_.path()));
+  expectRefused({{"render", field(), "-o", at("x.png"), "--color", "distance"}}, "normal", namesIn(folder_.path()));
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--mesh", "builtin:box"}}, "mesh", namesIn(folder_.path()));
+  const Outcome other =
+      run({{"slice", field(), "-o", at("x.png"), "--color", "error", "--mesh", "builtin:box", "--cpu"}});
+  EXPECT_EQ(other.status, 0);
+  EXPECT_THAT(other.err, HasSubstr("not what the field was made from"));
+}
+
+TEST_F(Cli, errorsNeedTheMeshUnlessItWasBuiltJustNow) {
+  writeFile(at("mesh.obj"), kTetrahedron);
+  const std::string build = "build " + at("mesh.obj") + " output=" + at("m.hpsdf") + " target-error=1e-4";
+  const std::string slice = "slice output=" + at("s.png") + " color=error size=100x80 cpu=true";
+  const Outcome together = run({{"run", "-e", build, "-e", slice}});
+  EXPECT_EQ(together.status, 0) << together.err;
+  const Outcome alone = run({{"slice", at("m.hpsdf"), "-o", at("a.png"), "--color", "error", "--cpu"}});
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_THAT(alone.err, HasSubstr("mesh=mesh.obj"));
+  EXPECT_EQ(run({{"slice", at("m.hpsdf"), "-o", at("a.png"), "--color", "error", "--cpu", "--size", "100x80", "--mesh",
+                  at("mesh.obj")}})
+                .status,
+            0);
+  EXPECT_EQ(readFile(at("a.png")), readFile(at("s.png")));
+}
+
 TEST_F(Cli, viewsThatShowLittleAreNoted) {
   const auto render = [&](const std::string& offset) {
     const Outcome outcome =

@@ -254,13 +254,13 @@ TEST(Arguments, picturesTakeThem) {
   ASSERT_TRUE(std::holds_alternative<render::AxisPlane>(slice.plane));
   EXPECT_EQ(std::get<render::AxisPlane>(slice.plane).axis, 1);
   EXPECT_EQ(std::get<render::AxisPlane>(slice.plane).offset, 0.5);
-  EXPECT_EQ(slice.color, render::SliceColor::distance);
+  EXPECT_EQ(slice.color, render::ColorBy::distance);
   EXPECT_EQ(slice.width, 64);
   EXPECT_EQ(slice.height, 48);
   EXPECT_EQ(slice.samples, 2);
   const auto surface = surfacePicture(parse("render", "f -o x.png --up z --color depth --offset 0.1"));
   EXPECT_EQ(surface.camera.up, render::UpAxis::z);
-  EXPECT_EQ(surface.color, render::SurfaceColor::depth);
+  EXPECT_EQ(surface.color, render::ColorBy::depth);
   EXPECT_EQ(surface.offset, 0.1);
   const render::OrbitCamera standard;
   EXPECT_EQ(surface.camera.azimuthDegrees, standard.azimuthDegrees);

@@ -1,5 +1,6 @@
 #include "colormap.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -109,6 +110,37 @@ TEST(LevelMap, SpreadsTheLevelsThatOccur) {
   EXPECT_EQ(map(9), orderedColor(1));
   EXPECT_EQ(map(3), LinearColor(1, 0, 1)) << "a level that does not occur must stand out";
   EXPECT_EQ(LevelMap(std::vector<int>{4})(4), orderedColor(0.5));
+}
+
+TEST(ColorScale, SpansPowersOfTenOrStartsAtZero) {
+  const ColorScale decades = ColorScale::around(3e-5, 0.02, true);
+  EXPECT_DOUBLE_EQ(decades.low(), 1e-5);
+  EXPECT_DOUBLE_EQ(decades.high(), 0.1);
+  EXPECT_NEAR(decades.place(1e-3), 0.5, 1e-12);
+  EXPECT_EQ(decades.place(0), 0);
+  EXPECT_EQ(decades.place(-1), 0);
+  EXPECT_EQ(decades.place(7), 1);
+  EXPECT_EQ(decades.place(std::numeric_limits<double>::quiet_NaN()), 0);
+  EXPECT_EQ(decades(1e-9), orderedColor(0));
+  EXPECT_EQ(decades(1e-3), orderedColor(0.5));
+  EXPECT_EQ(decades(5), orderedColor(1));
+  EXPECT_DOUBLE_EQ(ColorScale::around(1e-30, 1, true).low(), 1e-6) << "six decades at most";
+  EXPECT_DOUBLE_EQ(ColorScale::around(1, 1, true).low(), 0.1) << "one at least";
+
+  const ColorScale even = ColorScale::around(0.3, 0.37, false);
+  EXPECT_EQ(even.low(), 0);
+  EXPECT_DOUBLE_EQ(even.high(), 0.4);
+  EXPECT_NEAR(even.place(0.1), 0.25, 1e-12);
+  for (const bool logarithmic : {false, true}) EXPECT_EQ(ColorScale::around(0, 0, logarithmic).high(), 1);
+}
+
+TEST(ColorScale, MarksArePowersOfTenOrEvenSteps) {
+  using testing::DoubleNear;
+  using testing::Pointwise;
+  EXPECT_THAT(scaleMarks(ColorScale(1e-3, 1, true)), Pointwise(DoubleNear(1e-12), {1e-3, 1e-2, 1e-1, 1.0}));
+  EXPECT_THAT(scaleMarks(ColorScale(2e-3, 0.5, true)), Pointwise(DoubleNear(1e-12), {1e-2, 1e-1}));
+  EXPECT_THAT(scaleMarks(ColorScale(0, 0.4, false)), Pointwise(DoubleNear(1e-12), {0.0, 0.1, 0.2, 0.3, 0.4}));
+  EXPECT_THAT(scaleMarks(ColorScale(2, 6, true)), Pointwise(DoubleNear(1e-12), {2.0, 3.0, 4.0, 5.0, 6.0}));
 }
 
 TEST(DivergingMap, IsWhiteAtZeroAndDarkensAlike) {

@@ -1,5 +1,6 @@
 #include "hpsdf/render/picture.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -100,7 +101,7 @@ class FakeRenderer : public Renderer {
   const Field& field_;
 };
 
-SlicePicture slice(SliceColor color, int width = 640, int height = 360, int samples = 1) {
+SlicePicture slice(ColorBy color, int width = 640, int height = 360, int samples = 1) {
   return {AxisPlane{2, 0.5}, color, width, height, samples};
 }
 
@@ -137,7 +138,7 @@ TEST(Picture, DegreeSliceHasTheColorsOfItsCells) {
   FakeRenderer renderer(field);
   const LevelMap map(std::vector<int>{2, 3, 5});
   for (int samples : {1, 3}) {
-    const SlicePicture picture = slice(SliceColor::degree, 640, 360, samples);
+    const SlicePicture picture = slice(ColorBy::degree, 640, 360, samples);
     const Image image = draw(renderer, field, picture);
     EXPECT_EQ(image.width, 640);
     EXPECT_EQ(image.height, 360);
@@ -152,7 +153,7 @@ TEST(Picture, DegreeSliceHasTheColorsOfItsCells) {
 TEST(Picture, DepthSliceShowsDepths) {
   const Field field = planeField();
   FakeRenderer renderer(field);
-  const SlicePicture picture = slice(SliceColor::depth);
+  const SlicePicture picture = slice(ColorBy::depth);
   const Image image = draw(renderer, field, picture);
   EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), encodeSrgb(orderedColor(0)));
   EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(orderedColor(1)));
@@ -161,7 +162,7 @@ TEST(Picture, DepthSliceShowsDepths) {
 TEST(Picture, DistanceSliceIsBlueInsideRedOutsideAndDarkAtZero) {
   const Field field = planeField();
   FakeRenderer renderer(field);
-  const SlicePicture picture = slice(SliceColor::distance);
+  const SlicePicture picture = slice(ColorBy::distance);
   const Image image = draw(renderer, field, picture);
   EXPECT_LT(toOklab(decodeSrgb(colorAt(image, field, picture, {-0.77, 0.3, 0.5}))).b, -0.05);
   EXPECT_GT(toOklab(decodeSrgb(colorAt(image, field, picture, {0.77, 0.3, 0.5}))).a, 0.05);
@@ -176,7 +177,7 @@ TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
   picture.width = 640;
   picture.height = 360;
   std::set<std::vector<Color>> pictures;
-  for (SurfaceColor color : {SurfaceColor::normal, SurfaceColor::degree, SurfaceColor::depth}) {
+  for (ColorBy color : {ColorBy::normal, ColorBy::degree, ColorBy::depth}) {
     picture.color = color;
     const Image image = draw(renderer, field, picture);
     const ViewSize size = viewSize(640, 360);
@@ -190,7 +191,7 @@ TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
 TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {
   const Field field = planeField({2, 3, 5});
   FakeRenderer renderer(field);
-  SlicePicture picture = slice(SliceColor::degree);
+  SlicePicture picture = slice(ColorBy::degree);
   picture.plane = AxisPlane{2, -0.5};  // below the divided cell: no degree 5 in the section itself
   const Image image = draw(renderer, field, picture);
   const LevelMap map(std::vector<int>{2, 3, 5});
@@ -213,18 +214,18 @@ TEST(Picture, LegendNamesEachLevelAndItsShare) {
 TEST(Picture, AWrongFieldGivesAnotherPicture) {
   const Field right = planeField({2, 3, 5}), wrong = planeField({3, 2, 5});
   FakeRenderer ofRight(right), ofWrong(wrong);
-  const Image expected = draw(ofRight, right, slice(SliceColor::degree));
-  const Image actual = draw(ofWrong, wrong, slice(SliceColor::degree));
+  const Image expected = draw(ofRight, right, slice(ColorBy::degree));
+  const Image actual = draw(ofWrong, wrong, slice(ColorBy::degree));
   int different = 0;
   for (std::size_t i = 0; i < expected.pixels.size(); ++i) different += expected.pixels[i] != actual.pixels[i];
   EXPECT_GT(different, 40000);
-  EXPECT_EQ(draw(ofRight, right, slice(SliceColor::degree)).pixels, expected.pixels);
+  EXPECT_EQ(draw(ofRight, right, slice(ColorBy::degree)).pixels, expected.pixels);
 }
 
 TEST(Picture, MoreSamplesKeepTheAverageColor) {
   const Field field = planeField();
   FakeRenderer renderer(field);
-  for (SliceColor color : {SliceColor::degree, SliceColor::distance}) {
+  for (ColorBy color : {ColorBy::degree, ColorBy::distance}) {
     const auto meanOf = [&](int samples) {
       const Image image = draw(renderer, field, slice(color, 320, 240, samples));
       LinearColor sum = LinearColor::Zero();
@@ -240,13 +241,13 @@ TEST(Picture, TheRendererIsAskedForTheViewAlone) {
   for (const auto& [width, height] : {std::pair{64, 64}, {320, 240}, {640, 360}, {1280, 720}}) {
     const ViewSize size = viewSize(width, height);
     for (const Field* f : {&field, &other})
-      for (SliceColor color : {SliceColor::degree, SliceColor::distance}) {
+      for (ColorBy color : {ColorBy::degree, ColorBy::distance}) {
         FakeRenderer renderer(*f);
         draw(renderer, *f, slice(color, width, height, 2));
         EXPECT_EQ(renderer.lastWidth, 2 * size.width);
         EXPECT_EQ(renderer.lastHeight, 2 * size.height);
       }
-    const SliceView view = sliceView(field, slice(SliceColor::degree, width, height));
+    const SliceView view = sliceView(field, slice(ColorBy::degree, width, height));
     EXPECT_NEAR(view.right.norm() / size.width, view.up.norm() / size.height, 1e-12) << "pixels are not square";
   }
 }
@@ -270,11 +271,54 @@ TEST(Picture, SizesOutOfRangeAreRefusedBeforeAnythingIsDone) {
     surface.height = bad.height;
     surface.samples = bad.samples;
     for (const std::string& message :
-         {messageOf([&] { draw(renderer, field, slice(SliceColor::degree, bad.width, bad.height, bad.samples)); }),
+         {messageOf([&] { draw(renderer, field, slice(ColorBy::degree, bad.width, bad.height, bad.samples)); }),
           messageOf([&] { draw(renderer, field, surface); })})
       EXPECT_NE(message.find(bad.says), std::string::npos) << message;
   }
   EXPECT_EQ(renderer.calls, 0);
+}
+
+TEST(Picture, QuantitiesHaveTheColorsOfTheirScale) {
+  const Field field = planeField({2, 3, 5});
+  FakeRenderer renderer(field);
+  const Jumps jumps = findJumps(field);
+  const std::vector<double> ofCells = worstJumpOfCells(field, jumps, JumpKind::gradient);
+  const DistanceFunction exact([](const Vector3& x) { return x.x() - 0.2; });
+  SlicePicture picture = slice(ColorBy::error);
+  picture.scale = {.limits = {{1e-3, 10}}, .logarithmic = true};
+  const ColorScale scale(1e-3, 10, true);
+  const Image image = draw(renderer, field, picture, {nullptr, &exact});
+  for (const Vector3& point : {Vector3(-0.63, 0.31, 0.5), Vector3(0.57, -0.41, 0.5)}) {
+    const double error = std::abs(field.value(point) - (point.x() - 0.2));
+    const Color expected = encodeSrgb(scale(error)), shown = colorAt(image, field, picture, point);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(shown[i], expected[i], 3);
+  }
+  picture.scale.limits = {{1e-4, 1}};
+  EXPECT_NE(draw(renderer, field, picture, {nullptr, &exact}).pixels, image.pixels) << "another scale, other colours";
+
+  picture = slice(ColorBy::gradientJump);
+  picture.scale = {.limits = {{0, 5}}, .logarithmic = false};
+  const Image ofJumps = draw(renderer, field, picture, {&jumps, nullptr});
+  const Vector3 point(-0.63, 0.31, 0.5);
+  EXPECT_EQ(colorAt(ofJumps, field, picture, point),
+            encodeSrgb(ColorScale(0, 5, false)(float(ofCells[field.cellAt(point).id]))));
+}
+
+TEST(Picture, ColorsWithoutTheirEvidenceOrOnTheWrongViewAreRefused) {
+  const Field field = planeField({2, 3, 5});
+  FakeRenderer renderer(field);
+  const auto refusal = [&](const auto& picture) { return messageOf([&] { draw(renderer, field, picture); }); };
+  EXPECT_THAT(refusal(slice(ColorBy::valueJump)), testing::HasSubstr("jumps"));
+  EXPECT_THAT(refusal(slice(ColorBy::error)), testing::HasSubstr("exact"));
+  EXPECT_THAT(refusal(slice(ColorBy::normal)), testing::HasSubstr("slice"));
+  SurfacePicture surface;
+  surface.color = ColorBy::distance;
+  EXPECT_THAT(refusal(surface), testing::HasSubstr("surface"));
+  for (const std::array<double, 2> limits : {std::array{1.0, 1.0}, std::array{2.0, 1.0}, std::array{0.0, 1.0}}) {
+    SlicePicture picture = slice(ColorBy::slope);
+    picture.scale.limits = limits;
+    EXPECT_THAT(refusal(picture), testing::HasSubstr("range"));
+  }
 }
 
 TEST(Picture, EverySizeIsDrawn) {
@@ -290,7 +334,7 @@ TEST(Picture, EverySizeIsDrawn) {
                                       {300, 1000},
                                       {1023, 517},
                                       {4096, 2160}}) {
-    for (SliceColor color : {SliceColor::degree, SliceColor::depth, SliceColor::distance})
+    for (ColorBy color : {ColorBy::degree, ColorBy::depth, ColorBy::distance, ColorBy::slope, ColorBy::cellError})
       EXPECT_EQ(draw(renderer, field, slice(color, width, height)).pixels.size(), std::size_t(width) * height);
     SurfacePicture picture;
     picture.width = width;
@@ -363,6 +407,15 @@ TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
       addCaption(furniture, f, count % 2 ? longName : "bunny.obj", details);
       expectTidy(furniture, f, size + ", " + std::to_string(count) + " levels");
     }
+    for (double high : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9})
+      for (double ratio : {1e-6, 0.02, 0.7})
+        for (bool logarithmic : {false, true}) {
+          Furniture furniture;
+          addScaleBar(furniture, f, titles, ColorScale(ratio * high, high, logarithmic));
+          expectTidy(furniture, f, size + ", scale up to " + std::to_string(high));
+          if (f.panel.empty() || f.panel.height() < 100) continue;
+          EXPECT_GE(furniture.texts.size(), 3U) << size << ": hardly a number beside the scale up to " << high;
+        }
     for (double range : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9}) {
       Furniture furniture;
       addDistanceBar(furniture, f, distanceScale(-0.3 * range, range));
@@ -532,14 +585,14 @@ TEST(Picture, SlicesAlongAnAxisNameTheAxesAcross) {
         << (axes == nullptr ? "none" : axes);
   };
   for (int axis = 0; axis < 3; ++axis) {
-    SlicePicture picture = slice(SliceColor::degree);
+    SlicePicture picture = slice(ColorBy::degree);
     picture.plane = AxisPlane{axis, 0.5};
     expectAxes(picture, names[axis]);
-    picture.color = SliceColor::distance;
+    picture.color = ColorBy::distance;
     picture.plane = FreePlane{Vector3(0.1, 0.2, 0.3), Vector3::Unit(axis)};
     expectAxes(picture, names[axis]);
   }
-  SlicePicture oblique = slice(SliceColor::degree);
+  SlicePicture oblique = slice(ColorBy::degree);
   oblique.plane = FreePlane{Vector3::Zero(), Vector3(1, 1, 1)};
   expectAxes(oblique, nullptr);
 }

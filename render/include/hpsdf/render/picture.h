@@ -1,19 +1,49 @@
 #pragma once
 // From a field to a finished picture: view, buffers, colours, legend, caption.
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
+#include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
+#include "hpsdf/jumps.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
 
-enum class SliceColor : std::uint8_t { degree, depth, distance };
-enum class SurfaceColor : std::uint8_t { normal, degree, depth };
+/// What the colours of a view mean.
+enum class ColorBy : std::uint8_t {
+  normal,    ///< nothing: a lit surface; not for slices
+  degree,    ///< of the cell
+  depth,     ///< of the cell
+  distance,  ///< f; not for surfaces
+  // quantities: not negative, on a scale from dark to light
+  valueJump,     ///< greatest jump of f at the cell's faces; needs `Evidence::jumps`
+  gradientJump,  ///< the same of the gradient
+  slope,         ///< how far |∇f| is from 1 at the point
+  error,         ///< |f − Φ| at the point; needs `Evidence::exact`
+  cellError,     ///< estimated RMS error of the cell: √(ε_e / its volume), without nearness
+};
+constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
+
+/// What some quantities are known by. What is referred to must live while a picture is drawn.
+struct Evidence {
+  const Jumps* jumps = nullptr;
+  const DistanceFunction* exact = nullptr;
+};
+
+/// Of a quantity: which values the darkest and the lightest colour stand for. Without limits they are chosen from the
+/// values: of all cells where the quantity is a cell's, else of the points shown.
+struct ScaleOptions {
+  std::optional<std::array<double, 2>> limits = {};  ///< ascending; above 0 on a logarithmic scale
+  bool logarithmic = true;
+};
 
 struct AxisPlane {
   int axis = 2;
@@ -26,34 +56,44 @@ struct FreePlane {
 
 struct SlicePicture {
   std::variant<AxisPlane, FreePlane> plane = AxisPlane{};
-  SliceColor color = SliceColor::degree;
+  ColorBy color = ColorBy::degree;
   int width = 1280;  ///< of the whole picture, legend included
   int height = 720;
   int samples = 1;  ///< an axis and pixel, 1 to 8
+  ScaleOptions scale = {};
 };
 
 struct SurfacePicture {
   OrbitCamera camera;
   double offset = 0;
-  SurfaceColor color = SurfaceColor::normal;
+  ColorBy color = ColorBy::normal;
   int width = 1280;
   int height = 720;
   int samples = 1;
+  ScaleOptions scale = {};
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
 /// the whole field, so that colours keep their meaning from slice to slice.
 /// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8; no more than 64 Mi samples in
-/// all), before memory is taken.
-Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture);
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture);
+/// all), before memory is taken; for colours that are not for such a view or whose evidence is missing; for limits that
+/// make no scale.
+Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
 /// The same picture, and whether any of its pixels shows the surface.
 struct DrawnSurface {
   Image image;
   bool seen = false;
 };
-DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture);
+DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
+                         const Evidence& evidence = {});
+
+/// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.
+std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
+                              const Evidence& evidence);
+std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
+                              const Evidence& evidence);
 
 /// Whether the surface f = offset meets the walls of the domain, where tracing cuts it off. Judged by the sign at
 /// 40 × 40 points of each wall: a piece that is smaller than their distance may pass for none.

@@ -1,0 +1,87 @@
+#include "quantity.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "hpsdf/render/renderer.h"
+#include "support/random_field.h"
+
+namespace hpsdf::render {
+namespace {
+
+struct Seen {
+  Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
+  Jumps jumps = findJumps(field);
+  DistanceFunction exact{[](const Vector3& x) { return x.norm() - 0.5; }};
+  Evidence evidence{&jumps, &exact};
+};
+
+Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
+  return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
+}
+
+TEST(Quantity, OfASliceIsThatOfItsPoints) {
+  const Seen seen;
+  const SliceView view = planeSlice(seen.field.domain(), {0.1, 0, 0.05}, {1, 2, 3}, 60, 40);
+  const ViewBuffers buffers = makeCpuRenderer(seen.field)->slice(view, 60, 40);
+  const auto at = [&](ColorBy quantity) { return quantityAt(seen.field, view, buffers, quantity, seen.evidence); };
+  const auto valueJump = at(ColorBy::valueJump), gradientJump = at(ColorBy::gradientJump), slope = at(ColorBy::slope),
+             error = at(ColorBy::error), cellError = at(ColorBy::cellError);
+  const auto worstValue = worstJumpOfCells(seen.field, seen.jumps, JumpKind::value);
+  const auto worstGradient = worstJumpOfCells(seen.field, seen.jumps, JumpKind::gradient);
+  int hits = 0, misses = 0;
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 60; ++x) {
+      const std::size_t i = std::size_t(y) * 60 + x;
+      if (!buffers.hit(i)) {
+        ++misses;
+        for (const auto* values : {&valueJump, &gradientJump, &slope, &error, &cellError})
+          EXPECT_TRUE(std::isnan((*values)[i]));
+        continue;
+      }
+      ++hits;
+      const Vector3 point = pointOf(view, x, y, 60, 40);
+      const Cell cell = seen.field.cellAt(point);
+      ASSERT_EQ(cell.id, buffers.cell[i]);
+      const auto [value, gradient] = seen.field.valueAndGradient(point);
+      EXPECT_EQ(valueJump[i], float(worstValue[cell.id]));
+      EXPECT_EQ(gradientJump[i], float(worstGradient[cell.id]));
+      EXPECT_FLOAT_EQ(slope[i], float(std::abs(gradient.norm() - 1)));
+      EXPECT_FLOAT_EQ(error[i], float(std::abs(value - (point.norm() - 0.5))));
+      EXPECT_FLOAT_EQ(cellError[i], float(std::sqrt(cell.error / cell.box.volume())));
+    }
+  EXPECT_GT(hits, 500);
+  EXPECT_GT(misses, 50);
+}
+
+TEST(Quantity, OfASurfaceIsThatOfItsHits) {
+  const Seen seen;
+  const SurfaceView view{pinhole({}, seen.field.domain(), 50, 50), 0};
+  const ViewBuffers buffers = makeCpuRenderer(seen.field)->surface(view, 50, 50);
+  const auto error = quantityAt(seen.field, view, buffers, ColorBy::error, seen.evidence);
+  int hits = 0;
+  for (std::size_t i = 0; i < error.size(); ++i) {
+    if (!buffers.hit(i)) continue;
+    ++hits;
+    const auto x = static_cast<int>(i % 50), y = static_cast<int>(i / 50);
+    const Vector3 ray =
+        view.camera.forward + view.camera.right * (2 * (x + 0.5) / 50 - 1) + view.camera.up * (1 - 2 * (y + 0.5) / 50);
+    const Vector3 hit = view.camera.eye + ray.normalized() * buffers.distance[i];
+    EXPECT_FLOAT_EQ(error[i], float(std::abs(seen.field.value(hit) - (hit.norm() - 0.5))));
+  }
+  EXPECT_GT(hits, 200);
+}
+
+TEST(Quantity, TheScaleFollowsTheCellsOrThePointsOrWhatIsAsked) {
+  const std::vector<double> cells = {0, 2e-4, 3e-2};
+  const std::vector<float> samples = {1e-3F, 0.5F, std::numeric_limits<float>::quiet_NaN()};
+  EXPECT_DOUBLE_EQ(colorScale({}, cells, samples).low(), 1e-4);
+  EXPECT_DOUBLE_EQ(colorScale({}, cells, samples).high(), 0.1);
+  EXPECT_DOUBLE_EQ(colorScale({}, {}, samples).high(), 1);
+  EXPECT_EQ(colorScale({.limits = {{2, 3}}}, cells, samples).low(), 2);
+  EXPECT_EQ(colorScale({.logarithmic = false}, cells, samples).low(), 0);
+}
+
+}  // namespace
+}  // namespace hpsdf::render
