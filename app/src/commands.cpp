@@ -9,6 +9,7 @@ Registry makeRegistry() {
   addFieldCommands(registry);
   addJumpsCommand(registry);
   addPictureCommands(registry);
+  addFigureCommands(registry);
   addReportCommand(registry);
   addToolCommands(registry);
   return registry;

@@ -98,7 +98,8 @@ void runSlice(Session& session, const Arguments& arguments) {
   if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
     plane->offset = defaultOffset(field.domain(), plane->axis);
   if (format == SliceFormat::png) {
-    savePng(render::draw(renderer, field, picture, evidence), file);
+    session.setPicture(render::drawSlice(renderer, field, picture, evidence));
+    savePng(session.picture().image, file);
   } else {
     const render::SliceView view = render::sliceView(field, picture, picture.width, picture.height);
     const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
@@ -136,9 +137,9 @@ void runRender(Session& session, const Arguments& arguments) {
       session.evidence(picture.color, arguments.given("mesh") ? arguments.text("mesh") : "");
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  const render::DrawnSurface drawn = render::drawSurface(renderer, field, picture, evidence);
-  savePng(drawn.image, file);
-  noteOddSurface(session.console(), field, picture.offset, drawn.seen);
+  session.setPicture(render::drawSurface(renderer, field, picture, evidence));
+  savePng(session.picture().image, file);
+  noteOddSurface(session.console(), field, picture.offset, session.picture().seen);
   report(session, arguments, picture.width, picture.height, renderer);
 }
 

@@ -311,7 +311,9 @@ class ArgumentReader {
 };
 
 Arguments parseArguments(const Command& command, std::span<const Word> words, Origin origin) {
-  return ArgumentReader(command, words, origin).read();
+  Arguments arguments = ArgumentReader(command, words, origin).read();
+  if (command.check) command.check(arguments);
+  return arguments;
 }
 
 const Arguments::Entry& Arguments::entry(std::string_view name) const {

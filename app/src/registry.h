@@ -91,6 +91,8 @@ struct Command {
   std::vector<std::string> examples = {};  ///< as typed in a shell; of script verbs, script lines
   std::vector<Parameter> parameters = {};
   std::function<void(Session&, const Arguments&)> action = {};
+  /// What of the arguments the parameters' types cannot tell: throws `Error`. Of a script, before its first line runs.
+  std::function<void(const Arguments&)> check = {};
   bool scriptOnly = false;
   bool takesVariables = false;    ///< positional `name=value` words are its own, not options
   bool definesVariables = false;  ///< and define variables for the rest of the script (`assignments`)

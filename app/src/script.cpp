@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "expectation.h"
 #include "hpsdf/error.h"
 #include "hpsdf/nearest_name.h"
 #include "session.h"
@@ -202,6 +203,8 @@ void runScript(Session& session, const std::vector<Call>& calls) {
   for (const Call& call : calls) {
     try {
       perform(*call.command, session, call.arguments);
+    } catch (const ExpectationFailed& error) {
+      throw ExpectationFailed(call.where + ": " + error.what());
     } catch (const Error& error) {
       throw Error(call.where + ": " + error.what());
     }

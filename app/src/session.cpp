@@ -12,6 +12,7 @@ void Session::setField(CurrentField field) {
   renderer_.reset();
   jumps_.reset();
   exact_.reset();
+  picture_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
 }
 
@@ -37,6 +38,11 @@ const DistanceFunction& Session::exact(const std::string& surface) {
   exact_ = exactDistance(console_, surface.empty() ? source.name : surface, source);
   exactSurface_ = surface;
   return *exact_;
+}
+
+const render::Drawn& Session::picture() const {
+  if (!picture_) throw Error("there is no picture yet; 'slice' or 'render' comes first");
+  return *picture_;
 }
 
 render::Evidence Session::evidence(render::ColorBy color, const std::string& surface) {

@@ -66,6 +66,10 @@ class Session {
   const DistanceFunction& exact(const std::string& surface);
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
 
+  /// The last picture drawn of the current field. Throws `Error` when there is none.
+  const render::Drawn& picture() const;
+  void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
+
   /// What pictures with these colours need.
   render::Evidence evidence(render::ColorBy color, const std::string& surface);
 
@@ -78,6 +82,7 @@ class Session {
   bool json_ = false;
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
+  std::optional<render::Drawn> picture_;
   std::shared_ptr<const DistanceFunction> exact_;
   std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
   std::unique_ptr<render::Renderer> renderer_;

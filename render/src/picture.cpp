@@ -192,18 +192,19 @@ std::string describeGreatest(const std::vector<float>& values) {
   return greatest < 0 ? "nothing shown" : "up to " + formatNumber(greatest, 3);
 }
 
-std::function<Vector3(int, int)> pointsOf(const SliceView& view, const ViewBuffers& buffers) {
-  return [&](int x, int y) -> Vector3 {
-    return view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
-  };
+Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y) {
+  return view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
 }
 
-std::function<Vector3(int, int)> pointsOf(const SurfaceView& view, const ViewBuffers& buffers) {
-  return [&](int x, int y) -> Vector3 {
-    const Vector3 ray = view.camera.forward + view.camera.right * (2 * (x + 0.5) / buffers.width - 1) +
-                        view.camera.up * (1 - 2 * (y + 0.5) / buffers.height);
-    return view.camera.eye + ray.normalized() * buffers.distance[std::size_t(y) * buffers.width + x];
-  };
+Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
+  const Vector3 ray = view.camera.forward + view.camera.right * (2 * (x + 0.5) / buffers.width - 1) +
+                      view.camera.up * (1 - 2 * (y + 0.5) / buffers.height);
+  return view.camera.eye + ray.normalized() * buffers.distance[std::size_t(y) * buffers.width + x];
+}
+
+template <typename View>
+std::function<Vector3(int, int)> pointsOf(const View& view, const ViewBuffers& buffers) {
+  return [&](int x, int y) { return pointAt(view, buffers, x, y); };
 }
 
 void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field, const FieldStatistics& figures) {
@@ -240,11 +241,15 @@ SliceView sliceView(const Field& field, const SlicePicture& picture) {
 }
 
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence) {
+  return drawSlice(renderer, field, picture, evidence).image;
+}
+
+Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence) {
   Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::normal, evidence);
   const SliceView view = sliceView(field, picture);
   const int samples = picture.samples;
-  const ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
+  ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
   const PixelRect section = sectionOf(buffers, samples);
   moveBeside(frame, section);
   const double sampleSize = view.right.norm() / buffers.width;
@@ -276,20 +281,19 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, 
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
-  return image;
+  return {std::move(image), view, std::move(buffers), samples, !section.empty()};
 }
 
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
   return drawSurface(renderer, field, picture, evidence).image;
 }
 
-DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
-                         const Evidence& evidence) {
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset};
-  const ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
+  ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
   const FieldStatistics figures = statistics(field);
 
   Furniture furniture;
@@ -320,7 +324,7 @@ DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePi
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
   const bool seen = std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; });
-  return {std::move(image), seen};
+  return {std::move(image), view, std::move(buffers), samples, seen};
 }
 
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
@@ -335,6 +339,21 @@ std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const
   requireEvidence(quantity, evidence);
   return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
                            quantityOfCells(field, quantity, evidence));
+}
+
+std::optional<Pick> pickAt(const Drawn& drawn, int x, int y) {
+  const Image& image = drawn.image;
+  if (x < 0 || y < 0 || x >= image.width || y >= image.height)
+    throw Error("pixel " + std::to_string(x) + "," + std::to_string(y) + " lies outside of the picture of " +
+                std::to_string(image.width) + "x" + std::to_string(image.height));
+  const ViewBuffers& buffers = drawn.buffers;
+  const int column = x * drawn.samples + drawn.samples / 2, row = y * drawn.samples + drawn.samples / 2;
+  if (column >= buffers.width || row >= buffers.height) return std::nullopt;
+  const std::size_t i = std::size_t(row) * buffers.width + column;
+  if (!buffers.hit(i)) return std::nullopt;
+  const Vector3 position =
+      std::visit([&](const auto& view) { return pointAt(view, buffers, column, row); }, drawn.view);
+  return Pick{position, buffers.cell[i], buffers.degree[i], buffers.depth[i], buffers.value[i]};
 }
 
 bool meetsWalls(const Field& field, double offset) {

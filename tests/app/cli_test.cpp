@@ -658,6 +658,72 @@ TEST_F(Cli, scriptsRunScripts) {
   expectRefused({.words = {"run", "loop.hps"}, .folder = folder_.path()}, "does one run itself?");
 }
 
+TEST_F(Cli, expectationsHoldOrEndTheScript) {
+  const Json info = Json::parse(run({{"info", field(), "--json"}}).out);
+  const std::string leaves = std::to_string(info.at("leaves").get<int>());
+  writeFile(at("s.hps"), "load \"" + field() + "\"\nexpect stats.leaves == " + leaves +
+                             "\nexpect jumps.max > 0; expect jumps.max < 1\n"
+                             "slice axis=z cpu=true size=320x240 output=" +
+                             at("s.png") +
+                             "\nexpect pick(100,100).degree >= 1\nexpect at(0,0,0.1).error == 0 within 0.1\n");
+  const Outcome good = run({{"run", at("s.hps")}});
+  EXPECT_EQ(good.status, 0) << good.err;
+
+  writeFile(at("bad.hps"), "load \"" + field() + "\"\nslice cpu=true size=64x48 output=" + at("kept.png") +
+                               "\n  expect stats.leaves < 3\nslice cpu=true output=" + at("never.png"));
+  const Outcome failed = run({{"run", at("bad.hps")}});
+  EXPECT_EQ(failed.status, 1);
+  EXPECT_THAT(failed.err, HasSubstr("bad.hps:3:3: expected stats.leaves < 3, found " + leaves));
+  EXPECT_TRUE(fs::exists(at("kept.png")));
+  EXPECT_FALSE(fs::exists(at("never.png")));
+
+  const auto complaint = [&](const std::string& line) {
+    const Outcome outcome = run({{"run", "-e", "load \"" + field() + "\"; " + line}});
+    EXPECT_EQ(outcome.status, 2) << line;
+    return outcome.err;
+  };
+  EXPECT_THAT(complaint("expect stats.leafs < 3"), HasSubstr("did you mean 'leaves'?"));
+  EXPECT_THAT(complaint("expect stats.mesh < 3"), HasSubstr("no number"));
+  EXPECT_THAT(complaint("expect pick(3,4).degree == 3"), HasSubstr("no picture yet"));
+  EXPECT_THAT(complaint("slice cpu=true size=64x48 output=" + at("p.png") + "; pick 64,3"),
+              HasSubstr("outside of the picture"));
+  // a mistake in the last line shows before the first has run
+  EXPECT_THAT(complaint("slice output=" + at("unseen.png") + "; expect stat.leaves < 3"), HasSubstr("'stats'"));
+  EXPECT_FALSE(fs::exists(at("unseen.png")));
+}
+
+/// What a pixel of a picture shows is what the field says there.
+TEST_F(Cli, picksAgreeWithQueries) {
+  HPSDF_REQUIRE_GL();
+  const Field torus = load(field());
+  for (const char* look : {"slice axis=z offset=0.05 color=degree", "slice plane=0,0,0,1,2,3 color=distance samples=2",
+                           "render camera=40,30,1", "slice axis=x cpu=true"}) {
+    const std::string backend = std::string(look).find("cpu") == std::string::npos ? " gl=software" : "";
+    std::string script = "load \"" + field() + "\"\n" + look + backend + " size=320x240 output=" + at("p.png") + "\n";
+    for (int n = 0; n < 200; ++n)
+      script += "pick " + std::to_string(n * 37 % 260) + "," + std::to_string(n * 53 % 200) + "\n";
+    writeFile(at("picks.hps"), script);
+    const Outcome outcome = run({{"run", "--json", at("picks.hps")}});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    std::istringstream documents(outcome.out);
+    int hits = 0, odd = 0;
+    Json pick;
+    for (int document = 0; document < 202; ++document) {
+      pick.clear();
+      documents >> pick;
+      if (!pick.is_object() || !pick.contains("cell")) continue;
+      ++hits;
+      const Vector3 x(pick["position"][0], pick["position"][1], pick["position"][2]);
+      EXPECT_NEAR(pick["value"].get<double>(), torus.value(x), 1e-5);
+      const Cell cell = torus.cellAt(x);
+      odd += pick["cell"] != cell.id || pick["degree"] != cell.degree || pick["depth"] != cell.depth;
+    }
+    EXPECT_GT(hits, 60) << look;
+    // the hit of a ray is rounded and may lie on the other side of a face; points of a slice are exact
+    EXPECT_LE(odd, std::string(look).starts_with("render") ? hits / 50 : 0) << look;
+  }
+}
+
 TEST_F(Cli, scriptMistakesAreRefused) {
   writeFile(at("s.hps"), "load \"" + field() + "\"\nslice colour=degree output=x.png\n");
   expectRefused({.words = {"run", "s.hps"}, .folder = folder_.path()},

@@ -616,7 +616,7 @@ TEST(Surface, SaysWhetherItIsSeen) {
   const auto renderer = makeCpuRenderer(field);
   SurfacePicture picture;
   picture.width = picture.height = 64;
-  const DrawnSurface drawn = drawSurface(*renderer, field, picture);
+  const Drawn drawn = drawSurface(*renderer, field, picture);
   EXPECT_TRUE(drawn.seen);
   EXPECT_EQ(drawn.image.pixels, draw(*renderer, field, picture).pixels);
   picture.offset = 5;

@@ -81,13 +81,28 @@ struct SurfacePicture {
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
-/// The same picture, and whether any of its pixels shows the surface.
-struct DrawnSurface {
+/// A finished picture and the view in its upper left corner.
+struct Drawn {
   Image image;
-  bool seen = false;
+  std::variant<SliceView, SurfaceView> view;
+  ViewBuffers buffers;  ///< samples × samples for each pixel
+  int samples = 1;
+  bool seen = false;  ///< whether any pixel shows the field
 };
-DrawnSurface drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
-                         const Evidence& evidence = {});
+Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
+
+/// What a pixel of a picture shows, at its middle sample.
+struct Pick {
+  Vector3 position;    ///< world units
+  std::uint32_t cell;  ///< `Cell::id`
+  int degree, depth;
+  double value;  ///< f as the renderer has it; on a surface the offset but for rounding
+};
+
+/// Nothing where the pixel shows no part of the field: paper, backdrop, legend. Throws `Error` for a pixel outside of
+/// the picture.
+std::optional<Pick> pickAt(const Drawn& drawn, int x, int y);
 
 /// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
