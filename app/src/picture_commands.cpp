@@ -208,6 +208,24 @@ constexpr std::pair<std::string_view, ColorBy> kColors[] = {
     {"distance", ColorBy::distance}, {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
     {"slope", ColorBy::slope},       {"error", ColorBy::error},          {"cell-error", ColorBy::cellError}};
 
+struct NamedView {
+  std::string_view name;
+  double azimuthDegrees, elevationDegrees;
+};
+constexpr NamedView kViews[] = {{"front", 0, 0},
+                                {"back", 180, 0},
+                                {"left", -90, 0},
+                                {"right", 90, 0},
+                                {"top", 0, 90},
+                                {"bottom", 0, -90},
+                                {"corner", 45, 35.264389682754654}};
+
+std::vector<std::string> viewNames() {
+  std::vector<std::string> names;
+  for (const NamedView& view : kViews) names.emplace_back(view.name);
+  return names;
+}
+
 std::vector<std::string> colorNames(ColorBy without) {
   std::vector<std::string> names;
   for (const auto& [name, color] : kColors)
@@ -296,6 +314,16 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   picture.camera.azimuthDegrees = camera[0];
   picture.camera.elevationDegrees = camera[1];
   picture.camera.distance = camera[2];
+  if (arguments.given("view")) {
+    if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
+    const NamedView& view = *std::ranges::find(kViews, arguments.text("view"), &NamedView::name);
+    picture.camera.azimuthDegrees = view.azimuthDegrees;
+    picture.camera.elevationDegrees = view.elevationDegrees;
+  }
+  if (arguments.given("target")) {
+    const auto target = arguments.numbers("target");
+    picture.camera.target = Vector3(target[0], target[1], target[2]);
+  }
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
   picture.color = colorNamed(arguments.text("color"));
@@ -361,7 +389,8 @@ void addPictureCommands(Registry& registry) {
                "shrink it. The camera circles the centre of the domain.",
        .examples = {"hpsdf render bunny.hpsdf -o surface.png",
                     "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
-                    "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4"},
+                    "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
+                    "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
        .parameters =
            {fieldParameter(),
             {.name = "output", .type = ParameterType::outputPath, .help = "*.png.", .alias = 'o', .need = Need::always},
@@ -371,6 +400,18 @@ void addPictureCommands(Registry& registry) {
                      "the domain.",
              .defaultText = "30,20,1.1",
              .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+             .counts = {3}},
+            {.name = "view",
+             .type = ParameterType::choice,
+             .help = "A named direction instead of camera: front looks along -z (with z up: along y), right from +x, "
+                     "corner along a diagonal of the cube.",
+             .choices = viewNames()},
+            {.name = "target",
+             .type = ParameterType::numbers,
+             .help = "The point in the picture's middle, which the camera circles; the domain's centre when left out. "
+                     "With a small distance in camera, a close look at it.",
+             .valueName = "X,Y,Z",
+             .unit = "world units",
              .counts = {3}},
             {.name = "up",
              .type = ParameterType::choice,

@@ -12,6 +12,7 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr double kRedrawSeconds = 0.1;
 constexpr double kQuietSeconds = 10;
+constexpr double kQuickSeconds = 0.3;  // work that ends sooner needs no words
 constexpr int kBarCells = 24;
 constexpr std::string_view kEraseLine = "\r\x1b[K";
 
@@ -32,7 +33,7 @@ ProgressLine::~ProgressLine() {
 }
 
 bool ProgressLine::due(double fraction, Clock::time_point now) const {
-  if (!drawn_) return true;
+  if (!drawn_) return Seconds(now - start_).count() >= kQuickSeconds;
   const double quiet = Seconds(now - lastDrawn_).count();
   if (redraws_) return quiet >= kRedrawSeconds;
   return quiet >= kQuietSeconds || static_cast<int>(fraction * 4) > lastQuarter_;

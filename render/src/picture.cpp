@@ -318,7 +318,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     details = {(degree ? "degree on the " : "depth on the ") + surface};
   }
   details.push_back("camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
-                    formatNumber(picture.camera.elevationDegrees) + "°");
+                    formatNumber(picture.camera.elevationDegrees) + "°" +
+                    (picture.camera.target ? " at " + formatVector(*picture.camera.target) : ""));
   details.push_back(formatCount(figures.leaves) + " cells");
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);

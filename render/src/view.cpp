@@ -135,7 +135,9 @@ Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int hei
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
   const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
   Pinhole result;
-  result.eye = domain.center() + camera.distance * domain.diagonal().norm() * towardsEye;
+  const Vector3 target = camera.target.value_or(domain.center());
+  checkRange("target", target.sum(), target.allFinite(), "three finite coordinates");
+  result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
   result.forward = -towardsEye;
   result.right = right * (halfHeight * width / height);
   result.up = up * halfHeight;

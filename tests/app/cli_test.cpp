@@ -578,6 +578,22 @@ TEST_F(Cli, quantitiesColourSlicesAndSurfaces) {
   EXPECT_THAT(other.err, HasSubstr("not what the field was made from"));
 }
 
+TEST_F(Cli, viewsAreNamedOrAimed) {
+  const auto surface = [&](const std::vector<std::string>& words) {
+    std::vector<std::string> all = {"render", field(), "-o", at("v.png"), "--cpu", "--size", "120x90"};
+    all.insert(all.end(), words.begin(), words.end());
+    const Outcome outcome = run({all});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return readFile(at("v.png"));
+  };
+  EXPECT_EQ(surface({"--view", "left"}), surface({"--camera=-90,0,1.1"}));
+  EXPECT_EQ(surface({"--view", "top", "--up", "z"}), surface({"--camera", "0,90,1.1", "--up", "z"}));
+  EXPECT_NE(surface({"--view", "left"}), surface({"--view", "top"}));
+  EXPECT_NE(surface({"--target", "0.5,0,0"}), surface({}));
+  expectRefused({{"render", field(), "-o", at("x.png"), "--view", "left", "--camera", "0,0,1"}}, "camera", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--view", "lefd"}}, "left", {"v.png"});
+}
+
 TEST_F(Cli, errorsNeedTheMeshUnlessItWasBuiltJustNow) {
   writeFile(at("mesh.obj"), kTetrahedron);
   const std::string build = "build " + at("mesh.obj") + " output=" + at("m.hpsdf") + " target-error=1e-4";
@@ -979,7 +995,8 @@ TEST(Progress, aPipeGetsALineAQuarterAndEveryTenSeconds) {
   };
   {
     ProgressLine line(out, false, start);
-    line.report("refining", 0, after(0));
+    line.report("refining", 0, after(0.2));
+    line.report("refining", 0, after(0.4));
     line.report("refining", 0.1, after(5));
     line.report("refining", 0.26, after(6));
     line.report("refining", 0.3, after(7));
@@ -1003,6 +1020,18 @@ TEST(Progress, aTerminalGetsOneLineThatIsErased) {
   EXPECT_EQ(lineCount(out.str()), 0u);
   EXPECT_LE(std::ranges::count(out.str(), '['), 2 * 12);  // a bar and an escape sequence each: at most 10 a second
   EXPECT_THAT(out.str(), EndsWith("\r\x1b[K"));
+}
+
+TEST(Progress, quickWorkNeedsNoWords) {
+  for (const bool redraws : {false, true}) {
+    std::ostringstream out;
+    const Clock::time_point start{};
+    {
+      ProgressLine line(out, redraws, start);
+      for (int i = 0; i <= 4; ++i) line.report("measuring", i / 4.0, start + std::chrono::milliseconds(50 * i));
+    }
+    EXPECT_EQ(out.str(), "");
+  }
 }
 
 TEST(Progress, durationsAreReadable) {

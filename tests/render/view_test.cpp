@@ -143,6 +143,15 @@ TEST(Pinhole, LooksFromWhereTheAnglesSay) {
   EXPECT_TRUE(view.up.normalized().isApprox(Vector3::UnitY()));
 }
 
+TEST(Pinhole, CirclesItsTarget) {
+  const Vector3 target(0.3, -0.2, 0.7);
+  const Pinhole view =
+      pinhole({.azimuthDegrees = 50, .elevationDegrees = 10, .distance = 0.1, .target = target}, kBox, 64, 64);
+  EXPECT_NEAR((view.eye - target).norm(), 0.1 * kBox.sizes().norm(), 1e-12);
+  EXPECT_TRUE(view.forward.isApprox((target - view.eye).normalized()));
+  EXPECT_THROW(pinhole({.target = Vector3(kNaN, 0, 0)}, kBox, 64, 64), Error);
+}
+
 TEST(Pinhole, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
   for (const UpAxis up : {UpAxis::y, UpAxis::z})
     for (const double azimuth : {-200.0, 0.0, 30.0, 1000.0})

@@ -2,6 +2,7 @@
 // What to look at: a plane through the field or a camera before its surface. And the data that a look yields.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "hpsdf/field.h"
@@ -26,13 +27,14 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
 
 enum class UpAxis : std::uint8_t { y, z };
 
-/// A camera that orbits the centre of the domain, perspective.
+/// A camera that orbits the centre of the domain, or another target; perspective.
 struct OrbitCamera {
   double azimuthDegrees = 30;      ///< about the up axis, 0 looks along −z (y up) or from −y (z up)
   double elevationDegrees = 20;    ///< above the horizon, −90 to 90
-  double distance = 1.1;           ///< of the eye from the centre, in domain diagonals, > 0
+  double distance = 1.1;           ///< of the eye from the target, in domain diagonals, > 0
   double fieldOfViewDegrees = 35;  ///< vertical
   UpAxis up = UpAxis::y;
+  std::optional<Vector3> target = {};  ///< world units; the domain's centre when not given
 };
 
 /// A pinhole: pixel (x, y) of w × h looks along forward + right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h).
