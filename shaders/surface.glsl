@@ -10,6 +10,8 @@ layout(location = 7) uniform dvec3 scale;  // grid coordinates per world unit
 layout(location = 8) uniform dvec2 pixelStep;
 layout(location = 9) uniform float offset;
 layout(location = 10) uniform float diagonal;  // of the domain, world units
+layout(location = 15) uniform dvec3 shownLo;   // what of the domain is shown, grid coordinates
+layout(location = 16) uniform dvec3 shownHi;
 
 // State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, b,
 // a first guess, -), for a pixel under way (last height, reach, -, -).
@@ -23,10 +25,10 @@ const uint kBracketed = 3u;  // the surface is crossed between a and b, within o
 
 struct Ray {
   dvec3 worldDirection;  // unit
-  dvec3 origin;          // where the ray enters the domain, grid coordinates
+  dvec3 origin;          // where the ray enters what is shown of the domain, grid coordinates
   dvec3 direction;       // grid coordinates per world unit
   double fromEye;        // world units from the eye to the origin
-  double length;         // world units within the domain; negative for a ray that misses it
+  double length;         // world units within it; negative for a ray that misses it
 };
 
 Ray pixelRay() {
@@ -39,13 +41,12 @@ Ray pixelRay() {
   double first = 0.0lf;
   double last = 1e300lf;
   for (int axis = 0; axis < 3; ++axis) {
-    double extent = double(grid[axis]);
     if (ray.direction[axis] != 0.0lf) {
-      double toLo = -eye[axis] / ray.direction[axis];
-      double toHi = (extent - eye[axis]) / ray.direction[axis];
+      double toLo = (shownLo[axis] - eye[axis]) / ray.direction[axis];
+      double toHi = (shownHi[axis] - eye[axis]) / ray.direction[axis];
       first = max(first, min(toLo, toHi));
       last = min(last, max(toLo, toHi));
-    } else if (!(eye[axis] >= 0.0lf && eye[axis] <= extent)) {
+    } else if (!(eye[axis] >= shownLo[axis] && eye[axis] <= shownHi[axis])) {
       last = -1.0lf;
     }
   }

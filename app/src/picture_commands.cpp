@@ -326,6 +326,10 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   }
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
+  if (arguments.given("clip"))
+    picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
+  else if (arguments.given("clip-offset"))
+    throw Error("clip-offset: needs clip, the axis that it lies on");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
@@ -390,6 +394,7 @@ void addPictureCommands(Registry& registry) {
        .examples = {"hpsdf render bunny.hpsdf -o surface.png",
                     "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
                     "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
+                    "hpsdf render bunny.hpsdf -o inside.png --clip z --color degree",
                     "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
        .parameters =
            {fieldParameter(),
@@ -421,6 +426,16 @@ void addPictureCommands(Registry& registry) {
             {.name = "offset",
              .type = ParameterType::number,
              .help = "The distance whose surface is drawn.",
+             .defaultText = "0",
+             .unit = "world units"},
+            {.name = "clip",
+             .type = ParameterType::choice,
+             .help = "Cut across this axis: the half towards the camera is left out, and the section shows the cells "
+                     "in the picture's colours.",
+             .choices = {"x", "y", "z"}},
+            {.name = "clip-offset",
+             .type = ParameterType::number,
+             .help = "Where the cut crosses that axis.",
              .defaultText = "0",
              .unit = "world units"}},
        .action = runRender},

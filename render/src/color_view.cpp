@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <unordered_map>
 
 namespace hpsdf::render {
@@ -19,6 +20,7 @@ constexpr Color kZeroLine = {10, 10, 20};
 constexpr Color kSurfaceLine = {255, 255, 255};
 constexpr Color kSurfaceCasing = {16, 14, 34};
 constexpr Color kClay = {210, 153, 119};
+constexpr Color kSection = {238, 222, 205};  // of clay that is cut
 
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
@@ -383,12 +385,23 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color, int samples) {
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color,
+                   const Sampling& sampling) {
   const SurfaceShader shader(buffers, camera, color);
-  return average(buffers, samples, [&](int y, std::vector<LinearColor>& row) {
+  std::optional<CellOutlines> outlines;
+  if (!buffers.section.empty()) outlines.emplace(buffers, sampling);
+  const LinearColor outline = decodeSrgb(kOutline), plain = decodeSrgb(kSection);
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
     const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
-    for (int x = 0; x < buffers.width; ++x)
-      row[x] = buffers.hit(std::size_t(y) * buffers.width + x) ? shader(x, y) : ground;
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      if (!buffers.hit(i))
+        row[x] = ground;
+      else if (!buffers.section.empty() && buffers.section[i])
+        row[x] = mix(color ? color(i) : plain, outline, float(kOutlineStrength) * (*outlines)(x, y));
+      else
+        row[x] = shader(x, y);
+    }
   });
 }
 

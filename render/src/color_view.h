@@ -33,7 +33,9 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
 /// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded.
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color, int samples);
+/// A clipping plane's section is flat, its cells outlined.
+Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color,
+                   const Sampling& sampling);
 
 /// What is drawn where a slice leaves the domain, and under legend and caption.
 Color paperColor();

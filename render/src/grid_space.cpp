@@ -50,8 +50,11 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
   }
 }
 
-RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, int h)
+RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, int h,
+                         const std::optional<ClipPlane>& clip)
     : eye(space.point(camera.eye)),
+      lo(Vector3::Zero()),
+      hi(space.grid),
       forward(camera.forward),
       right(camera.right),
       up(camera.up),
@@ -66,6 +69,13 @@ RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, i
   checkFinite(camera.right, "right vector");
   checkFinite(camera.up, "up vector");
   if (forward.isZero(0)) throw Error("a camera's forward vector is zero: give a direction to look along");
+  if (!clip) return;
+  if (!std::isfinite(clip->offset)) throw Error("a clipping plane's offset is not finite: give a finite number");
+  // a little within what is kept: a cut along faces then starts in cells on that side, in single precision too
+  const bool eyeAbove = camera.eye[clip->axis] >= clip->offset;
+  const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];
+  const double within = cut + (eyeAbove ? -kClipNudge : kClipNudge) * space.grid[clip->axis];
+  (eyeAbove ? hi : lo)[clip->axis] = std::clamp(within, 0.0, space.grid[clip->axis]);
 }
 
 }  // namespace hpsdf::render

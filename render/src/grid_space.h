@@ -2,6 +2,8 @@
 // Grid coordinates, in which both renderers work: the domain is [0, grid], a base cell a unit cube. Views are turned
 // into grid coordinates here, once and in double precision, so that CPU and GPU start from the same numbers.
 
+#include <optional>
+
 #include "hpsdf/field.h"
 #include "hpsdf/render/view.h"
 
@@ -38,10 +40,14 @@ struct SliceGeometry {
   double stepX, stepY;  ///< 1/(2w), 1/(2h)
 };
 
+/// How far behind a clipping plane one looks, in parts of the domain.
+constexpr double kClipNudge = 1e-6;
+
 /// The rays of a camera. Pixel (x, y) looks along forward + right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, in world
 /// units; `scale` takes a world direction to grid coordinates.
 struct RayGeometry {
-  RayGeometry(const GridSpace& space, const Pinhole& camera, int width, int height);
+  RayGeometry(const GridSpace& space, const Pinhole& camera, int width, int height,
+              const std::optional<ClipPlane>& clip = {});
 
   Vector3 direction(int x, int y) const {
     const Vector3 d = forward + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
@@ -49,6 +55,7 @@ struct RayGeometry {
   }
 
   Vector3 eye;                 ///< grid coordinates
+  Vector3 lo, hi;              ///< what of the domain is shown, grid coordinates
   Vector3 forward, right, up;  ///< world units
   Vector3 scale;
   int width, height;

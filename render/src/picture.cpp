@@ -12,6 +12,7 @@
 #include "hpsdf/error.h"
 #include "legend.h"
 #include "quantity.h"
+#include "section.h"
 
 namespace hpsdf::render {
 namespace {
@@ -292,8 +293,10 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
-  const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset};
+  const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
   ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
+  addSection(field, view, buffers);
+  const Sampling sampling{samples, lineWidthOf(frame), 1};
   const FieldStatistics figures = statistics(field);
 
   Furniture furniture;
@@ -305,21 +308,23 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
-    place(image, colorSurface(buffers, view.camera, quantityColors(measured.values, measured.scale), samples));
+    place(image, colorSurface(buffers, view.camera, quantityColors(measured.values, measured.scale), sampling));
     details = {titlesOf(picture.color).back() + " on the " + surface, describeGreatest(measured.values)};
   } else if (picture.color == ColorBy::normal) {
     addFieldFacts(furniture, frame, field, figures);
-    place(image, colorSurface(buffers, view.camera, {}, samples));
+    place(image, colorSurface(buffers, view.camera, {}, sampling));
     details = {surface};
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree);
-    place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), samples));
+    place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), sampling));
     details = {(degree ? "degree on the " : "depth on the ") + surface};
   }
   details.push_back("camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
                     formatNumber(picture.camera.elevationDegrees) + "°" +
                     (picture.camera.target ? " at " + formatVector(*picture.camera.target) : ""));
+  if (picture.clip)
+    details.push_back(std::string("cut at ") + "xyz"[picture.clip->axis] + " = " + formatNumber(picture.clip->offset));
   details.push_back(formatCount(figures.leaves) + " cells");
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);

@@ -590,6 +590,10 @@ TEST_F(Cli, viewsAreNamedOrAimed) {
   EXPECT_EQ(surface({"--view", "top", "--up", "z"}), surface({"--camera", "0,90,1.1", "--up", "z"}));
   EXPECT_NE(surface({"--view", "left"}), surface({"--view", "top"}));
   EXPECT_NE(surface({"--target", "0.5,0,0"}), surface({}));
+  EXPECT_NE(surface({"--clip", "z"}), surface({}));
+  EXPECT_NE(surface({"--clip", "z", "--clip-offset", "0.1"}), surface({"--clip", "z"}));
+  EXPECT_EQ(surface({"--clip", "z", "--clip-offset", "50"}), surface({"--clip", "z", "--clip-offset", "40"}));
+  expectRefused({{"render", field(), "-o", at("x.png"), "--clip-offset", "0.1"}}, "clip", {"v.png"});
   expectRefused({{"render", field(), "-o", at("x.png"), "--view", "left", "--camera", "0,0,1"}}, "camera", {"v.png"});
   expectRefused({{"render", field(), "-o", at("x.png"), "--view", "lefd"}}, "left", {"v.png"});
 }

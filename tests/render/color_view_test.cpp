@@ -213,7 +213,7 @@ TEST(Surface, ShowsTheBackdropWhereARayMisses) {
   ViewBuffers buffers = blank(16, 16);
   std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
   const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
-  const Image image = colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), 1);
+  const Image image = colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1});
   EXPECT_EQ(image.at(3, 2), encodeSrgb(backdropColor(2.5 / 16)));
   EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
 }
@@ -228,7 +228,7 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
       return Vector3(rotation.cast<double>() * Vector3(x, y, z));
     };
     const Pinhole camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
-    return colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), 1).at(0, 0);
+    return colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0);
   };
   const Eigen::Vector3f left = Eigen::Vector3f(-1, 1, 1).normalized(), right = Eigen::Vector3f(1, -1, 1).normalized();
   const Eigen::Matrix3f still = Eigen::Matrix3f::Identity();
@@ -246,7 +246,7 @@ Image groove(double depth, ColorBy color) {
     const bool inGroove = x >= 95 && x < 105;
     buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * ray.norm());
   });
-  return colorSurface(buffers, camera, levelColors(buffers, kMap, color), 1);
+  return colorSurface(buffers, camera, levelColors(buffers, kMap, color), {1, 1, 1});
 }
 
 TEST(Surface, FoldsAreDarkerThanTheOpen) {
@@ -263,7 +263,7 @@ TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
   const auto shaded = [&](const Eigen::Vector3f& normal) {
     ViewBuffers buffers = blank(1, 1);
     buffers.normal[0] = normal.normalized();
-    return lightnessOf(colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), 1).at(0, 0));
+    return lightnessOf(colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0));
   };
   EXPECT_NEAR(shaded({0, -1, -0.6F}), shaded({0, -1, 0}), 0.01);
 }
@@ -277,8 +277,8 @@ TEST(Surface, LevelColorsStayRecognisableUnderShading) {
       ViewBuffers buffers = blank(1, 1);
       buffers.degree[0] = static_cast<std::uint8_t>(level);
       buffers.normal[0] = Eigen::Vector3f(float(-std::sin(tilt)), 0, float(std::cos(tilt)));
-      const Oklab shown =
-          toOklab(decodeSrgb(colorSurface(buffers, camera, levelColors(buffers, map, ColorBy::degree), 1).at(0, 0)));
+      const Oklab shown = toOklab(
+          decodeSrgb(colorSurface(buffers, camera, levelColors(buffers, map, ColorBy::degree), {1, 1, 1}).at(0, 0)));
       int nearest = 0;
       for (int candidate : levels)
         if (nearest == 0 ||

@@ -17,6 +17,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
+#include "section.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
 
@@ -243,6 +244,71 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
       expectNothingPassed(field, view, buffers, 500, 0, 1e-5, [&](const Vector3& p) { return field.value(p); });
     }
   }
+}
+
+TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
+  const Field field = randomField(5, {.roughness = 0.05});
+  const auto cpu = makeCpuRenderer(field);
+  const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
+  std::size_t seen = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double offset : {-0.3, 0.0, 0.25, 2.0, -2.0})
+      for (const double azimuth : {30.0, 200.0}) {
+        const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25};
+        const Pinhole camera = pinhole(orbit, field.domain(), kWidth, kHeight);
+        const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
+        const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
+        const bool eyeAbove = camera.eye[axis] >= offset;
+        for (int y = 0; y < kHeight; ++y)
+          for (int x = 0; x < kWidth; ++x) {
+            const std::size_t i = std::size_t(y) * kWidth + x;
+            if (!buffers.hit(i)) continue;
+            ++seen;
+            const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, kWidth, kHeight, x, y);
+            EXPECT_LE((hit[axis] - offset) * (eyeAbove ? 1 : -1), 1e-5);
+          }
+        if (!gl) continue;
+        EXPECT_TRUE(agree(buffers, gl->surface(view, kWidth, kHeight), surfaceTolerance(field), &camera))
+            << axis << " " << offset << " " << azimuth;
+      }
+  EXPECT_GT(seen, 10000u);
+  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  EXPECT_THROW(cpu->surface({camera, 0, ClipPlane{0, std::nan("")}}, 8, 8), Error);
+}
+
+TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+  const Field field = randomField(5, {.roughness = 0.05});
+  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const SurfaceView view{camera, 0, ClipPlane{2, 0.1}};
+  ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
+  const ViewBuffers before = buffers;
+  addSection(field, view, buffers);
+  int inside = 0, outside = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const std::size_t i = std::size_t(y) * kWidth + x;
+      const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
+      const Vector3 point = camera.eye + (0.1 - camera.eye.z()) / ray.z() * ray;
+      const bool cut = field.domain().contains(point) && field.value({point.x(), point.y(), 0.1}) < 0;
+      ASSERT_EQ(buffers.section[i] != 0, cut);
+      if (!cut) {
+        ++outside;
+        EXPECT_EQ(buffers.cell[i], before.cell[i]);
+        continue;
+      }
+      ++inside;
+      const Cell cell = field.cellAt({point.x(), point.y(), 0.1});
+      EXPECT_EQ(buffers.cell[i], cell.id);
+      EXPECT_EQ(buffers.degree[i], cell.degree);
+      EXPECT_LT(buffers.value[i], 0);
+      EXPECT_NEAR(buffers.distance[i], (point - camera.eye).norm(), 1e-5);
+      EXPECT_EQ(buffers.normal[i], Eigen::Vector3f::UnitZ());
+    }
+  EXPECT_GT(inside, 300);
+  EXPECT_GT(outside, 300);
+  ViewBuffers whole = before;
+  addSection(field, {camera, 0}, whole);
+  EXPECT_TRUE(whole.section.empty());
 }
 
 /// One cell of degree 2 in [−1, 1]³: the linear terms are 0, `c` in lexicographic order.

@@ -14,22 +14,23 @@ bool inside(const Vector3& p, const Vector3& grid) {
   return (p.array() >= 0).all() && (p.array() <= grid.array()).all();
 }
 
-/// The part of a ray from the eye within the domain; t counts from its start. Empty where it misses.
+/// The part of a ray from the eye within what is shown of the domain; t counts from its start. Empty where it misses.
 struct Entry {
   Ray ray;
   double fromEye;  ///< world units from the eye to the part's start
 };
 
-std::optional<Entry> enter(const GridSpace& space, const Vector3& eye, const Vector3& direction) {
+std::optional<Entry> enter(const RayGeometry& rays, const Vector3& direction) {
+  const Vector3& eye = rays.eye;
   double first = 0;
   double last = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
-    const double toLo = (0 - eye[axis]) / direction[axis];
-    const double toHi = (space.grid[axis] - eye[axis]) / direction[axis];
+    const double toLo = (rays.lo[axis] - eye[axis]) / direction[axis];
+    const double toHi = (rays.hi[axis] - eye[axis]) / direction[axis];
     if (direction[axis] != 0) {
       first = std::max(first, std::min(toLo, toHi));
       last = std::min(last, std::max(toLo, toHi));
-    } else if (!(eye[axis] >= 0 && eye[axis] <= space.grid[axis])) {
+    } else if (!(eye[axis] >= rays.lo[axis] && eye[axis] <= rays.hi[axis])) {
       return std::nullopt;
     }
   }
@@ -52,7 +53,7 @@ class CpuRenderer final : public Renderer {
 
   ViewBuffers surface(const SurfaceView& view, int width, int height) override {
     checkOffset(view.offset);
-    const RayGeometry geometry(field_.space(), view.camera, width, height);
+    const RayGeometry geometry(field_.space(), view.camera, width, height, view.clip);
     ViewBuffers buffers = emptyBuffers(width, height, true);
     tbb::parallel_for(0, height, [&](int y) {
       for (int x = 0; x < width; ++x) surfacePixel(geometry, view.offset, x, y, buffers);
@@ -74,7 +75,7 @@ class CpuRenderer final : public Renderer {
 
   void surfacePixel(const RayGeometry& geometry, double offset, int x, int y, ViewBuffers& buffers) const {
     const Vector3 direction = geometry.direction(x, y);
-    const auto entry = enter(field_.space(), geometry.eye, direction.cwiseProduct(geometry.scale));
+    const auto entry = enter(geometry, direction.cwiseProduct(geometry.scale));
     if (!entry) return;
     const auto hit = field_.trace(entry->ray, offset);
     if (!hit) return;

@@ -24,6 +24,7 @@ static_assert(kTile % kBlock == 0);
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
+enum : GLint { kShownLo = 15, kShownHi };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
@@ -171,6 +172,8 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
   setVector(program, kRight, rays.right);
   setVector(program, kUp, rays.up);
   setVector(program, kScale, rays.scale);
+  setVector(program, kShownLo, rays.lo);
+  setVector(program, kShownHi, rays.hi);
   glProgramUniform2d(program.name(), kRayStep, rays.stepX, rays.stepY);
   glProgramUniform1f(program.name(), kOffset, static_cast<float>(offset));
   glProgramUniform1f(program.name(), kDiagonal, static_cast<float>(diagonal));
@@ -235,7 +238,7 @@ class GlRenderer final : public Renderer {
 
   ViewBuffers surface(const SurfaceView& view, int width, int height) override {
     checkOffset(view.offset);
-    const RayGeometry rays(space_, view.camera, width, height);
+    const RayGeometry rays(space_, view.camera, width, height, view.clip);
     const EglContext::Current current(context_);
     setRays(resources_->march, rays, view.offset, space_.diagonal);
     setRays(resources_->hit, rays, view.offset, space_.diagonal);

@@ -71,6 +71,7 @@ struct SurfacePicture {
   int height = 720;
   int samples = 1;
   ScaleOptions scale = {};
+  std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, its cells outlined
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in

@@ -46,10 +46,17 @@ struct Pinhole {
 };
 Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height);
 
-/// The zero set, or that of f − offset, as seen by a camera.
+/// The plane {x_axis = offset}; the half on the eye's side is left out.
+struct ClipPlane {
+  int axis = 2;
+  double offset = 0;  ///< world units
+};
+
+/// The zero set, or that of f − offset, as seen by a camera. Where a clipping plane cuts the solid, one looks into it.
 struct SurfaceView {
   Pinhole camera;
   double offset = 0;
+  std::optional<ClipPlane> clip = {};
 };
 
 constexpr std::uint32_t kNoCell = 0xffffffff;
@@ -65,6 +72,8 @@ struct ViewBuffers {
   std::vector<float> value;             ///< f at the point; along a ray, at the hit (near the offset)
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f, made a unit vector; not filled for slices
   std::vector<float> distance;          ///< from the eye to the hit, world units; not filled for slices
+  /// 1 where a pixel shows the section of the solid with a clipping plane; filled by `addSection`, else empty.
+  std::vector<std::uint8_t> section;
 
   bool hit(std::size_t pixel) const { return cell[pixel] != kNoCell; }
 };

@@ -1,0 +1,57 @@
+#include "section.h"
+
+#include <tbb/parallel_for.h>
+
+#include <vector>
+
+#include "grid_space.h"
+
+namespace hpsdf::render {
+
+void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers) {
+  if (!view.clip) return;
+  buffers.section.assign(buffers.cell.size(), 0);
+  const Pinhole& camera = view.camera;
+  const int axis = view.clip->axis;
+  const double toPlane = view.clip->offset - camera.eye[axis];
+  const double nudge = kClipNudge * field.domain().sizes()[axis];
+  const double behind = view.clip->offset + (toPlane > 0 ? nudge : -nudge);
+  Eigen::Vector3f towardsEye = Eigen::Vector3f::Zero();
+  towardsEye[axis] = toPlane > 0 ? -1.0F : 1.0F;
+  tbb::parallel_for(0, buffers.height, [&](int y) {
+    struct Cut {
+      std::size_t pixel;
+      double distance;
+    };
+    std::vector<Cut> cuts;
+    std::vector<Vector3> points;
+    for (int x = 0; x < buffers.width; ++x) {
+      const Vector3 ray = (camera.forward + camera.right * (2 * (x + 0.5) / buffers.width - 1) +
+                           camera.up * (1 - 2 * (y + 0.5) / buffers.height))
+                              .normalized();
+      const double distance = toPlane / ray[axis];
+      if (!(distance > 0)) continue;
+      Vector3 point = camera.eye + distance * ray;
+      if (!field.domain().contains(point)) continue;
+      point[axis] = behind;
+      cuts.push_back({std::size_t(y) * buffers.width + x, distance});
+      points.push_back(point);
+    }
+    std::vector<double> values(points.size());
+    field.values(points, values);
+    for (std::size_t n = 0; n < cuts.size(); ++n) {
+      if (!(values[n] < view.offset)) continue;
+      const std::size_t i = cuts[n].pixel;
+      const Cell cell = field.cellAt(points[n]);
+      buffers.cell[i] = cell.id;
+      buffers.degree[i] = static_cast<std::uint8_t>(cell.degree);
+      buffers.depth[i] = static_cast<std::uint8_t>(cell.depth);
+      buffers.value[i] = static_cast<float>(values[n]);
+      buffers.normal[i] = towardsEye;
+      buffers.distance[i] = static_cast<float>(cuts[n].distance);
+      buffers.section[i] = 1;
+    }
+  });
+}
+
+}  // namespace hpsdf::render
