@@ -9,6 +9,7 @@ Registry makeRegistry() {
   addFieldCommands(registry);
   addJumpsCommand(registry);
   addPictureCommands(registry);
+  addProbeCommand(registry);
   addReportCommand(registry);
   addToolCommands(registry);
   return registry;

@@ -10,6 +10,7 @@ Registry makeRegistry();
 void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
 void addJumpsCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render
+void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, set, mesh, shapes, doctor, help
 
