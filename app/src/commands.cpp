@@ -10,6 +10,7 @@ Registry makeRegistry() {
   addJumpsCommand(registry);
   addPictureCommands(registry);
   addFigureCommands(registry);
+  addProbeCommand(registry);
   addReportCommand(registry);
   addToolCommands(registry);
   return registry;

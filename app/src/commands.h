@@ -11,6 +11,7 @@ void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
 void addJumpsCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render
 void addFigureCommands(Registry& registry);   ///< pick, expect
+void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, set, mesh, shapes, doctor, help
 

@@ -29,10 +29,12 @@ const Jumps& Session::jumps() {
   return *jumps_;
 }
 
+bool Session::knowsExact() const { return exact_ || isShape(current().field.metadata().source.name); }
+
 const DistanceFunction& Session::exact(const std::string& surface) {
   const Source& source = current().field.metadata().source;
   if (exact_ && (surface.empty() || surface == exactSurface_)) return *exact_;
-  if (surface.empty() && !isShape(source.name))
+  if (surface.empty() && !knowsExact())
     throw Error("color error needs the mesh that the field was made from: give mesh=" +
                 (source.name.empty() ? "FILE" : source.name));
   exact_ = exactDistance(console_, surface.empty() ? source.name : surface, source);

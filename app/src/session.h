@@ -64,6 +64,8 @@ class Session {
   /// The exact distance that the current field was made from: of `surface`, or, where that is empty, of the shape that
   /// the field names or the mesh that it was built from just now. Kept. Throws `Error` when it is not to be had.
   const DistanceFunction& exact(const std::string& surface);
+  /// Whether `exact` needs no surface.
+  bool knowsExact() const;
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
 
   /// The last picture drawn of the current field. Throws `Error` when there is none.

@@ -15,7 +15,10 @@ double niceCeil(double x) {
   return 10 * power;
 }
 
-// The step whose number of lines is nearest to the wanted one, as a ratio.
+}  // namespace
+
+double powerOfTenBelow(double x) { return std::pow(10.0, std::floor(std::log10(x) + 1e-12)); }
+
 double niceStep(double span, double lines) {
   const double ideal = span / lines;
   const double power = powerOfTenBelow(ideal);
@@ -24,10 +27,6 @@ double niceStep(double span, double lines) {
     if (std::abs(std::log(digits * power / ideal)) < std::abs(std::log(best / ideal))) best = digits * power;
   return best;
 }
-
-}  // namespace
-
-double powerOfTenBelow(double x) { return std::pow(10.0, std::floor(std::log10(x) + 1e-12)); }
 
 LinearColor orderedColor(double t) {
   t = std::clamp(t, 0.0, 1.0);

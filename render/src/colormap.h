@@ -54,6 +54,9 @@ class ColorScale {
 /// Values to mark on a scale, ascending: powers of ten, where there are two of them, else some five even steps.
 std::vector<double> scaleMarks(const ColorScale& scale);
 
+/// Of 1, 2 and 5 times a power of ten, the step that divides a span into as nearly so many lines as possible.
+double niceStep(double span, double lines);
+
 /// The largest power of ten that is not above x > 0.
 double powerOfTenBelow(double x);
 

@@ -9,13 +9,7 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr Color kInk = {32, 34, 44};
-constexpr Color kSoftInk = {98, 102, 116};
 constexpr Color kShareBar = {206, 209, 218};
-constexpr Color kRule = {222, 223, 228};
-constexpr Color kTick = {60, 64, 78};
-
-constexpr double kSmallestText = 8;  // pixels an em: below, digits of DejaVu Sans run together
 
 // Text of a picture: 15 pixels at 1280 × 720, in proportion above, shrinking less than the picture below.
 double textSizeFor(int width, int height) {
@@ -24,11 +18,6 @@ double textSizeFor(int width, int height) {
 }
 
 Color colorOf(const LinearColor& color) { return encodeSrgb(color); }
-
-// Dark or light, whichever reads better on it.
-Color inkOn(const LinearColor& ground) {
-  return toOklab(ground).lightness > 0.64 ? Color{20, 20, 30} : Color{255, 255, 255};
-}
 
 double advanceOf(const std::string& text, double size) { return measureText(text, size).advance; }
 
@@ -54,11 +43,7 @@ Column columnOf(const Frame& frame) {
 
 // Writes the first title that fits and moves the column's top below it.
 void addTitle(Furniture& furniture, Column& column, std::span<const std::string> titles, double size) {
-  std::string title;
-  for (const std::string& candidate : titles)
-    if (title.empty() && advanceOf(candidate, size) <= column.width()) title = candidate;
-  if (title.empty()) title = fitText(titles.back(), size, column.width());
-  addText(furniture, title, size, column.left, column.top + capHeight(size), kInk);
+  addText(furniture, fittingTitle(titles, size, column.width()), size, column.left, column.top + capHeight(size), kInk);
   column.top += 1.7 * size;
 }
 
@@ -174,6 +159,16 @@ void blendBox(Image& image, const BoxItem& box) {
 }
 
 }  // namespace
+
+Color inkOn(const LinearColor& ground) {
+  return toOklab(ground).lightness > 0.64 ? Color{20, 20, 30} : Color{255, 255, 255};
+}
+
+std::string fittingTitle(std::span<const std::string> titles, double size, double width) {
+  for (const std::string& title : titles)
+    if (advanceOf(title, size) <= width) return title;
+  return fitText(titles.back(), size, width);
+}
 
 Frame frame(int width, int height) {
   Frame f;

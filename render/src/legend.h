@@ -14,6 +14,15 @@
 
 namespace hpsdf::render {
 
+constexpr Color kInk = {32, 34, 44};
+constexpr Color kSoftInk = {98, 102, 116};
+constexpr Color kRule = {222, 223, 228};
+constexpr Color kTick = {60, 64, 78};
+constexpr double kSmallestText = 8;  ///< pixels an em: below, digits of DejaVu Sans run together
+
+/// Dark or light, whichever reads better on it.
+Color inkOn(const LinearColor& ground);
+
 /// Where the parts of a picture stand; depends on its size alone.
 struct Frame {
   int width = 0, height = 0;
@@ -42,6 +51,9 @@ struct Furniture {
   std::vector<BoxItem> boxes;
   std::vector<TextItem> texts;
 };
+
+/// The first title that fits into a width, or as much as fits of the last.
+std::string fittingTitle(std::span<const std::string> titles, double size, double width);
 
 /// One swatch a level, the highest on top, with the level's number and its share of the volume. The first of `titles`
 /// that fits is taken.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "color_view.h"
+#include "describe.h"
 #include "hpsdf/error.h"
 #include "legend.h"
 #include "quantity.h"
@@ -71,10 +72,6 @@ void place(Image& picture, const Image& view) {
     std::copy_n(&view.pixels[std::size_t(y) * view.width], view.width, &picture.at(0, y));
 }
 
-std::string formatVector(const Vector3& v) {
-  return "(" + formatNumber(v.x()) + ", " + formatNumber(v.y()) + ", " + formatNumber(v.z()) + ")";
-}
-
 // The axis that a direction runs along, if it is one.
 std::optional<char> axisAlong(const Vector3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -93,13 +90,6 @@ std::string describePlane(const SlicePicture& picture) {
     return std::string("slice ") + "xyz"[axis->axis] + " = " + formatNumber(axis->offset);
   const auto& plane = std::get<FreePlane>(picture.plane);
   return "slice through " + formatVector(plane.point) + " with normal " + formatVector(plane.normal);
-}
-
-std::string describeTarget(const Field& field) { return "τ = " + formatNumber(field.metadata().targetError, 3); }
-
-std::string describeSource(const Field& field) {
-  const std::string& name = field.metadata().source.name;
-  return name.empty() ? "unnamed field" : name;
 }
 
 std::vector<int> levelsOf(const std::map<int, double>& shares) {

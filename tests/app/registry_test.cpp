@@ -73,6 +73,7 @@ TEST(Registry, holdsTheNamesToKeep) {
       {"info", {"json"}},
       {"query", {"json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
+      {"probe", {"from", "to", "output", "samples", "mesh", "size"}},
       {"render", {"color", "camera", "up", "offset", "size", "cpu", "gl"}},
   };
   for (const auto& [verb, names] : fixed)

@@ -29,6 +29,18 @@ inline std::uint32_t childOnWay(std::uint64_t way, int depth) {
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
 }
 
+inline GridFrame gridFrame(const FieldData& field) {
+  GridFrame frame;
+  for (int axis = 0; axis < 3; ++axis) {
+    frame.lower[axis] = field.domain.min()[axis];
+    frame.upper[axis] = field.domain.max()[axis];
+    frame.size[axis] = field.domain.max()[axis] - field.domain.min()[axis];
+    frame.cells[axis] = field.grid[axis];
+    frame.last[axis] = (std::int64_t{field.grid[axis]} << kMaxDepth) - 1;
+  }
+  return frame;
+}
+
 /// Coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain then
 /// lands exactly on the face between two base cells.
 inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {

@@ -73,18 +73,6 @@ Answer answerOne(const FieldData& field, const Directory& directory, const Vecto
   return result;
 }
 
-GridFrame gridFrame(const FieldData& field) {
-  GridFrame frame;
-  for (int axis = 0; axis < 3; ++axis) {
-    frame.lower[axis] = field.domain.min()[axis];
-    frame.upper[axis] = field.domain.max()[axis];
-    frame.size[axis] = field.domain.max()[axis] - field.domain.min()[axis];
-    frame.cells[axis] = field.grid[axis];
-    frame.last[axis] = (std::int64_t{field.grid[axis]} << kMaxDepth) - 1;
-  }
-  return frame;
-}
-
 /// As deep as a sixteenth of the field's own size allows.
 Directory makeDirectory(const FieldData& field) {
   Directory directory;

@@ -1,0 +1,44 @@
+#pragma once
+// Layouts as readers need them.
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "legend.h"
+
+namespace hpsdf::render {
+
+/// Nothing beyond the picture; texts large enough, and apart from each other.
+inline void expectReadable(const Furniture& furniture, const Frame& frame, const std::string& what) {
+  const PixelRect whole = {0, 0, frame.width, frame.height};
+  std::vector<PixelRect> boxes;
+  for (const TextItem& item : furniture.texts) {
+    const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
+    EXPECT_TRUE(whole.contains(ink)) << what << ": \"" << item.text << "\" is cut";
+    EXPECT_GE(item.size, 7.9) << what << ": \"" << item.text << "\" cannot be read";
+    boxes.push_back(ink);
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_FALSE(boxes[i].overlaps(boxes[k]))
+          << what << ": \"" << furniture.texts[i].text << "\" lies on \"" << furniture.texts[k].text << "\"";
+  for (const BoxItem& box : furniture.boxes) {
+    EXPECT_GE(box.x0, 0) << what;
+    EXPECT_GE(box.y0, 0) << what;
+    EXPECT_LE(box.x1, frame.width) << what;
+    EXPECT_LE(box.y1, frame.height) << what;
+  }
+}
+
+/// Also no text in the view.
+inline void expectTidy(const Furniture& furniture, const Frame& frame, const std::string& what) {
+  expectReadable(furniture, frame, what);
+  for (const TextItem& item : furniture.texts) {
+    const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
+    EXPECT_TRUE(frame.panel.contains(ink) || frame.caption.contains(ink)) << what << ": \"" << item.text << "\" strays";
+  }
+}
+
+}  // namespace hpsdf::render
