@@ -8,6 +8,7 @@
 namespace hpsdf::app {
 
 constexpr int kExitDone = 0;
+constexpr int kExitFailed = 1;  // a comparison
 constexpr int kExitBadInput = 2;
 constexpr int kExitCancelled = 130;  // 128 + SIGINT, as shells count
 
