@@ -10,6 +10,7 @@ Registry makeRegistry() {
   addJumpsCommand(registry);
   addPictureCommands(registry);
   addReportCommand(registry);
+  addCheckCommands(registry);
   addToolCommands(registry);
   return registry;
 }
