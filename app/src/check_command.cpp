@@ -125,7 +125,7 @@ Json lastResults(const fs::path& folder, const fs::path& from) {
   const std::string file = (from / kCheckResults).string();
   const std::string again = fmt::format("run 'hpsdf check {}' first", shellWord(folder.string()));
   if (!fs::exists(file)) throw Error(fmt::format("{}: no such file; {}, or name its folder with --from", file, again));
-  const Json json = Json::parse(readTextFile(file), nullptr, false);
+  Json json = Json::parse(readTextFile(file), nullptr, false);
   if (!json.is_object() || !json.contains("items"))
     throw Error(fmt::format("{}: is not the result of a whole check; {}", file, again));
   if (json.value("folder", "") != folderId(folder))
