@@ -179,6 +179,9 @@ class ScriptCheck {
     variables["out"] = actual_.string();
     variables["wrong"] = wrong_.string();
     const std::vector<Call> calls = parseScript(registry, file_, text, variables);
+    for (const auto& [line, stated] : controls)
+      if (std::ranges::find(calls, line, &Call::line) == calls.end())
+        throw Error(fmt::format("{}:{}: expected a command after the colon", file_, line));
     if (!controls.empty()) fs::create_directories(wrong_);
     std::istringstream nothing;
     std::ostringstream ignored;  // what commands report on standard output

@@ -217,6 +217,8 @@ TEST_F(Check, negativeControlsMustFailAsStated) {
     script(right + typo);
     EXPECT_THAT(check().out, HasSubstr("looks.hps:3:1: expected '# wrong pixels: COMMAND'")) << typo;
   }
+  script(right + "# wrong pixels:\n");
+  EXPECT_THAT(check().out, HasSubstr("looks.hps:3: expected a command after the colon"));
   script(right + "# wrong pixels: slice colour=degree\n");
   EXPECT_THAT(check().out, HasSubstr("looks.hps:3:23: slice: unknown option 'colour'")) << "the column in the file";
 }
