@@ -12,6 +12,7 @@ Registry makeRegistry() {
   addFigureCommands(registry);
   addProbeCommand(registry);
   addReportCommand(registry);
+  addCheckCommands(registry);
   addToolCommands(registry);
   return registry;
 }

@@ -13,7 +13,8 @@ void addPictureCommands(Registry& registry);  ///< slice, render
 void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
-void addToolCommands(Registry& registry);  ///< run, set, mesh, shapes, doctor, help
+void addCheckCommands(Registry& registry);  ///< check, accept
+void addToolCommands(Registry& registry);   ///< run, set, mesh, shapes, doctor, help
 
 /// The parameter `field` of commands that look at a field, and what they do with it: load it, or keep the current one.
 Parameter fieldParameter();

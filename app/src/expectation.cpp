@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hpsdf/error.h"
 #include "hpsdf/nearest_name.h"
 #include "registry.h"
 

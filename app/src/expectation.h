@@ -5,15 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "hpsdf/error.h"
-
 namespace hpsdf::app {
-
-/// An expectation that does not hold: the program ends with status 1.
-class ExpectationFailed : public Error {
- public:
-  using Error::Error;
-};
 
 /// SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER]
 struct Expectation {

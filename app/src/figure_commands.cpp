@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "expectation.h"
+#include "failed.h"
 #include "hpsdf/nearest_name.h"
 #include "session.h"
 #include "summaries.h"
@@ -60,7 +61,7 @@ Json figuresOf(Session& session, const Expectation& expectation) {
     return pointJson(session, {n[0], n[1], n[2]}, withExact);
   }
   Json pick = pickJson(session, static_cast<int>(n[0]), static_cast<int>(n[1]));
-  if (pick.is_null()) throw ExpectationFailed(fmt::format("pixel {},{} shows no part of the field", n[0], n[1]));
+  if (pick.is_null()) throw Failed(fmt::format("pixel {},{} shows no part of the field", n[0], n[1]));
   return pick;
 }
 
@@ -109,7 +110,7 @@ void runExpect(Session& session, const Arguments& arguments) {
   const std::string text = expressionOf(arguments);
   const Expectation expectation = parseExpectation(text);
   const double found = followed(figuresOf(session, expectation), expectation);
-  if (!expectation.holds(found)) throw ExpectationFailed(fmt::format("expected {}, found {}", text, found));
+  if (!expectation.holds(found)) throw Failed(fmt::format("expected {}, found {}", text, found));
   if (session.wantsJson(arguments)) printJson(session.console().out, {{"expected", text}, {"found", found}});
 }
 

@@ -119,8 +119,9 @@ std::string overviewHelp(const Registry& registry) {
   text +=
       "\n'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its options; 'hpsdf --version' tells "
       "the "
-      "version.\nA script writes an option --name value as name=value. Exit status: 0 done, 2 bad input, 130 "
-      "cancelled.\n";
+      "version.\nA script writes an option --name value as name=value. Exit status: 0 done, 1 a comparison failed, 2 "
+      "bad "
+      "input, 130 cancelled.\n";
   return text;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -19,14 +18,8 @@ namespace {
 
 enum class SliceFormat : std::uint8_t { png, pfm, csv };
 
-std::string extension(const std::string& file) {
-  std::string text = std::filesystem::path(file).extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 SliceFormat sliceFormat(const std::string& file) {
-  const std::string kind = extension(file);
+  const std::string kind = lowerExtension(file);
   if (kind == ".png") return SliceFormat::png;
   if (kind == ".pfm") return SliceFormat::pfm;
   if (kind == ".csv") return SliceFormat::csv;
@@ -128,7 +121,7 @@ void noteOddSurface(const Console& console, const Field& field, double offset, b
 
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  if (extension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   const render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
   checkWritable(file);

@@ -7,7 +7,7 @@
 #include <ostream>
 
 #include "commands.h"
-#include "expectation.h"
+#include "failed.h"
 #include "help.h"
 #include "hpsdf/error.h"
 #include "version.h"
@@ -62,8 +62,8 @@ int runProgram(std::span<const std::string> words, const Console& console) {
   } catch (const Cancelled&) {
     console.err << "hpsdf: cancelled; nothing was written" << std::endl;
     return kExitCancelled;
-  } catch (const ExpectationFailed& error) {
-    return fail(console, error.what(), kExitFailed);
+  } catch (const Failed& failed) {
+    return fail(console, failed.what(), kExitFailed);
   } catch (const Error& error) {
     return fail(console, error.what(), kExitBadInput);
   } catch (const std::bad_alloc&) {

@@ -8,7 +8,7 @@
 namespace hpsdf::app {
 
 constexpr int kExitDone = 0;
-constexpr int kExitFailed = 1;  ///< an expectation or a comparison
+constexpr int kExitFailed = 1;  // an expectation, a comparison
 constexpr int kExitBadInput = 2;
 constexpr int kExitCancelled = 130;  // 128 + SIGINT, as shells count
 

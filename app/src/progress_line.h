@@ -7,8 +7,8 @@
 
 namespace hpsdf::app {
 
-/// Shows the progress of an operation, once it has taken a moment: on a terminal one line that is drawn again and again and erased at the end,
-/// elsewhere a line then, at every further quarter, and after ten quiet seconds.
+/// Shows the progress of an operation, once it has taken a moment: on a terminal one line that is drawn again and again
+/// and erased at the end, elsewhere a line then, at every further quarter, and after ten quiet seconds.
 class ProgressLine {
  public:
   using Clock = std::chrono::steady_clock;

@@ -67,17 +67,6 @@ std::string plainName(const std::string& source) {
   return name.empty() ? "field" : name;
 }
 
-/// As a shell takes it.
-std::string shellWord(const std::string& word) {
-  const bool plain = std::ranges::all_of(word, [](unsigned char c) {
-    return std::isalnum(c) || std::string_view("._-/:,=+").find(char(c)) != std::string::npos;
-  });
-  if (plain && !word.empty()) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
-
 std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
   std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
   for (const Parameter& parameter : buildParameters()) {

@@ -81,12 +81,20 @@ std::string htmlEscaped(const std::string& text) {
   return result;
 }
 
-std::string reportHtml(const ReportPage& page) {
-  std::string html = fmt::format(
+std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle) {
+  return fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n<p class=\"subtitle\">{2}</p>\n",
-      htmlEscaped(page.title), kStyle, htmlEscaped(page.subtitle));
+      "<title>{0}</title>\n<style>{1}{2}</style>\n</head>\n<body>\n<h1>{0}</h1>\n<p class=\"subtitle\">{3}</p>\n",
+      htmlEscaped(title), kStyle, moreStyle, htmlEscaped(subtitle));
+}
+
+std::string htmlFoot(const std::string& footer) {
+  return fmt::format("<footer>{}</footer>\n</body>\n</html>\n", htmlEscaped(footer));
+}
+
+std::string reportHtml(const ReportPage& page) {
+  std::string html = htmlHead(page.title, page.subtitle, "");
   html += "<h2>Figures</h2>\n<table>\n";
   for (const auto& [name, value] : page.figures)
     html += fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", htmlEscaped(name), htmlEscaped(value));
@@ -96,7 +104,7 @@ std::string reportHtml(const ReportPage& page) {
   for (const ReportPicture& picture : page.pictures) html += figure(picture);
   html += "<div class=\"columns\">\n" + levels("Volume by degree", page.degrees) +
           levels("Volume by depth", page.depths) + "</div>\n";
-  return html + fmt::format("<footer>{}</footer>\n</body>\n</html>\n", htmlEscaped(page.footer));
+  return html + htmlFoot(page.footer);
 }
 
 }  // namespace hpsdf::app

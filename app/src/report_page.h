@@ -2,6 +2,7 @@
 // The report's page: one HTML file beside its pictures = {}; no script, no network.
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,10 @@ struct ReportPage {
 };
 
 std::string reportHtml(const ReportPage& page);
+
+/// A page's beginning, in the report's style and some more of its own, and its end.
+std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
+std::string htmlFoot(const std::string& footer);
 
 /// Text that is safe between tags and in quoted attributes.
 std::string htmlEscaped(const std::string& text);

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
 
-#include "expectation.h"
+#include "failed.h"
 #include "hpsdf/error.h"
 #include "hpsdf/nearest_name.h"
 #include "session.h"
@@ -162,6 +165,18 @@ class Scanner {
 
 }  // namespace
 
+std::string readTextFile(const std::string& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) throw Error(file + ": is a folder; give a file");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw Error(file + (std::filesystem::exists(file, ignored) ? ": cannot be read; check its permissions"
+                                                               : ": no such file; check the name"));
+  std::stringstream text;
+  text << stream.rdbuf();
+  return std::move(text).str();
+}
+
 bool isVariableAssignment(std::string_view word) {
   const std::size_t equals = word.find('=');
   return equals != std::string_view::npos && isIdentifier(word.substr(0, equals));
@@ -190,7 +205,8 @@ std::vector<Call> parseScript(const Registry& registry, std::string_view name, s
       Arguments arguments = parseArguments(command, rest, Origin::script);
       if (command.definesVariables)
         for (auto& [key, value] : parseVariables(arguments.texts("assignments"))) variables[key] = value;
-      calls.push_back({&command, std::move(arguments), fmt::format("{}:{}:{}", name, statement.line, verb.column)});
+      calls.push_back(
+          {&command, std::move(arguments), fmt::format("{}:{}:{}", name, statement.line, verb.column), statement.line});
     } catch (const ArgumentError& error) {
       scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what());
     } catch (const Error& error) {
@@ -199,12 +215,12 @@ std::vector<Call> parseScript(const Registry& registry, std::string_view name, s
   }
 }
 
-void runScript(Session& session, const std::vector<Call>& calls) {
+void runScript(Session& session, std::span<const Call> calls) {
   for (const Call& call : calls) {
     try {
       perform(*call.command, session, call.arguments);
-    } catch (const ExpectationFailed& error) {
-      throw ExpectationFailed(call.where + ": " + error.what());
+    } catch (const Failed& error) {
+      throw Failed(call.where + ": " + error.what());
     } catch (const Error& error) {
       throw Error(call.where + ": " + error.what());
     }

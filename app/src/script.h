@@ -2,6 +2,7 @@
 // Scripts: a command a line, `verb value key=value …`; docs/scripts.md is the manual.
 
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,7 @@ struct Call {
   const Command* command;
   Arguments arguments;
   std::string where;  ///< "file:line:column" of the verb
+  int line;
 };
 
 /// Reads and checks a whole script, so that a mistake in the last line shows before the first has run. `name` stands
@@ -26,7 +28,10 @@ std::vector<Call> parseScript(const Registry& registry, std::string_view name, s
                               Variables variables);
 
 /// Runs the calls one after another; stops at the first that throws, and says where.
-void runScript(Session& session, const std::vector<Call>& calls);
+void runScript(Session& session, std::span<const Call> calls);
+
+/// All of a file. Throws `Error` naming it.
+std::string readTextFile(const std::string& file);
 
 /// "name=value" words. Throws `Error` for one that is not of that form.
 Variables parseVariables(const std::vector<std::string>& words);

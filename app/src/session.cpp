@@ -60,6 +60,7 @@ render::Renderer& Session::renderer(const Backend& backend) {
   renderer_.reset();
   renderer_ = backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
   backend_ = backend;
+  lastRenderer_ = renderer_->description();
   return *renderer_;
 }
 

@@ -77,6 +77,8 @@ class Session {
 
   /// The renderer of the current field: kept, since its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
+  /// Description of the one asked for last; "" before that.
+  const std::string& lastRenderer() const { return lastRenderer_; }
 
  private:
   const Registry& registry_;
@@ -89,6 +91,7 @@ class Session {
   std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
+  std::string lastRenderer_;
 };
 
 }  // namespace hpsdf::app

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 namespace hpsdf::app {
@@ -76,6 +77,22 @@ std::string shortNumber(double number) {
   mantissa.erase(mantissa.find_last_not_of("0", e - 1) + 1);
   if (mantissa.ends_with('.')) mantissa.pop_back();
   return fmt::format("{}e{}", mantissa, exponent);
+}
+
+std::string lowerExtension(const std::filesystem::path& file) {
+  std::string text = file.extension().string();
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::string shellWord(const std::string& word) {
+  const bool plain = std::ranges::all_of(word, [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("._-/:,=+").find(char(c)) != std::string::npos;
+  });
+  if (plain && !word.empty()) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 std::string strategyName(Strategy strategy) {

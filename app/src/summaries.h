@@ -43,6 +43,12 @@ Json vectorJson(const Vector3& v);
 /// "(0.1, 0.2, 0.3)"
 std::string vectorText(const Vector3& v);
 
+/// ".png" of a.PNG
+std::string lowerExtension(const std::filesystem::path& file);
+
+/// A word of a command as a shell takes it, quoted where it must be.
+std::string shellWord(const std::string& word);
+
 /// An indented line of a summary.
 std::string summaryRow(std::string_view label, const std::string& value);
 

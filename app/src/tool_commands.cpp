@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "building.h"
@@ -21,18 +19,6 @@ namespace hpsdf::app {
 namespace {
 
 constexpr int kMostNestedScripts = 16;
-
-std::string readScript(const std::string& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw Error(file + ": is a folder; give a script");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw Error(file + (std::filesystem::exists(file, ignored) ? ": cannot be read; check its permissions"
-                                                               : ": no such file; check the name"));
-  std::stringstream text;
-  text << stream.rdbuf();
-  return std::move(text).str();
-}
 
 /// Counts the scripts now running, and the setting of --json for what they call.
 class ScriptScope {
@@ -58,7 +44,7 @@ void runRun(Session& session, const Arguments& arguments) {
   if (words.empty() && lines.empty()) throw Error("run: give a script's file, or lines with -e");
   const std::string name = lines.empty() ? words.front() : "-e";
   if (lines.empty()) words.erase(words.begin());
-  const std::string text = lines.empty() ? readScript(name) : fmt::format("{}", fmt::join(lines, "\n"));
+  const std::string text = lines.empty() ? readTextFile(name) : fmt::format("{}", fmt::join(lines, "\n"));
   if (session.scriptDepth >= kMostNestedScripts)
     throw Error(fmt::format("{}: more than {} scripts run each other; does one run itself?", name, kMostNestedScripts));
   const auto calls = parseScript(session.registry(), name, text, parseVariables(words));

@@ -28,13 +28,17 @@ void measure(const Field& field, ColorBy quantity, const Evidence& evidence, std
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - exact[i]);
 }
 
-/// The least value above 0, the lowest hundredth left out, and the greatest.
+/// The least and the greatest value above 0, but for the lowest hundredth and the highest thousandth: a few outliers
+/// would leave all else one colour.
 std::array<double, 2> spread(std::vector<double> values) {
   std::erase_if(values, [](double v) { return !(v > 0) || !std::isfinite(v); });
   if (values.empty()) return {0, 0};
-  const auto least = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 100);
-  std::nth_element(values.begin(), least, values.end());
-  return {*least, *std::max_element(values.begin(), values.end())};
+  const auto nth = [&](std::size_t n) {
+    const auto place = values.begin() + static_cast<std::ptrdiff_t>(n);
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+  };
+  return {nth(values.size() / 100), nth(values.size() - 1 - values.size() / 1000)};
 }
 
 }  // namespace

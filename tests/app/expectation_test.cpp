@@ -6,6 +6,8 @@
 #include <functional>
 #include <limits>
 
+#include "hpsdf/error.h"
+
 namespace hpsdf::app {
 namespace {
 

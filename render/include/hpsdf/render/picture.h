@@ -39,7 +39,7 @@ struct Evidence {
 };
 
 /// Of a quantity: which values the darkest and the lightest colour stand for. Without limits they are chosen from the
-/// values: of all cells where the quantity is a cell's, else of the points shown.
+/// values, a few outliers left out: of all cells where the quantity is a cell's, else of the points shown.
 struct ScaleOptions {
   std::optional<std::array<double, 2>> limits = {};  ///< ascending; above 0 on a logarithmic scale
   bool logarithmic = true;
