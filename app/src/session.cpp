@@ -35,7 +35,7 @@ const DistanceFunction& Session::exact(const std::string& surface) {
   const Source& source = current().field.metadata().source;
   if (exact_ && (surface.empty() || surface == exactSurface_)) return *exact_;
   if (surface.empty() && !knowsExact())
-    throw Error("color error needs the mesh that the field was made from: give mesh=" +
+    throw Error("errors need the mesh that the field was made from: give mesh=" +
                 (source.name.empty() ? "FILE" : source.name));
   exact_ = exactDistance(console_, surface.empty() ? source.name : surface, source);
   exactSurface_ = surface;

@@ -172,7 +172,7 @@ Measured measure(const Field& field, const ViewBuffers& buffers, const std::func
                  ColorBy quantity, const ScaleOptions& options, const Evidence& evidence) {
   const std::vector<double> ofCells = quantityOfCells(field, quantity, evidence);
   std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, evidence, ofCells);
-  const ColorScale scale = colorScale(options, ofCells, values);
+  const ColorScale scale = colorScale(options, field, ofCells, values);
   return {std::move(values), scale};
 }
 

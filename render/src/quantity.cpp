@@ -28,17 +28,41 @@ void measure(const Field& field, ColorBy quantity, const Evidence& evidence, std
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - exact[i]);
 }
 
-/// The least and the greatest value above 0, but for the lowest hundredth and the highest thousandth: a few outliers
-/// would leave all else one colour.
-std::array<double, 2> spread(std::vector<double> values) {
-  std::erase_if(values, [](double v) { return !(v > 0) || !std::isfinite(v); });
+/// A value and how much it counts.
+struct Weighted {
+  double value, weight;
+};
+
+/// The least and the greatest value above 0, but for the lowest hundredth and the highest thousandth by weight: a few
+/// outliers would leave all else one colour.
+std::array<double, 2> spread(std::vector<Weighted> values) {
+  std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
   if (values.empty()) return {0, 0};
-  const auto nth = [&](std::size_t n) {
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(n);
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
+  std::ranges::sort(values, {}, &Weighted::value);
+  double total = 0;
+  for (const Weighted& v : values) total += v.weight;
+  const auto quantile = [&](double share) {
+    double sum = 0;
+    for (const Weighted& v : values)
+      if ((sum += v.weight) > share * total) return v.value;
+    return values.back().value;
   };
-  return {nth(values.size() / 100), nth(values.size() - 1 - values.size() / 1000)};
+  return {quantile(0.01), quantile(0.999)};
+}
+
+/// Cells count by their volume, so that many tiny ones in a corner do not decide.
+std::vector<Weighted> weighted(const Field& field, const std::vector<double>& ofCells) {
+  std::vector<Weighted> values;
+  field.forEachCell([&](const Cell& cell) { values.push_back({ofCells[cell.id], cell.box.volume()}); });
+  return values;
+}
+
+/// Of very many samples an even part tells as much.
+std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
+  constexpr std::size_t kMost = 1'000'000;
+  std::vector<Weighted> values;
+  for (std::size_t i = 0; i < ofSamples.size(); i += ofSamples.size() / kMost + 1) values.push_back({ofSamples[i], 1});
+  return values;
 }
 
 }  // namespace
@@ -87,7 +111,7 @@ std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buff
   return result;
 }
 
-ColorScale colorScale(const ScaleOptions& options, const std::vector<double>& ofCells,
+ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,
                       const std::vector<float>& ofSamples) {
   if (options.limits) {
     const auto [low, high] = *options.limits;
@@ -97,8 +121,7 @@ ColorScale colorScale(const ScaleOptions& options, const std::vector<double>& of
       throw Error("range: a logarithmic scale needs limits above 0; give others, or a linear scale");
     return {low, high, options.logarithmic};
   }
-  const auto [least, greatest] =
-      spread(ofCells.empty() ? std::vector<double>(ofSamples.begin(), ofSamples.end()) : ofCells);
+  const auto [least, greatest] = spread(ofCells.empty() ? weighted(ofSamples) : weighted(field, ofCells));
   return ColorScale::around(least, greatest, options.logarithmic);
 }
 

@@ -21,9 +21,9 @@ std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buff
                                      const std::function<Vector3(int, int)>& pointAt, ColorBy quantity,
                                      const Evidence& evidence, const std::vector<double>& ofCells);
 
-/// As asked, or chosen from the values of cells, or, where those are empty, from those of samples. Throws `Error` for
-/// limits that make no scale.
-ColorScale colorScale(const ScaleOptions& options, const std::vector<double>& ofCells,
+/// As asked, or chosen from the values of the field's cells, or, where those are empty, from those of samples. Throws
+/// `Error` for limits that make no scale.
+ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,
                       const std::vector<float>& ofSamples);
 
 }  // namespace hpsdf::render

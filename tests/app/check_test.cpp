@@ -193,6 +193,18 @@ TEST_F(Check, aScriptThatFailsIsNamedAndTheOthersRun) {
   EXPECT_THAT(check().out, HasSubstr("a script cannot run it"));
 }
 
+TEST_F(Check, anExpectationThatDoesNotHoldIsAFailureAndNoMistake) {
+  script(kBuild + kLook + "output=$out/a.png\nexpect stats.leaves > 0\n");
+  take({"looks/a.png"});
+  EXPECT_EQ(check().status, 0);
+  script(kBuild + kLook + "output=$out/a.png\nexpect stats.leaves < 0\n");
+  const Outcome outcome = check({"--junit", results_ / "junit.xml"});
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("looks.hps:3:1"), HasSubstr("expected stats.leaves < 0, found")));
+  EXPECT_THAT(results(), ElementsAre("looks/a.png: ok", "looks/: expected otherwise"));
+  EXPECT_THAT(readFile(results_ / "junit.xml"), AllOf(HasSubstr("<failure "), HasSubstr("errors=\"0\"")));
+}
+
 TEST_F(Check, negativeControlsMustFailAsStated) {
   const std::string right = kBuild + kLook + "output=$out/a.png\n";
   script(right);

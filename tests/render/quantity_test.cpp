@@ -74,13 +74,33 @@ TEST(Quantity, OfASurfaceIsThatOfItsHits) {
 }
 
 TEST(Quantity, TheScaleFollowsTheCellsOrThePointsOrWhatIsAsked) {
-  const std::vector<double> cells = {0, 2e-4, 3e-2};
+  // a cell of half the domain, and one divided once
+  FieldData data;
+  data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
+  data.grid = {2, 1, 1};
+  data.nodes = {node::leaf(0, 0), node::internal(2)};
+  for (int child = 0; child < 8; ++child) data.nodes.push_back(node::leaf(0, 0));
+  data.coefficients = std::vector<double>{1};
+  const Field field(data);
+  std::vector<double> cells(10, 3e-2);
+  cells[0] = 2e-4;
   const std::vector<float> samples = {1e-3F, 0.5F, std::numeric_limits<float>::quiet_NaN()};
-  EXPECT_DOUBLE_EQ(colorScale({}, cells, samples).low(), 1e-4);
-  EXPECT_DOUBLE_EQ(colorScale({}, cells, samples).high(), 0.1);
-  EXPECT_DOUBLE_EQ(colorScale({}, {}, samples).high(), 1);
-  EXPECT_EQ(colorScale({.limits = {{2, 3}}}, cells, samples).low(), 2);
-  EXPECT_EQ(colorScale({.logarithmic = false}, cells, samples).low(), 0);
+  EXPECT_DOUBLE_EQ(colorScale({}, field, cells, samples).low(), 1e-4);
+  EXPECT_DOUBLE_EQ(colorScale({}, field, cells, samples).high(), 0.1);
+  EXPECT_DOUBLE_EQ(colorScale({}, field, {}, samples).high(), 1);
+  EXPECT_EQ(colorScale({.limits = {{2, 3}}}, field, cells, samples).low(), 2);
+  EXPECT_EQ(colorScale({.logarithmic = false}, field, cells, samples).low(), 0);
+}
+
+TEST(Quantity, ManyTinyCellsDoNotStretchTheScale) {
+  // leaves deeper than 4 are a third of all, but fill a four-thousandth of the volume
+  const Field field =
+      randomField(4, {.grid = {1, 1, 1}, .refinement = 0, .maxDepth = 6, .deepAt = Vector3(-0.99, -0.99, -0.99)});
+  std::vector<double> cells(field.data().nodes.size(), 0.5);
+  field.forEachCell([&](const Cell& cell) {
+    if (cell.depth > 4) cells[cell.id] = 1000;
+  });
+  EXPECT_DOUBLE_EQ(colorScale({}, field, cells, {}).high(), 1);
 }
 
 }  // namespace
