@@ -265,8 +265,7 @@ bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) ||
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
   try {
-    const bool normalized = source.normalization.scale != 1 || !source.normalization.center.isZero(0);
-    auto exact = distanceTo(prepare(console, surface, normalized), 0);
+    auto exact = distanceTo(prepare(console, surface, !source.normalization.isIdentity()), 0);
     const Source& given = exact->source();
     if (given.fingerprint != source.fingerprint || (source.fingerprint == 0 && given.name != source.name))
       console.err << "hpsdf: warning: " << surface << " is not what the field was made from ("

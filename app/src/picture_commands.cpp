@@ -58,8 +58,7 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t pixel = std::size_t(y) * std::size_t(buffers.width) + std::size_t(x);
       if (!buffers.hit(pixel)) continue;
-      const Vector3 p =
-          view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
+      const Vector3 p = render::pixelPoint(view, x, y, buffers.width, buffers.height);
       rows += fmt::format("{},{},{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel], buffers.degree[pixel],
                           buffers.depth[pixel]);
     }
@@ -84,8 +83,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence =
-      session.evidence(picture.color, arguments.given("mesh") ? arguments.text("mesh") : "");
+  const render::Evidence evidence = session.evidence(picture.color, arguments.textOr("mesh", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
@@ -126,8 +124,7 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence =
-      session.evidence(picture.color, arguments.given("mesh") ? arguments.text("mesh") : "");
+  const render::Evidence evidence = session.evidence(picture.color, arguments.textOr("mesh", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   session.setPicture(render::drawSurface(renderer, field, picture, evidence));

@@ -1,9 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <filesystem>
 #include <span>
 
 #include "commands.h"
@@ -17,8 +15,7 @@ namespace hpsdf::app {
 namespace {
 
 bool isPicture(const std::string& file) {
-  std::string kind = std::filesystem::path(file).extension().string();
-  std::ranges::transform(kind, kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string kind = lowerExtension(file);
   if (kind != ".png" && kind != ".csv")
     throw Error(
         fmt::format("{}: unknown kind of output '{}'; expected .png for a plot or .csv for the samples", file, kind));
@@ -43,7 +40,7 @@ Line lineOf(const Field& field, const Arguments& arguments) {
 
 /// At the line's samples; empty where the exact distance is not at hand.
 std::vector<double> exactValues(Session& session, const Arguments& arguments, const Line& line) {
-  const std::string mesh = arguments.given("mesh") ? arguments.text("mesh") : "";
+  const std::string mesh = arguments.textOr("mesh", "");
   if (mesh.empty() && !session.knowsExact()) return {};
   std::vector<Vector3> points;
   for (const LineSample& sample : line.samples) points.push_back(sample.point);

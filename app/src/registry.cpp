@@ -11,6 +11,7 @@
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "hpsdf/nearest_name.h"
 
@@ -331,6 +332,9 @@ const Arguments::Value& Arguments::single(std::string_view name) const {
 bool Arguments::given(std::string_view name) const { return entry(name).given; }
 bool Arguments::has(std::string_view name) const { return !entry(name).values.empty(); }
 std::string Arguments::text(std::string_view name) const { return single(name).text; }
+std::string Arguments::textOr(std::string_view name, std::string fallback) const {
+  return has(name) ? text(name) : std::move(fallback);
+}
 double Arguments::number(std::string_view name) const { return single(name).numbers.at(0); }
 int Arguments::whole(std::string_view name) const { return static_cast<int>(number(name)); }
 std::vector<double> Arguments::numbers(std::string_view name) const { return single(name).numbers; }

@@ -61,6 +61,8 @@ class Arguments {
   bool has(std::string_view name) const;
 
   std::string text(std::string_view name) const;
+  /// `fallback` where it has no value.
+  std::string textOr(std::string_view name, std::string fallback) const;
   std::vector<std::string> texts(std::string_view name) const;
   double number(std::string_view name) const;
   int whole(std::string_view name) const;

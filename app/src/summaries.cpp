@@ -221,7 +221,7 @@ std::string fieldText(const CurrentField& current) {
                        fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
     text += summaryRow("fingerprint", fingerprintText(metadata.source.fingerprint));
   }
-  if (const Normalization& n = metadata.source.normalization; n.scale != 1 || !n.center.isZero(0))
+  if (const Normalization& n = metadata.source.normalization; !n.isIdentity())
     text += summaryRow("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
   text += summaryRow("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
   text += summaryRow("leaves", grouped(figures.leaves));

@@ -184,18 +184,25 @@ std::string describeGreatest(const std::vector<float>& values) {
 }
 
 Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y) {
-  return view.origin + view.right * ((x + 0.5) / buffers.width - 0.5) + view.up * (0.5 - (y + 0.5) / buffers.height);
+  return pixelPoint(view, x, y, buffers.width, buffers.height);
 }
 
 Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
-  const Vector3 ray = view.camera.forward + view.camera.right * (2 * (x + 0.5) / buffers.width - 1) +
-                      view.camera.up * (1 - 2 * (y + 0.5) / buffers.height);
-  return view.camera.eye + ray.normalized() * buffers.distance[std::size_t(y) * buffers.width + x];
+  return view.camera.eye + pixelRay(view.camera, x, y, buffers.width, buffers.height) *
+                               buffers.distance[std::size_t(y) * buffers.width + x];
 }
 
 template <typename View>
 std::function<Vector3(int, int)> pointsOf(const View& view, const ViewBuffers& buffers) {
   return [&](int x, int y) { return pointAt(view, buffers, x, y); };
+}
+
+template <typename View>
+std::vector<float> quantityIn(const Field& field, const View& view, const ViewBuffers& buffers, ColorBy quantity,
+                              const Evidence& evidence) {
+  requireEvidence(quantity, evidence);
+  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
+                           quantityOfCells(field, quantity, evidence));
 }
 
 void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field, const FieldStatistics& figures) {
@@ -325,16 +332,12 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
 
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
                               const Evidence& evidence) {
-  requireEvidence(quantity, evidence);
-  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
-                           quantityOfCells(field, quantity, evidence));
+  return quantityIn(field, view, buffers, quantity, evidence);
 }
 
 std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
                               const Evidence& evidence) {
-  requireEvidence(quantity, evidence);
-  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
-                           quantityOfCells(field, quantity, evidence));
+  return quantityIn(field, view, buffers, quantity, evidence);
 }
 
 std::optional<Pick> pickAt(const Drawn& drawn, int x, int y) {

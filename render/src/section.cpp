@@ -26,9 +26,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
     std::vector<Cut> cuts;
     std::vector<Vector3> points;
     for (int x = 0; x < buffers.width; ++x) {
-      const Vector3 ray = (camera.forward + camera.right * (2 * (x + 0.5) / buffers.width - 1) +
-                           camera.up * (1 - 2 * (y + 0.5) / buffers.height))
-                              .normalized();
+      const Vector3 ray = pixelRay(camera, x, y, buffers.width, buffers.height);
       const double distance = toPlane / ray[axis];
       if (!(distance > 0)) continue;
       Vector3 point = camera.eye + distance * ray;

@@ -144,4 +144,13 @@ Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int hei
   return result;
 }
 
+Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height) {
+  return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
+}
+
+Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height) {
+  return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
+      .normalized();
+}
+
 }  // namespace hpsdf::render

@@ -15,6 +15,8 @@ using Box = Eigen::AlignedBox3d;
 struct Normalization {
   Vector3 center = Vector3::Zero();
   double scale = 1;
+
+  bool isIdentity() const { return scale == 1 && center.isZero(0); }
 };
 
 }  // namespace hpsdf

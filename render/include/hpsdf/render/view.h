@@ -17,6 +17,9 @@ struct SliceView {
   Vector3 up;      ///< the whole height
 };
 
+/// The point that pixel (x, y) of a view of width × height samples.
+Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height);
+
 /// The plane {x_axis = offset}, framed so that the domain's section fits into width × height pixels, with square
 /// pixels. Axes x, y, z are 0, 1, 2. On screen: x → (right y, up z), y → (x, z), z → (x, y). Throws `Error` for an
 /// offset outside of the domain.
@@ -45,6 +48,9 @@ struct Pinhole {
   Vector3 up;       ///< half the height at distance 1
 };
 Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height);
+
+/// The unit direction in which pixel (x, y) of a view of width × height looks.
+Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height);
 
 /// The plane {x_axis = offset}; the half on the eye's side is left out.
 struct ClipPlane {
