@@ -112,10 +112,10 @@ std::string overviewHelp(const Registry& registry) {
       "\n"
       "Commands:\n";
   for (const Command& command : registry.commands())
-    if (!command.scriptOnly) text += fmt::format("  {:<8} {}\n", command.name, command.summary);
+    if (!command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
   text += "\nIn scripts also:\n";
   for (const Command& command : registry.commands())
-    if (command.scriptOnly) text += fmt::format("  {:<8} {}\n", command.name, command.summary);
+    if (command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
   text +=
       "\n'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its options; 'hpsdf --version' tells "
       "the "

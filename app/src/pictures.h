@@ -13,6 +13,9 @@ render::GlChoice glChoice(const Arguments& arguments);
 /// Throws `Error` when --cpu and --gl are both given.
 Backend backend(const Arguments& arguments);
 
+/// Of a parameter that takes three numbers and was given.
+Vector3 pointOf(const Arguments& arguments, const char* name);
+
 /// Throws `Error` when plane and axis are both given. Its plane is the one asked for, or, in a domain, lies where
 /// nobody said otherwise: at 0, or where the domain does not hold that, in its middle.
 render::SlicePicture slicePicture(const Arguments& arguments);
