@@ -118,23 +118,26 @@ void drawPlane(Ui& ui, const ViewState& view, const Field& field, Commands& comm
 }
 
 void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn>& picture, Commands& commands) {
+  const Coloring& colors = view.colors();
   const render::ColorBy without = view.slice ? render::ColorBy::normal : render::ColorBy::distance;
-  choice(ui, "view/color", "color", colorNames(without), std::string(colorName(view.color())), "color ", commands);
-  if (!render::isQuantity(view.color())) return;
-  choice(ui, "view/scale", "scale", {"log", "linear"}, view.scale.logarithmic ? "log" : "linear",
-         fmt::format("color {} scale=", colorName(view.color())), commands);
-  const auto range = [&](double low, double high) {
-    commands.push_back(fmt::format("color {} range={},{}", colorName(view.color()), low, high));
+  choice(ui, "view/color", "color", colorNames(without), std::string(colorName(colors.by)), "color ", commands);
+  const auto change = [&](const std::string& what) {
+    commands.push_back(fmt::format("color {} {}", colorName(colors.by), what));
   };
-  const auto shown = picture ? picture->legend.limits : std::nullopt;
-  if (const auto pinned = ui.checkbox("view/pinned", "pinned range", view.scale.limits.has_value())) {
+  if (colors.by == render::ColorBy::difference)
+    if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + scriptWord(*file));
+  if (!render::isQuantity(colors.by)) return;
+  choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
+         fmt::format("color {} scale=", colorName(colors.by)), commands);
+  const auto range = [&](double low, double high) { change(fmt::format("range={},{}", low, high)); };
+  if (const auto pinned = ui.checkbox("view/pinned", "pinned range", colors.scale.limits.has_value())) {
     if (!*pinned)
-      commands.push_back(fmt::format("color {} range=auto", colorName(view.color())));
-    else if (shown)
-      range((*shown)[0], (*shown)[1]);
+      change("range=auto");
+    else if (picture && picture->scale.limits)
+      range((*picture->scale.limits)[0], (*picture->scale.limits)[1]);
   }
-  if (!view.scale.limits) return;
-  const auto [low, high] = *view.scale.limits;
+  if (!colors.scale.limits) return;
+  const auto [low, high] = *colors.scale.limits;
   const auto typed = [&](const std::string& text) {
     const auto value = parseNumber(text);
     if (!value) throw Error(fmt::format("range: expected a number, found '{}'", text));
@@ -272,7 +275,7 @@ void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& share
 void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
   const auto& picture = explorer.picture();
   const auto legendOf = [&](render::ColorBy color) {
-    return picture && explorer.view().color() == color ? &picture->legend : nullptr;
+    return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
   };
   drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
   drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));

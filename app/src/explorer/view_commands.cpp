@@ -101,22 +101,26 @@ void checkPlane(const Arguments& arguments) {
 void runColor(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   const bool slice = arguments.given("of") ? arguments.text("of") == "slice" : view.slice;
-  const render::ColorBy color = colorNamed(arguments.text("by"));
-  if (color == (slice ? render::ColorBy::normal : render::ColorBy::distance))
-    throw Error(
-        fmt::format("by: {} is not for a {}; give another colour", colorName(color), slice ? "slice" : "surface"));
-  (slice ? view.sliceColor : view.surfaceColor) = color;
+  Coloring& colors = slice ? view.sliceColors : view.surfaceColors;
+  const render::ColorBy by = colorNamed(arguments.text("by"));
+  if (by == (slice ? render::ColorBy::normal : render::ColorBy::distance))
+    throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
+  if (by != colors.by) colors.scale.limits.reset();  // of another quantity
+  colors.by = by;
+  if (arguments.given("other")) colors.other = arguments.text("other");
+  if (by == render::ColorBy::difference && colors.other.empty())
+    throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
-    view.scale.limits.reset();
+    colors.scale.limits.reset();
     if (arguments.text("range") != "auto") {
       const auto n = arguments.numbers("range");
-      view.scale.limits = {n[0], n[1]};
+      colors.scale.limits = {n[0], n[1]};
     }
   }
-  if (arguments.given("scale")) view.scale.logarithmic = arguments.text("scale") == "log";
-  if (view.scale.limits && !((*view.scale.limits)[0] < (*view.scale.limits)[1]))
+  if (arguments.given("scale")) colors.scale.logarithmic = arguments.text("scale") == "log";
+  if (colors.scale.limits && !((*colors.scale.limits)[0] < (*colors.scale.limits)[1]))
     throw Error("range: expected LOW,HIGH with LOW below HIGH");
-  if (view.scale.limits && view.scale.logarithmic && !((*view.scale.limits)[0] > 0))
+  if (colors.scale.limits && render::isQuantity(by) && colors.scale.logarithmic && !((*colors.scale.limits)[0] > 0))
     throw Error("range: a logarithmic scale needs limits above 0; give others, or scale=linear");
   session.explorer().change(std::move(view));
 }
@@ -365,7 +369,11 @@ Command colorCommand() {
                          {.name = "scale",
                           .type = ParameterType::choice,
                           .help = "How such colours run between them; log at first.",
-                          .choices = {"log", "linear"}}},
+                          .choices = {"log", "linear"}},
+                         {.name = "other",
+                          .type = ParameterType::path,
+                          .help = "For difference: the field to compare with.",
+                          .valueName = "FIELD"}},
           .action = runColor,
           .scriptOnly = true};
 }
