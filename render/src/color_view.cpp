@@ -180,7 +180,7 @@ class Contours {
 // origin.
 class CameraFrame {
  public:
-  CameraFrame(const ViewBuffers& buffers, const Pinhole& camera) : buffers_(buffers) {
+  CameraFrame(const ViewBuffers& buffers, const Camera& camera) : buffers_(buffers) {
     axes_.row(0) = camera.right.normalized().cast<float>();
     axes_.row(1) = camera.up.normalized().cast<float>();
     axes_.row(2) = -camera.forward.normalized().cast<float>();
@@ -295,7 +295,7 @@ struct Lights {
 
 class SurfaceShader {
  public:
-  SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color)
+  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color)
       : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), color_(color) {}
   SurfaceShader(const SurfaceShader&) = delete;  // openness_ refers to frame_
 
@@ -385,7 +385,7 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color,
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
                    const Sampling& sampling) {
   const SurfaceShader shader(buffers, camera, color);
   std::optional<CellOutlines> outlines;

@@ -50,7 +50,7 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
   }
 }
 
-RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, int h,
+RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, int h,
                          const std::optional<ClipPlane>& clip)
     : eye(space.point(camera.eye)),
       lo(Vector3::Zero()),

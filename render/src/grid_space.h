@@ -46,7 +46,7 @@ constexpr double kClipNudge = 1e-6;
 /// The rays of a camera. Pixel (x, y) looks along forward + right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, in world
 /// units; `scale` takes a world direction to grid coordinates.
 struct RayGeometry {
-  RayGeometry(const GridSpace& space, const Pinhole& camera, int width, int height,
+  RayGeometry(const GridSpace& space, const Camera& camera, int width, int height,
               const std::optional<ClipPlane>& clip = {});
 
   Vector3 direction(int x, int y) const {

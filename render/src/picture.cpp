@@ -290,7 +290,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
-  const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
+  const SurfaceView view{cameraOf(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
   ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
   addSection(field, view, buffers);
   const Sampling sampling{samples, lineWidthOf(frame), 1};

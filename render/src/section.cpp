@@ -11,7 +11,7 @@ namespace hpsdf::render {
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers) {
   if (!view.clip) return;
   buffers.section.assign(buffers.cell.size(), 0);
-  const Pinhole& camera = view.camera;
+  const Camera& camera = view.camera;
   const int axis = view.clip->axis;
   const double toPlane = view.clip->offset - camera.eye[axis];
   const double nudge = kClipNudge * field.domain().sizes()[axis];

@@ -115,7 +115,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
   return framed(extent.min(), extent.max(), base, right, up, width, height);
 }
 
-Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height) {
+Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height) {
   checkDomain(domain);
   checkViewSize(width, height);
   checkRange("azimuth", camera.azimuthDegrees, true, "a finite angle in degrees");
@@ -134,7 +134,7 @@ Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int hei
   const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
   const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
-  Pinhole result;
+  Camera result;
   const Vector3 target = camera.target.value_or(domain.center());
   checkRange("target", target.sum(), target.allFinite(), "three finite coordinates");
   result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
@@ -148,7 +148,7 @@ Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height) {
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
-Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height) {
+Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height) {
   return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
       .normalized();
 }

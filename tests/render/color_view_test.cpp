@@ -212,7 +212,7 @@ TEST(DistanceSlice, AlmostFlatValuesMakeNoBlots) {
 TEST(Surface, ShowsTheBackdropWhereARayMisses) {
   ViewBuffers buffers = blank(16, 16);
   std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   const Image image = colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1});
   EXPECT_EQ(image.at(3, 2), encodeSrgb(backdropColor(2.5 / 16)));
   EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
@@ -227,7 +227,7 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
     const auto turned = [&](double x, double y, double z) {
       return Vector3(rotation.cast<double>() * Vector3(x, y, z));
     };
-    const Pinhole camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
+    const Camera camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
     return colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0);
   };
   const Eigen::Vector3f left = Eigen::Vector3f(-1, 1, 1).normalized(), right = Eigen::Vector3f(1, -1, 1).normalized();
@@ -240,7 +240,7 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
 // A wall before the camera whose middle steps back by `depth` in a groove, ten columns wide.
 Image groove(double depth, ColorBy color) {
   ViewBuffers buffers = blank(200, 200);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   forEachSample(buffers, [&](int x, int y, std::size_t i) {
     const Vector3 ray((2 * (x + 0.5) / 200 - 1) * 0.3, (1 - 2 * (y + 0.5) / 200) * 0.3, -1);
     const bool inGroove = x >= 95 && x < 105;
@@ -259,7 +259,7 @@ TEST(Surface, FoldsAreDarkerThanTheOpen) {
 }
 
 TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   const auto shaded = [&](const Eigen::Vector3f& normal) {
     ViewBuffers buffers = blank(1, 1);
     buffers.normal[0] = normal.normalized();
@@ -271,7 +271,7 @@ TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
 TEST(Surface, LevelColorsStayRecognisableUnderShading) {
   const std::vector<int> levels = {2, 3, 4, 5, 6, 7};
   const LevelMap map(levels);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   for (int level : levels)
     for (double tilt : {0.0, 0.4, 0.8}) {
       ViewBuffers buffers = blank(1, 1);

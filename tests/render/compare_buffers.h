@@ -27,7 +27,7 @@ inline bool atEdge(const ViewBuffers& buffers, int x, int y) {
 }
 
 /// Direction of a pixel's ray, unit.
-inline Vector3 rayDirection(const Pinhole& camera, int width, int height, int x, int y) {
+inline Vector3 rayDirection(const Camera& camera, int width, int height, int x, int y) {
   return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
       .normalized();
 }
@@ -35,7 +35,7 @@ inline Vector3 rayDirection(const Pinhole& camera, int width, int height, int x,
 /// Cells, degrees and depths agree but for few pixels, each within one pixel of an edge; where they agree, values,
 /// and, for a surface (`camera` given), positions across the surface and normals agree within the tolerances.
 inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuffers& actual,
-                                      const BufferTolerance& tolerance, const Pinhole* camera = nullptr) {
+                                      const BufferTolerance& tolerance, const Camera* camera = nullptr) {
   if (expected.width != actual.width || expected.height != actual.height)
     return testing::AssertionFailure() << "sizes differ";
   std::size_t differing = 0;

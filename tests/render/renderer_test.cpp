@@ -49,7 +49,7 @@ BufferTolerance surfaceTolerance(const Field& field) {
   return {.value = 1e-5, .position = 1e-6 * field.domain().sizes().norm(), .normalAngle = 2e-3};
 }
 
-Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
   const Vector3 unit = forward.normalized();
   const Vector3 right = unit.unitOrthogonal();
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
@@ -57,7 +57,7 @@ Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight)
 
 /// Cameras of every kind: orbits near and far, eyes anywhere within the domain (also inside the solid) and eyes beside
 /// the surface looking along it.
-std::vector<Pinhole> cameras(const Field& field, unsigned seed, int count) {
+std::vector<Camera> cameras(const Field& field, unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
   std::normal_distribution<double> normal;
@@ -66,14 +66,14 @@ std::vector<Pinhole> cameras(const Field& field, unsigned seed, int count) {
   const auto somewhere = [&] {
     return Vector3(domain.min() + domain.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random))));
   };
-  std::vector<Pinhole> result;
+  std::vector<Camera> result;
   for (int i = 0; i < count; ++i) {
     if (i % 3 == 0) {
       const OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
                               .elevationDegrees = 180 * unit(random) - 90,
                               .distance = std::exp(4 * unit(random) - 2),
                               .fieldOfViewDegrees = 20 + 60 * unit(random)};
-      result.push_back(pinhole(orbit, domain, kWidth, kHeight));
+      result.push_back(cameraOf(orbit, domain, kWidth, kHeight));
     } else if (i % 3 == 1) {
       result.push_back(lookingAt(somewhere(), direction(), 0.2 + unit(random)));
     } else {
@@ -223,7 +223,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheField) {
     const Field& field = shape(name);
     const auto renderer = makeCpuRenderer(field);
     std::size_t seen = 0;
-    for (const Pinhole& camera : cameras(field, 11, 9))
+    for (const Camera& camera : cameras(field, 11, 9))
       for (const double offset : {0.0, 0.05}) {
         const SurfaceView view{camera, offset};
         const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
@@ -238,7 +238,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     const Field field = randomField(seed, {.roughness = seed % 2 ? 1.0 : 0.2, .maxDepth = 5, .maxDegree = 8});
     const auto renderer = makeCpuRenderer(field);
-    for (const Pinhole& camera : cameras(field, seed, 6)) {
+    for (const Camera& camera : cameras(field, seed, 6)) {
       const SurfaceView view{camera, 0};
       const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
       expectNothingPassed(field, view, buffers, 500, 0, 1e-5, [&](const Vector3& p) { return field.value(p); });
@@ -255,7 +255,7 @@ TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
     for (const double offset : {-0.3, 0.0, 0.25, 2.0, -2.0})
       for (const double azimuth : {30.0, 200.0}) {
         const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25};
-        const Pinhole camera = pinhole(orbit, field.domain(), kWidth, kHeight);
+        const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
         const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
         const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
         const bool eyeAbove = camera.eye[axis] >= offset;
@@ -272,13 +272,13 @@ TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
             << axis << " " << offset << " " << azimuth;
       }
   EXPECT_GT(seen, 10000u);
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   EXPECT_THROW(cpu->surface({camera, 0, ClipPlane{0, std::nan("")}}, 8, 8), Error);
 }
 
 TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
   const Field field = randomField(5, {.roughness = 0.05});
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   const SurfaceView view{camera, 0, ClipPlane{2, 0.1}};
   ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   const ViewBuffers before = buffers;
@@ -347,7 +347,7 @@ std::vector<Grazing> grazingFields(double dip) {
 void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(const Field&)>& make) {
   for (const double dip : {1e-5, 1e-3, 0.02, 0.05, 0.1})
     for (const Grazing& grazing : grazingFields(dip)) {
-      const Pinhole camera = lookingAt(-3 * grazing.direction, grazing.direction, 0.01);
+      const Camera camera = lookingAt(-3 * grazing.direction, grazing.direction, 0.01);
       const ViewBuffers buffers = make(grazing.field)->surface({camera, 0}, 16, 12);
       EXPECT_EQ(hits(buffers), buffers.cell.size()) << "a dip of " << dip << " is passed";
       for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
@@ -381,7 +381,7 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
     EXPECT_LT(error, 0.01) << name;
     const double tolerance = 1.5 * error + 1e-6;  // the largest error lies between the points that were tried
     const auto renderer = makeCpuRenderer(field);
-    for (const Pinhole& camera : cameras(field, 23, 15)) {
+    for (const Camera& camera : cameras(field, 23, 15)) {
       const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
       expectNothingPassed(field, {camera, 0}, buffers, 300, tolerance, 0, distance);
       for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
@@ -400,7 +400,7 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
 TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
   const double radius = 0.8;
   const Field& field = shape("sphere,radius=0.8");
-  const Pinhole camera = pinhole({}, kCube, kWidth, kHeight);
+  const Camera camera = cameraOf({}, kCube, kWidth, kHeight);
   const ViewBuffers buffers = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
   const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
   const ViewBuffers other = gl ? gl->surface({camera, 0}, kWidth, kHeight) : buffers;
@@ -430,13 +430,13 @@ TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
   const Field& field = shape("sphere,radius=0.8");
   const auto renderer = makeCpuRenderer(field);
   // a pinhole at the centre sees the inside all around
-  const Pinhole centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
+  const Camera centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
   const ViewBuffers inside = renderer->surface({centered, 0}, kWidth, kHeight);
   EXPECT_EQ(hits(inside), inside.cell.size());
   EXPECT_NEAR(inside.distance[kWidth * kHeight / 2 + kWidth / 2], 0.79, 2e-3);
   EXPECT_GT(inside.normal[kWidth * kHeight / 2 + kWidth / 2].x(), 0.99);
 
-  const Pinhole outside = lookingAt(Vector3(4, 0.01, 0.02), Vector3(-1, 0, 0), 0.1);
+  const Camera outside = lookingAt(Vector3(4, 0.01, 0.02), Vector3(-1, 0, 0), 0.1);
   const std::size_t middle = kWidth * kHeight / 2 + kWidth / 2;
   for (const double offset : {-0.3, 0.0, 0.2}) {
     const ViewBuffers buffers = renderer->surface({outside, offset}, kWidth, kHeight);
@@ -454,14 +454,14 @@ TEST(CpuRenderer, RefusesViewsThatAreNone) {
   const Field field = randomField(1);
   const auto renderer = makeCpuRenderer(field);
   const SliceView slice = axisSlice(field.domain(), 2, 0, 8, 8);
-  const Pinhole camera = pinhole({}, field.domain(), 8, 8);
+  const Camera camera = cameraOf({}, field.domain(), 8, 8);
   EXPECT_THROW(renderer->slice(slice, 0, 8), Error);
   EXPECT_THROW(renderer->surface({camera, 0}, 8, -3), Error);
   EXPECT_THAT([&] { renderer->surface({camera, std::nan("")}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("offset")));
   SliceView badSlice = slice;
   badSlice.up.x() = std::nan("");
   EXPECT_THROW(renderer->slice(badSlice, 8, 8), Error);
-  Pinhole badCamera = camera;
+  Camera badCamera = camera;
   badCamera.forward.setZero();
   EXPECT_THAT([&] { renderer->surface({badCamera, 0}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("forward")));
 }
@@ -530,7 +530,7 @@ TEST_F(Gl, ViewsLargerThanATile) {
   const Field& field = shape("torus");
   expectSameSlice(field, axisSlice(kCube, 2, 0, 4500, 9), kSliceTolerance, 4500, 9);
   expectSameSlice(field, axisSlice(kCube, 2, 0, 5, 4500), kSliceTolerance, 5, 4500);
-  const Pinhole camera = pinhole({}, kCube, 2100, 64);
+  const Camera camera = cameraOf({}, kCube, 2100, 64);
   EXPECT_TRUE(agree(makeCpuRenderer(field)->surface({camera, 0}, 2100, 64),
                     makeGlRenderer(field, GlChoice::software)->surface({camera, 0}, 2100, 64), surfaceTolerance(field),
                     &camera));
@@ -542,7 +542,7 @@ TEST_F(Gl, SurfacesOfBuiltInShapesFromAnywhere) {
     const auto cpu = makeCpuRenderer(field);
     const auto gl = makeGlRenderer(field, GlChoice::software);
     std::size_t seen = 0;
-    for (const Pinhole& camera : cameras(field, 31, 18))
+    for (const Camera& camera : cameras(field, 31, 18))
       for (const double offset : {0.0, -0.04}) {
         const ViewBuffers expected = cpu->surface({camera, offset}, kWidth, kHeight);
         seen += hits(expected);
@@ -562,7 +562,7 @@ TEST_F(Gl, SurfacesSeenAlongAnAxis) {
     for (const auto& [azimuth, elevation] : {std::pair(0, 0), {90, 0}, {180, 0}, {270, 0}, {0, 90}, {0, -90}, {45, 0}})
       for (const auto& [width, height] : {std::pair(96, 64), {97, 65}, {160, 107}}) {
         const OrbitCamera orbit{.azimuthDegrees = double(azimuth), .elevationDegrees = double(elevation)};
-        const Pinhole camera = pinhole(orbit, field.domain(), width, height);
+        const Camera camera = cameraOf(orbit, field.domain(), width, height);
         const ViewBuffers expected = cpu->surface({camera, 0}, width, height);
         const ViewBuffers actual = gl->surface({camera, 0}, width, height);
         const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation);
@@ -590,7 +590,7 @@ TEST_F(Gl, SurfacesOfTheRudestFields) {
     BufferTolerance tolerance = surfaceTolerance(field);
     tolerance.value = 1e-4;
     tolerance.position *= 10;
-    for (const Pinhole& camera : cameras(field, seed, 6))
+    for (const Camera& camera : cameras(field, seed, 6))
       EXPECT_TRUE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
                         tolerance, &camera))
           << seed;
@@ -602,7 +602,7 @@ TEST_F(Gl, SurfacesOfDegree30) {
   const Field field = randomField(9, {.grid = {1, 1, 1}, .maxDepth = 1, .minDegree = 30, .maxDegree = 30});
   const auto cpu = makeCpuRenderer(field);
   const auto gl = makeGlRenderer(field, GlChoice::software);
-  const Pinhole camera = pinhole({}, field.domain(), 64, 48);
+  const Camera camera = cameraOf({}, field.domain(), 64, 48);
   const ViewBuffers expected = cpu->surface({camera, 0}, 64, 48);
   EXPECT_GT(hits(expected), 300u);
   EXPECT_TRUE(agree(expected, gl->surface({camera, 0}, 64, 48), surfaceTolerance(field), &camera));
@@ -612,7 +612,7 @@ TEST_F(Gl, SurfacesOfDegree30) {
 TEST_F(Gl, NegativeControl) {
   const Field field = randomField(2);
   const SliceView slice = axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   const ViewBuffers expectedSlice = makeCpuRenderer(field)->slice(slice, kWidth, kHeight);
   const ViewBuffers expectedSurface = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
   const auto rendered = [&](std::uint32_t cell, double change) {
@@ -654,7 +654,7 @@ TEST_F(Gl, SeveralRenderersAtOnceAndOnAnyThread) {
 
 TEST_F(Gl, RepeatsItselfBitByBit) {
   const Field& field = shape("torus");
-  const SurfaceView view{pinhole({}, kCube, kWidth, kHeight), 0};
+  const SurfaceView view{cameraOf({}, kCube, kWidth, kHeight), 0};
   const auto gl = makeGlRenderer(field, GlChoice::software);
   const ViewBuffers once = gl->surface(view, kWidth, kHeight);
   const ViewBuffers again = gl->surface(view, kWidth, kHeight);
@@ -673,7 +673,7 @@ TEST_F(Gl, RefusesViewsThatAreNone) {
   const Field field = randomField(1);
   const auto renderer = makeGlRenderer(field, GlChoice::software);
   EXPECT_THROW(renderer->slice(axisSlice(field.domain(), 2, 0, 8, 8), 0, 8), Error);
-  EXPECT_THROW(renderer->surface({pinhole({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
+  EXPECT_THROW(renderer->surface({cameraOf({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
 }
 
 /// In a fresh process, so that EGL looks for its drivers again: there are none, and the error says all that was tried.

@@ -63,7 +63,7 @@ void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
     }
 }
 
-Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
   const Vector3 unit = forward.normalized();
   const Vector3 right = unit.unitOrthogonal();
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
@@ -90,7 +90,7 @@ TEST(SurfaceBlocks, LeaveNothingOutFromAnywhere) {
 
 TEST(SurfaceBlocks, OfACameraWithoutWidthAreTheWholeView) {
   const Field field = randomField(1);
-  const Pinhole flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
+  const Camera flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
   for (const float start : find(field, {flat, 0}).starts) EXPECT_LT(start, 3);
 }
 
@@ -100,7 +100,7 @@ Field sphere() { return randomField(3, {.roughness = 0.02, .refinement = 1, .max
 /// What the blocks are for: few pixels beside the surface are drawn, and rays start close to it.
 TEST(SurfaceBlocks, HugTheSurface) {
   const Field field = sphere();
-  const SurfaceView view{pinhole({}, field.domain(), kWidth, kHeight), 0};
+  const SurfaceView view{cameraOf({}, field.domain(), kWidth, kHeight), 0};
   const Found found = find(field, view);
   const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   int drawn = 0, hit = 0;
@@ -123,12 +123,12 @@ TEST(SurfaceBlocks, AreNoneWhereThereIsNothingToSee) {
     const Found found = find(field, view);
     return std::ranges::count_if(found.starts, [](float start) { return std::isfinite(start); });
   };
-  const Pinhole away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
+  const Camera away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
   EXPECT_EQ(count({away, 0}), 0);
   // past the sphere, which lies to both sides of the plane through the eye
-  const Pinhole past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
+  const Camera past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
   EXPECT_EQ(count({past, 0}), 0);
-  EXPECT_EQ(count({pinhole({}, field.domain(), kWidth, kHeight), 5}), 0);
+  EXPECT_EQ(count({cameraOf({}, field.domain(), kWidth, kHeight), 5}), 0);
 }
 
 }  // namespace

@@ -41,16 +41,16 @@ struct OrbitCamera {
 };
 
 /// A pinhole: pixel (x, y) of w × h looks along forward + right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h).
-struct Pinhole {
+struct Camera {
   Vector3 eye;
   Vector3 forward;  ///< unit
   Vector3 right;    ///< half the width at distance 1
   Vector3 up;       ///< half the height at distance 1
 };
-Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height);
+Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
 /// The unit direction in which pixel (x, y) of a view of width × height looks.
-Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height);
+Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 
 /// The plane {x_axis = offset}; the half on the eye's side is left out.
 struct ClipPlane {
@@ -60,7 +60,7 @@ struct ClipPlane {
 
 /// The zero set, or that of f − offset, as seen by a camera. Where a clipping plane cuts the solid, one looks into it.
 struct SurfaceView {
-  Pinhole camera;
+  Camera camera;
   double offset = 0;
   std::optional<ClipPlane> clip = {};
 };
