@@ -315,6 +315,8 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
     picture.camera.target = Vector3(target[0], target[1], target[2]);
   }
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                             : render::Projection::perspective;
   picture.offset = arguments.number("offset");
   if (arguments.given("clip"))
     picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
@@ -413,6 +415,12 @@ void addPictureCommands(Registry& registry) {
              .help = "The axis that points up in the picture.",
              .defaultText = "y",
              .choices = {"y", "z"}},
+            {.name = "projection",
+             .type = ParameterType::choice,
+             .help = "orthographic looks along parallel rays, so that lengths can be compared wherever they are; at "
+                     "the target the picture is as high as in perspective.",
+             .defaultText = "perspective",
+             .choices = {"perspective", "orthographic"}},
             {.name = "offset",
              .type = ParameterType::number,
              .help = "The distance whose surface is drawn.",

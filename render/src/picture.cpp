@@ -188,8 +188,9 @@ Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y)
 }
 
 Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
-  return view.camera.eye + pixelRay(view.camera, x, y, buffers.width, buffers.height) *
-                               buffers.distance[std::size_t(y) * buffers.width + x];
+  return pixelEye(view.camera, x, y, buffers.width, buffers.height) +
+         pixelRay(view.camera, x, y, buffers.width, buffers.height) *
+             buffers.distance[std::size_t(y) * buffers.width + x];
 }
 
 template <typename View>
@@ -320,6 +321,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   details.push_back("camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
                     formatNumber(picture.camera.elevationDegrees) + "°" +
                     (picture.camera.target ? " at " + formatVector(*picture.camera.target) : ""));
+  if (picture.camera.projection == Projection::orthographic) details.push_back("orthographic");
   if (picture.clip)
     details.push_back(std::string("cut at ") + "xyz"[picture.clip->axis] + " = " + formatNumber(picture.clip->offset));
   details.push_back(formatCount(figures.leaves) + " cells");

@@ -238,24 +238,33 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
 }
 
 // A wall before the camera whose middle steps back by `depth` in a groove, ten columns wide.
-Image groove(double depth, ColorBy color) {
+Image groove(double depth, ColorBy color, Projection projection) {
   ViewBuffers buffers = blank(200, 200);
-  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const bool parallel = projection == Projection::orthographic;
+  const double half = parallel ? 0.9 : 0.3;  // 0.9 of the wall in either case
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {half, 0, 0}, {0, half, 0}, projection};
   forEachSample(buffers, [&](int x, int y, std::size_t i) {
     const Vector3 ray((2 * (x + 0.5) / 200 - 1) * 0.3, (1 - 2 * (y + 0.5) / 200) * 0.3, -1);
     const bool inGroove = x >= 95 && x < 105;
-    buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * ray.norm());
+    buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * (parallel ? 1 : ray.norm()));
   });
   return colorSurface(buffers, camera, levelColors(buffers, kMap, color), {1, 1, 1});
 }
 
 TEST(Surface, FoldsAreDarkerThanTheOpen) {
-  for (ColorBy color : {ColorBy::normal, ColorBy::depth}) {
-    const Image flat = groove(0, color), folded = groove(0.1, color);
-    for (int x : {95, 100, 104}) EXPECT_LT(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)) - 0.01) << x;
-    for (int x : {20, 60, 140, 180})
-      EXPECT_NEAR(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)), 0.01) << x;
-  }
+  for (ColorBy color : {ColorBy::normal, ColorBy::depth})
+    for (Projection projection : {Projection::perspective, Projection::orthographic}) {
+      const Image flat = groove(0, color, projection), folded = groove(0.1, color, projection);
+      for (int x : {95, 100, 104}) EXPECT_LT(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)) - 0.01) << x;
+      for (int x : {20, 60, 140, 180})
+        EXPECT_NEAR(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)), 0.01) << x;
+    }
+}
+
+TEST(Surface, ParallelRaysShadeAFlatWallAlike) {
+  const Image flat = groove(0, ColorBy::normal, Projection::orthographic);
+  for (int x : {0, 50, 150, 199}) EXPECT_EQ(flat.at(x, 20), flat.at(100, 20)) << x;
+  EXPECT_NE(groove(0, ColorBy::normal, Projection::perspective).at(0, 20), flat.at(0, 20));
 }
 
 TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {

@@ -26,10 +26,24 @@ inline bool atEdge(const ViewBuffers& buffers, int x, int y) {
   return false;
 }
 
-/// Direction of a pixel's ray, unit.
+/// Where a pixel's ray starts.
+inline Vector3 rayStart(const Camera& camera, int width, int height, int x, int y) {
+  if (camera.projection == Projection::perspective) return camera.eye;
+  return camera.eye + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
+}
+
+/// Its direction, unit.
 inline Vector3 rayDirection(const Camera& camera, int width, int height, int x, int y) {
+  if (camera.projection == Projection::orthographic) return camera.forward;
   return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
       .normalized();
+}
+
+/// What a pixel sees: where it hits.
+inline Vector3 hitPoint(const Camera& camera, const ViewBuffers& buffers, std::size_t pixel) {
+  const int x = static_cast<int>(pixel % buffers.width), y = static_cast<int>(pixel / buffers.width);
+  return rayStart(camera, buffers.width, buffers.height, x, y) +
+         double(buffers.distance[pixel]) * rayDirection(camera, buffers.width, buffers.height, x, y);
 }
 
 /// Cells, degrees and depths agree but for few pixels, each within one pixel of an edge; where they agree, values,

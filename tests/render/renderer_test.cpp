@@ -55,8 +55,10 @@ Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) 
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
 }
 
+constexpr Projection kProjections[] = {Projection::perspective, Projection::orthographic};
+
 /// Cameras of every kind: orbits near and far, eyes anywhere within the domain (also inside the solid) and eyes beside
-/// the surface looking along it.
+/// the surface looking along it. The first two also orthographically: from before the domain, and from planes within.
 std::vector<Camera> cameras(const Field& field, unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -69,13 +71,20 @@ std::vector<Camera> cameras(const Field& field, unsigned seed, int count) {
   std::vector<Camera> result;
   for (int i = 0; i < count; ++i) {
     if (i % 3 == 0) {
-      const OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
-                              .elevationDegrees = 180 * unit(random) - 90,
-                              .distance = std::exp(4 * unit(random) - 2),
-                              .fieldOfViewDegrees = 20 + 60 * unit(random)};
-      result.push_back(cameraOf(orbit, domain, kWidth, kHeight));
+      OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
+                        .elevationDegrees = 180 * unit(random) - 90,
+                        .distance = std::exp(4 * unit(random) - 2),
+                        .fieldOfViewDegrees = 20 + 60 * unit(random)};
+      for (const Projection projection : kProjections) {
+        orbit.projection = projection;
+        result.push_back(cameraOf(orbit, domain, kWidth, kHeight));
+      }
     } else if (i % 3 == 1) {
-      result.push_back(lookingAt(somewhere(), direction(), 0.2 + unit(random)));
+      Camera camera = lookingAt(somewhere(), direction(), 0.2 + unit(random));
+      for (const Projection projection : kProjections) {
+        camera.projection = projection;
+        result.push_back(camera);
+      }
     } else {
       Vector3 eye = somewhere();
       for (int step = 0; step < 20; ++step) {
@@ -191,28 +200,31 @@ std::optional<std::pair<double, double>> stretchWithin(const Box& box, const Vec
   return std::pair(first, last);
 }
 
-/// Follows every 7th pixel's ray in small steps. Before the hit, and all along the ray where there is none,
-/// `height(point)` must stay on the side of the surface on which it starts, down to -tolerance.
+/// Follows every 7th pixel's ray in small steps. Before the hit (by `nearHit` across the faces of cells, which a ray
+/// may meet at a shallow angle), and all along the ray where there is none, `height(point)` must stay on the side of
+/// the surface on which it starts, down to -tolerance.
 template <typename Height>
 void expectNothingPassed(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int steps,
                          double tolerance, double nearHit, Height&& height) {
   for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
     const int x = static_cast<int>(i % buffers.width);
     const int y = static_cast<int>(i / buffers.width);
+    const Vector3 eye = rayStart(view.camera, buffers.width, buffers.height, x, y);
     const Vector3 direction = rayDirection(view.camera, buffers.width, buffers.height, x, y);
-    const auto stretch = stretchWithin(field.domain(), view.camera.eye, direction);
+    const auto stretch = stretchWithin(field.domain(), eye, direction);
     if (!stretch) {
       EXPECT_FALSE(buffers.hit(i));
       continue;
     }
     const auto [first, last] = *stretch;
-    const double end = buffers.hit(i) ? buffers.distance[i] - nearHit : last - 1e-9;
-    const double start = height(view.camera.eye + (first + 1e-9) * direction) - view.offset;
+    const double shallowest = std::max(0.02, direction.cwiseAbs().minCoeff());
+    const double end = buffers.hit(i) ? buffers.distance[i] - nearHit / shallowest : last - 1e-9;
+    const double start = height(eye + (first + 1e-9) * direction) - view.offset;
     if (std::abs(start) <= tolerance) continue;  // starts on the surface
     for (int step = 1; step < steps; ++step) {
       const double t = first + 1e-9 + (end - first) * step / steps;
       if (t >= end) break;
-      const double here = height(view.camera.eye + t * direction) - view.offset;
+      const double here = height(eye + t * direction) - view.offset;
       ASSERT_GT(start > 0 ? here : -here, -tolerance) << "pixel (" << x << ", " << y << ") at " << t << " of " << end;
     }
   }
@@ -253,32 +265,48 @@ TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
   std::size_t seen = 0;
   for (int axis = 0; axis < 3; ++axis)
     for (const double offset : {-0.3, 0.0, 0.25, 2.0, -2.0})
-      for (const double azimuth : {30.0, 200.0}) {
-        const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25};
-        const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
-        const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
-        const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
-        const bool eyeAbove = camera.eye[axis] >= offset;
-        for (int y = 0; y < kHeight; ++y)
-          for (int x = 0; x < kWidth; ++x) {
-            const std::size_t i = std::size_t(y) * kWidth + x;
+      for (const double azimuth : {30.0, 200.0})
+        for (const Projection projection : kProjections) {
+          const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25, .projection = projection};
+          const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+          const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
+          const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
+          const bool above =
+              projection == Projection::perspective ? camera.eye[axis] >= offset : camera.forward[axis] < 0;
+          for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
             if (!buffers.hit(i)) continue;
             ++seen;
-            const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, kWidth, kHeight, x, y);
-            EXPECT_LE((hit[axis] - offset) * (eyeAbove ? 1 : -1), 1e-5);
+            EXPECT_LE((hitPoint(camera, buffers, i)[axis] - offset) * (above ? 1 : -1), 1e-5);
           }
-        if (!gl) continue;
-        EXPECT_TRUE(agree(buffers, gl->surface(view, kWidth, kHeight), surfaceTolerance(field), &camera))
-            << axis << " " << offset << " " << azimuth;
-      }
+          if (!gl) continue;
+          EXPECT_TRUE(agree(buffers, gl->surface(view, kWidth, kHeight), surfaceTolerance(field), &camera))
+              << axis << " " << offset << " " << azimuth;
+        }
   EXPECT_GT(seen, 10000u);
   const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   EXPECT_THROW(cpu->surface({camera, 0, ClipPlane{0, std::nan("")}}, 8, 8), Error);
 }
 
-TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+TEST(Surface, AlongAClippingPlaneParallelRaysSeeTheSideThatPerspectiveSees) {
   const Field field = randomField(5, {.roughness = 0.05});
-  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
+  const auto cpu = makeCpuRenderer(field);
+  for (const double azimuth : {-90.0, 90.0, 270.0})  // along x, but for rounding
+    for (const double offset : {-0.1, 0.1}) {
+      const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 0, .projection = Projection::orthographic};
+      const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+      const ViewBuffers buffers = cpu->surface({camera, 0, ClipPlane{2, offset}}, kWidth, kHeight);
+      EXPECT_GT(hits(buffers), 500u);
+      for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+        if (!buffers.hit(i)) continue;
+        const double z = hitPoint(camera, buffers, i).z();
+        EXPECT_TRUE(offset > 0 ? z > offset : z < offset) << azimuth << " " << offset;
+      }
+    }
+}
+
+void expectSectionWhereTheSolidIsCut(Projection projection) {
+  const Field field = randomField(5, {.roughness = 0.05});
+  const Camera camera = cameraOf({.projection = projection}, field.domain(), kWidth, kHeight);
   const SurfaceView view{camera, 0, ClipPlane{2, 0.1}};
   ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   const ViewBuffers before = buffers;
@@ -287,8 +315,9 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const std::size_t i = std::size_t(y) * kWidth + x;
+      const Vector3 eye = rayStart(camera, kWidth, kHeight, x, y);
       const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
-      const Vector3 point = camera.eye + (0.1 - camera.eye.z()) / ray.z() * ray;
+      const Vector3 point = eye + (0.1 - eye.z()) / ray.z() * ray;
       const bool cut = field.domain().contains(point) && field.value({point.x(), point.y(), 0.1}) < 0;
       ASSERT_EQ(buffers.section[i] != 0, cut);
       if (!cut) {
@@ -301,7 +330,7 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
       EXPECT_EQ(buffers.cell[i], cell.id);
       EXPECT_EQ(buffers.degree[i], cell.degree);
       EXPECT_LT(buffers.value[i], 0);
-      EXPECT_NEAR(buffers.distance[i], (point - camera.eye).norm(), 1e-5);
+      EXPECT_NEAR(buffers.distance[i], (point - eye).norm(), 1e-5);
       EXPECT_EQ(buffers.normal[i], Eigen::Vector3f::UnitZ());
     }
   EXPECT_GT(inside, 300);
@@ -309,6 +338,10 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
   ViewBuffers whole = before;
   addSection(field, {camera, 0}, whole);
   EXPECT_TRUE(whole.section.empty());
+}
+
+TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+  for (const Projection projection : kProjections) expectSectionWhereTheSolidIsCut(projection);
 }
 
 /// One cell of degree 2 in [−1, 1]³: the linear terms are 0, `c` in lexicographic order.
@@ -351,7 +384,7 @@ void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(con
       const ViewBuffers buffers = make(grazing.field)->surface({camera, 0}, 16, 12);
       EXPECT_EQ(hits(buffers), buffers.cell.size()) << "a dip of " << dip << " is passed";
       for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
-        const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, 16, 12, int(i % 16), int(i / 16));
+        const Vector3 hit = hitPoint(camera, buffers, i);
         EXPECT_NEAR(grazing.field.value(hit), 0, 1e-5);
         EXPECT_LT(hit.dot(grazing.direction), 0) << "the first crossing is passed, dip " << dip;
       }
@@ -386,11 +419,9 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
       expectNothingPassed(field, {camera, 0}, buffers, 300, tolerance, 0, distance);
       for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
         if (!buffers.hit(i)) continue;
-        const Vector3 direction = rayDirection(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
-        const Vector3 hit = camera.eye + double(buffers.distance[i]) * direction;
         // where the ray begins within the error of the surface the field may see it already crossed
-        if (std::abs(distance(camera.eye)) > tolerance) {
-          EXPECT_NEAR(distance(hit), 0, tolerance) << name;
+        if (std::abs(distance(rayStart(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth)))) > tolerance) {
+          EXPECT_NEAR(distance(hitPoint(camera, buffers, i)), 0, tolerance) << name;
         }
       }
     }
@@ -424,6 +455,41 @@ TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
     ++compared;
   }
   EXPECT_GT(compared, 2000);
+}
+
+/// Parallel rays, by the formula; and however far away the camera is said to be, hits are as precise.
+TEST(CpuTrace, HitsTheSphereOrthographically) {
+  const double radius = 0.8;
+  const Field& field = shape("sphere,radius=0.8");
+  const auto cpu = makeCpuRenderer(field);
+  const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
+  for (const double distance : {1.1, 1e7}) {
+    // the same height at the target
+    const double halfHeight = 1.1 * std::tan(17.5 * std::acos(-1.0) / 180) / distance;
+    const OrbitCamera orbit{.distance = distance,
+                            .fieldOfViewDegrees = 2 * std::atan(halfHeight) * 180 / std::acos(-1.0),
+                            .projection = Projection::orthographic};
+    const Camera camera = cameraOf(orbit, kCube, kWidth, kHeight);
+    const ViewBuffers buffers = cpu->surface({camera, 0}, kWidth, kHeight);
+    const ViewBuffers other = gl ? gl->surface({camera, 0}, kWidth, kHeight) : buffers;
+    EXPECT_TRUE(agree(buffers, other, surfaceTolerance(field), &camera));
+    int compared = 0;
+    for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+      const Vector3 start = rayStart(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
+      const double toMiddle = -start.dot(camera.forward);
+      const double nearest2 = start.squaredNorm() - toMiddle * toMiddle;
+      if (nearest2 > 1.01 * radius * radius) {
+        EXPECT_FALSE(buffers.hit(i) || other.hit(i));
+      }
+      if (nearest2 > 0.98 * radius * radius) continue;
+      ASSERT_TRUE(buffers.hit(i) && other.hit(i));
+      EXPECT_NEAR(buffers.distance[i], toMiddle - std::sqrt(radius * radius - nearest2), 1e-3);
+      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 1e-6);
+      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 1e-5);
+      ++compared;
+    }
+    EXPECT_GT(compared, 2000) << distance;
+  }
 }
 
 TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
@@ -559,13 +625,22 @@ TEST_F(Gl, SurfacesSeenAlongAnAxis) {
     const Field& field = shape(name);
     const auto cpu = makeCpuRenderer(field);
     const auto gl = makeGlRenderer(field, GlChoice::software);
+    struct Direction {
+      int azimuth, elevation;
+      Projection projection;
+    };
+    std::vector<Direction> directions;
     for (const auto& [azimuth, elevation] : {std::pair(0, 0), {90, 0}, {180, 0}, {270, 0}, {0, 90}, {0, -90}, {45, 0}})
+      for (const Projection projection : kProjections) directions.push_back({azimuth, elevation, projection});
+    for (const auto& [azimuth, elevation, projection] : directions)
       for (const auto& [width, height] : {std::pair(96, 64), {97, 65}, {160, 107}}) {
-        const OrbitCamera orbit{.azimuthDegrees = double(azimuth), .elevationDegrees = double(elevation)};
+        const OrbitCamera orbit{
+            .azimuthDegrees = double(azimuth), .elevationDegrees = double(elevation), .projection = projection};
         const Camera camera = cameraOf(orbit, field.domain(), width, height);
         const ViewBuffers expected = cpu->surface({camera, 0}, width, height);
         const ViewBuffers actual = gl->surface({camera, 0}, width, height);
-        const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation);
+        const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation) +
+                                  (projection == Projection::perspective ? "" : ", orthographic");
         EXPECT_TRUE(agree(expected, actual, surfaceTolerance(field), &camera)) << where << ", width " << width;
         if (name == "torus") continue;  // whose silhouette is not convex
         EXPECT_EQ(gaps(expected), 0u) << where << ", width " << width;

@@ -169,6 +169,39 @@ TEST(Camera, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
       }
 }
 
+/// What lies in the plane through the target is where perspective shows it; and rays start before the domain, but not
+/// far from it.
+TEST(Camera, OrthographicKeepsTheFramingAndStartsBeforeTheDomain) {
+  const double diagonal = kBox.sizes().norm();
+  for (const double distance : {0.01, 1.1, 1e9})
+    for (const Vector3& target : {Vector3(kBox.center()), Vector3(0.3, -0.2, 0.7), Vector3(50, -60, 70)})
+      for (const double azimuth : {0.0, 33.0, 200.0})
+        for (const double elevation : {-90.0, -20.0, 0.0, 60.0}) {
+          OrbitCamera orbit{
+              .azimuthDegrees = azimuth, .elevationDegrees = elevation, .distance = distance, .target = target};
+          const Camera perspective = cameraOf(orbit, kBox, 300, 200);
+          orbit.projection = Projection::orthographic;
+          const Camera view = cameraOf(orbit, kBox, 300, 200);
+          EXPECT_EQ(view.forward, perspective.forward);
+          for (const auto& [x, y] : {std::pair(0, 0), {299, 0}, {10, 150}}) {
+            const Vector3 ray = pixelRay(perspective, x, y, 300, 200);
+            const double toTarget = distance * diagonal / ray.dot(view.forward);
+            const Vector3 shown = pixelEye(perspective, x, y, 300, 200) + toTarget * ray;
+            const Vector3 start = pixelEye(view, x, y, 300, 200);
+            EXPECT_EQ(pixelRay(view, x, y, 300, 200), view.forward);
+            const Vector3 across = shown - start - (shown - start).dot(view.forward) * view.forward;
+            EXPECT_LT(across.norm(), 1e-9 * std::max(1.0, distance) * diagonal);
+          }
+          double nearest = kInfinity;
+          for (int i = 0; i < 8; ++i) {
+            const Vector3 corner = kBox.corner(static_cast<Box::CornerType>(i));
+            nearest = std::min(nearest, (corner - view.eye).dot(view.forward));
+          }
+          EXPECT_GT(nearest, 0);
+          EXPECT_LT(nearest, 0.05 * diagonal);
+        }
+}
+
 TEST(Camera, RefusesNumbersOutOfRange) {
   const auto with = [](auto change) {
     OrbitCamera camera;

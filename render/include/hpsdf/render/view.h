@@ -30,7 +30,12 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
 
 enum class UpAxis : std::uint8_t { y, z };
 
-/// A camera that orbits the centre of the domain, or another target; perspective.
+enum class Projection : std::uint8_t {
+  perspective,
+  orthographic,  ///< parallel rays: what is farther away is no smaller
+};
+
+/// A camera that orbits the centre of the domain, or another target.
 struct OrbitCamera {
   double azimuthDegrees = 30;      ///< about the up axis, 0 looks along −z (y up) or from −y (z up)
   double elevationDegrees = 20;    ///< above the horizon, −90 to 90
@@ -38,21 +43,33 @@ struct OrbitCamera {
   double fieldOfViewDegrees = 35;  ///< vertical
   UpAxis up = UpAxis::y;
   std::optional<Vector3> target = {};  ///< world units; the domain's centre when not given
+  Projection projection = Projection::perspective;
 };
 
-/// A pinhole: pixel (x, y) of w × h looks along forward + right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h).
+/// The rays of a view. With across = right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h), pixel (x, y) of w × h looks
+/// * in perspective from the eye along forward + across,
+/// * orthographically from eye + across along forward.
 struct Camera {
-  Vector3 eye;
+  Vector3 eye;      ///< orthographic: the middle of the plane where rays start; what lies before it is not seen
   Vector3 forward;  ///< unit
-  Vector3 right;    ///< half the width at distance 1
-  Vector3 up;       ///< half the height at distance 1
+  Vector3 right;    ///< half the width, in perspective at distance 1
+  Vector3 up;       ///< half the height, in perspective at distance 1
+  Projection projection = Projection::perspective;
 };
+
+/// Orthographic: as high at the target as in perspective from `distance`; but rays start just before the domain,
+/// whatever the distance, so that they do not start within it and lengths along them stay precise.
+/// Throws `Error` for numbers out of range.
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
-/// The unit direction in which pixel (x, y) of a view of width × height looks.
+/// Where the ray of pixel (x, y) of a view of width × height starts, world units.
+Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height);
+
+/// The unit direction in which it looks.
 Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 
-/// The plane {x_axis = offset}; the half on the eye's side is left out.
+/// The plane {x_axis = offset}; the half on the eye's side is left out. Orthographically the eye is infinitely far
+/// away, and the side that of the target where one looks along the plane.
 struct ClipPlane {
   int axis = 2;
   double offset = 0;  ///< world units
@@ -77,7 +94,7 @@ struct ViewBuffers {
   std::vector<std::uint8_t> depth;
   std::vector<float> value;             ///< f at the point; along a ray, at the hit (near the offset)
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f, made a unit vector; not filled for slices
-  std::vector<float> distance;          ///< from the eye to the hit, world units; not filled for slices
+  std::vector<float> distance;          ///< from where the ray starts to the hit, world units; not filled for slices
   /// 1 where a pixel shows the section of the solid with a clipping plane; filled by `addSection`, else empty.
   std::vector<std::uint8_t> section;
 
