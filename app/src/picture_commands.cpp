@@ -322,6 +322,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
     picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
   else if (arguments.given("clip-offset"))
     throw Error("clip-offset: needs clip, the axis that it lies on");
+  picture.cracks = arguments.flag("cracks");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
@@ -387,6 +388,7 @@ void addPictureCommands(Registry& registry) {
                     "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
                     "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
                     "hpsdf render bunny.hpsdf -o inside.png --clip z --color degree",
+                    "hpsdf render bunny.hpsdf -o front.png --view front --projection orthographic --cracks",
                     "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
        .parameters =
            {fieldParameter(),
@@ -435,7 +437,12 @@ void addPictureCommands(Registry& registry) {
              .type = ParameterType::number,
              .help = "Where the cut crosses that axis.",
              .defaultText = "0",
-             .unit = "world units"}},
+             .unit = "world units"},
+            {.name = "cracks",
+             .type = ParameterType::flag,
+             .help = "Mark in magenta where the surface is torn: the field jumps over the distance drawn from one cell "
+                     "to the next. The caption has the widest jump.",
+             .defaultText = "false"}},
        .action = runRender},
       joined(colorParameters(ColorBy::distance,
                              "normal lights the surface; degree and depth show the cells that hold it.", "normal"),

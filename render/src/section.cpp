@@ -48,6 +48,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
       buffers.value[i] = static_cast<float>(values[n]);
       buffers.normal[i] = towardsEye;
       buffers.distance[i] = static_cast<float>(cuts[n].distance);
+      buffers.crack[i] = 0;
       buffers.section[i] = 1;
     }
   });

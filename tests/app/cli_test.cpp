@@ -699,6 +699,7 @@ TEST_F(Cli, viewsAreNamedOrAimed) {
   EXPECT_NE(surface({"--target", "0.5,0,0"}), surface({}));
   EXPECT_NE(surface({"--projection", "orthographic"}), surface({}));
   EXPECT_EQ(surface({"--projection", "perspective"}), surface({}));
+  EXPECT_NE(surface({"--cracks"}), surface({}));
   EXPECT_NE(surface({"--clip", "z"}), surface({}));
   EXPECT_NE(surface({"--clip", "z", "--clip-offset", "0.1"}), surface({"--clip", "z"}));
   EXPECT_EQ(surface({"--clip", "z", "--clip-offset", "50"}), surface({"--clip", "z", "--clip-offset", "40"}));

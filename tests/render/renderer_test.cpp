@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -14,6 +16,7 @@
 #include <thread>
 
 #include "compare_buffers.h"
+#include "cracks.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
@@ -530,6 +533,180 @@ TEST(CpuRenderer, RefusesViewsThatAreNone) {
   Camera badCamera = camera;
   badCamera.forward.setZero();
   EXPECT_THAT([&] { renderer->surface({badCamera, 0}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("forward")));
+}
+
+// --- Cracks --------------------------------------------------------------------------------------------------------
+
+/// A polynomial of degree 2 in a cell: in local coordinates, plain Legendre, lexicographic.
+using Quadratic = std::array<double, 10>;
+
+/// 4 × 4 × 4 base cells in [−1, 1]³, some of them divided; each with the polynomial that is given for its centre and
+/// half its size.
+Field pieces(const std::function<Quadratic(const Vector3&, double)>& polynomial) {
+  FieldData data{.domain = Box(-Vector3::Ones(), Vector3::Ones()),
+                 .grid = {4, 4, 4},
+                 .nodes = std::vector<std::uint64_t>(64),
+                 .coefficients = {},
+                 .metadata = {}};
+  std::vector<double> coefficients;
+  const auto leaf = [&](const Vector3& center, double half) {
+    const Quadratic c = polynomial(center, half);
+    coefficients.insert(coefficients.end(), c.begin(), c.end());
+    return node::leaf(2, std::uint32_t(coefficients.size() - c.size()));
+  };
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    const Vector3 center = Vector3(i % 4, i / 4 % 4, i / 16) * 0.5 - Vector3::Constant(0.75);
+    if (i % 3 != 0) {
+      data.nodes[i] = leaf(center, 0.25);
+      continue;
+    }
+    data.nodes[i] = node::internal(std::uint32_t(data.nodes.size()));
+    for (int child = 0; child < 8; ++child)
+      data.nodes.push_back(
+          leaf(center + 0.125 * Vector3(child & 1 ? 1 : -1, child & 2 ? 1 : -1, child & 4 ? 1 : -1), 0.125));
+  }
+  data.coefficients = std::move(coefficients);
+  return Field(std::move(data));
+}
+
+/// value + slope · (x − center)
+Quadratic linear(double value, const Vector3& slope, double half) {
+  return {value, slope.z() * half, 0, slope.y() * half, 0, 0, slope.x() * half};
+}
+
+/// (|x|² − r²) / 2r: of slope 1 on a sphere.
+Quadratic ball(double radius, const Vector3& center, double half) {
+  Quadratic c = linear((center.squaredNorm() + half * half - radius * radius) / (2 * radius), center / radius, half);
+  c[2] = c[5] = c[9] = half * half / (3 * radius);
+  return c;
+}
+
+/// Both, where there is OpenGL.
+std::vector<std::unique_ptr<Renderer>> renderersOf(const Field& field) {
+  std::vector<std::unique_ptr<Renderer>> result;
+  result.push_back(makeCpuRenderer(field));
+  if (support::glProblem().empty()) result.push_back(makeGlRenderer(field, GlChoice::software));
+  return result;
+}
+
+std::size_t crackCount(const ViewBuffers& buffers) {
+  return std::size_t(std::ranges::count(buffers.crack, std::uint8_t{1}));
+}
+
+/// The same polynomial everywhere, a kink at faces, and a surface that lies in faces, which rays meet just behind them;
+/// solids that the walls cut, so that rays enter within them.
+TEST(Cracks, AreNoneInAContinuousField) {
+  struct Continuous {
+    const char* name;
+    Field field;
+  };
+  const Continuous fields[] = {
+      {"sphere", pieces([](const Vector3& c, double half) { return ball(0.8, c, half); })},
+      {"ball beyond the walls", pieces([](const Vector3& c, double half) { return ball(1.2, c, half); })},
+      {"plane in faces", pieces([](const Vector3& c, double half) { return linear(c.z(), Vector3::UnitZ(), half); })},
+      {"oblique plane",
+       pieces([](const Vector3& c, double half) { return linear(c.sum() - 0.3, Vector3::Ones(), half); })},
+      {"kink", pieces([](const Vector3& c, double half) {
+         return linear(c.z() + 0.5 * std::abs(c.x()), Vector3(c.x() < 0 ? -0.5 : 0.5, 0, 1), half);
+       })},
+  };
+  for (const auto& [name, field] : fields) {
+    std::vector<Camera> views = cameras(field, 41, 3);
+    for (const double elevation : {-40.0, 0.0, 30.0, 90.0})
+      for (const Projection projection : kProjections)
+        views.push_back(
+            cameraOf({.elevationDegrees = elevation, .projection = projection}, field.domain(), kWidth, kHeight));
+    std::size_t seen = 0;
+    for (const auto& renderer : renderersOf(field))
+      for (const Camera& camera : views)
+        for (const double offset : {0.0, 0.25}) {
+          const ViewBuffers buffers = renderer->surface({camera, offset}, kWidth, kHeight);
+          seen += hits(buffers);
+          EXPECT_EQ(crackCount(buffers), 0u) << name << ", offset " << offset;
+        }
+    EXPECT_GT(seen, 20000u) << name;
+  }
+}
+
+/// f = z − 0.1 where x < 0, z + 0.1 elsewhere: seen from above and +x a cliff at x = 0.
+TEST(Cracks, AreExactlyWhereTheStepIs) {
+  const Field field = pieces(
+      [](const Vector3& c, double half) { return linear(c.z() + (c.x() < 0 ? -0.1 : 0.1), Vector3::UnitZ(), half); });
+  for (const Projection projection : kProjections) {
+    OrbitCamera orbit{
+        .azimuthDegrees = 60, .elevationDegrees = 25, .distance = 0.6, .up = UpAxis::z, .projection = projection};
+    const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+    for (const auto& renderer : renderersOf(field)) {
+      const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+      int cliff = 0, others = 0;
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+          const std::size_t i = std::size_t(y) * kWidth + x;
+          const Vector3 start = rayStart(camera, kWidth, kHeight, x, y);
+          const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
+          const Vector3 at = start - start.x() / ray.x() * ray;  // at x = 0
+          // all rays go down: above the lower floor at x = 0, they have not met it before
+          const bool expected = ray.x() < 0 && field.domain().contains(at) && at.z() > -0.1 && at.z() < 0.1;
+          if (std::abs(std::abs(at.z()) - 0.1) < 1e-4) continue;
+          ASSERT_EQ(buffers.crack[i] != 0, expected) << x << ", " << y;
+          if (!expected) {
+            others += buffers.hit(i);
+            continue;
+          }
+          ++cliff;
+          ASSERT_TRUE(buffers.hit(i));
+          EXPECT_NEAR(buffers.value[i], at.z() - 0.1, 1e-5);
+          EXPECT_LT((hitPoint(camera, buffers, i) - at).norm(), 1e-4);
+        }
+      EXPECT_GT(cliff, 500);
+      EXPECT_GT(others, 3000);
+      const Cracks cracks = cracksOf(buffers, 0, 1);
+      EXPECT_NEAR(double(cracks.pixels), cliff, 30);
+      EXPECT_GT(cracks.widest, 0.195);
+      EXPECT_LT(cracks.widest, 0.2 + 1e-5);
+    }
+    // from high above and −x one looks over the cliff
+    orbit.azimuthDegrees = -60;
+    orbit.elevationDegrees = 50;
+    orbit.distance = 0.25;
+    const SurfaceView over{cameraOf(orbit, field.domain(), kWidth, kHeight), 0};
+    for (const auto& renderer : renderersOf(field)) {
+      const ViewBuffers buffers = renderer->surface(over, kWidth, kHeight);
+      EXPECT_EQ(hits(buffers), buffers.cell.size());
+      EXPECT_EQ(crackCount(buffers), 0u);
+    }
+  }
+}
+
+/// Steps a little higher than what the march cannot tell from none, and a little lower.
+TEST(Cracks, OfHardlyAnyHeightAreNone) {
+  const auto stepped = [](double step) {
+    return pieces([step](const Vector3& c, double half) {
+      return linear(c.x() + 0.5 * (c.x() < 0 ? -step : step), Vector3::UnitX(), half);
+    });
+  };
+  const double diagonal = std::sqrt(12.0);
+  const Camera camera = cameraOf({.azimuthDegrees = 80, .distance = 0.3}, kCube, kWidth, kHeight);
+  const Field high = stepped(20e-6 * diagonal), low = stepped(2e-6 * diagonal);
+  for (const auto& renderer : renderersOf(high)) {
+    const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+    EXPECT_EQ(crackCount(buffers), buffers.crack.size());
+  }
+  for (const auto& renderer : renderersOf(low)) {
+    const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+    EXPECT_EQ(hits(buffers), buffers.cell.size());
+    EXPECT_EQ(crackCount(buffers), 0u);
+  }
+}
+
+TEST(Cracks, AreNotOnTheSectionOfAClippingPlane) {
+  const Field field = randomField(5, {.roughness = 0.2});
+  const SurfaceView view{cameraOf({}, field.domain(), kWidth, kHeight), 0, ClipPlane{2, 0.1}};
+  ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
+  const std::size_t before = crackCount(buffers);
+  addSection(field, view, buffers);
+  EXPECT_LT(crackCount(buffers), before) << "no crack behind the section: the test shows nothing";
+  for (std::size_t i = 0; i < buffers.crack.size(); ++i) EXPECT_FALSE(buffers.crack[i] && buffers.section[i]);
 }
 
 // --- OpenGL against the oracle -------------------------------------------------------------------------------------

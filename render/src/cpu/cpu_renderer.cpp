@@ -1,5 +1,6 @@
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "cpu/trace.h"
@@ -88,6 +89,8 @@ class CpuRenderer final : public Renderer {
     buffers.normal[pixel] = (length > 0 ? Vector3(gradient / length) : Vector3(-direction)).cast<float>();
     buffers.value[pixel] = static_cast<float>(sample.value);
     buffers.distance[pixel] = static_cast<float>(entry->fromEye + hit->t);
+    const double step = std::abs(sample.value - offset);
+    buffers.crack[pixel] = hit->onFace && step > kCrack * field_.space().diagonal * std::max(1.0, length);
   }
 
   void setCell(const CellPoint& at, std::size_t pixel, ViewBuffers& buffers) const {

@@ -280,7 +280,8 @@ class GlRenderer final : public Renderer {
         const Texel& texel = integers_[from];
         buffers.cell[to] = texel[0];
         buffers.degree[to] = static_cast<std::uint8_t>(texel[1] & 0xff);
-        buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8);
+        buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8 & 0xff);
+        buffers.crack[to] = static_cast<std::uint8_t>(texel[1] >> 16);
         buffers.value[to] = std::bit_cast<float>(texel[2]);
         buffers.distance[to] = std::bit_cast<float>(texel[3]);
         buffers.normal[to] = {normals_[from][0], normals_[from][1], normals_[from][2]};

@@ -72,6 +72,7 @@ struct SurfacePicture {
   int samples = 1;
   ScaleOptions scale = {};
   std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, its cells outlined
+  bool cracks = false;  ///< mark where the field jumps over the offset between two cells (`ViewBuffers::crack`)
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in

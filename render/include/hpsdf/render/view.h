@@ -95,6 +95,9 @@ struct ViewBuffers {
   std::vector<float> value;             ///< f at the point; along a ray, at the hit (near the offset)
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f, made a unit vector; not filled for slices
   std::vector<float> distance;          ///< from where the ray starts to the hit, world units; not filled for slices
+  /// 1 where the field jumps over the offset at a face between two cells instead of passing it within one: f − offset
+  /// is the height of the step on the far side. Not filled for slices.
+  std::vector<std::uint8_t> crack;
   /// 1 where a pixel shows the section of the solid with a clipping plane; filled by `addSection`, else empty.
   std::vector<std::uint8_t> section;
 
