@@ -277,6 +277,11 @@ std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCel
 
 }  // namespace
 
+Vector3 pointOf(const Arguments& arguments, const char* name) {
+  const auto p = arguments.numbers(name);
+  return {p[0], p[1], p[2]};
+}
+
 render::SlicePicture slicePicture(const Arguments& arguments) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
@@ -288,6 +293,8 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
     picture.plane =
         render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
   }
+  picture.zoom = arguments.number("zoom");
+  if (arguments.given("target")) picture.target = pointOf(arguments, "target");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
@@ -310,10 +317,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
     picture.camera.azimuthDegrees = view.azimuthDegrees;
     picture.camera.elevationDegrees = view.elevationDegrees;
   }
-  if (arguments.given("target")) {
-    const auto target = arguments.numbers("target");
-    picture.camera.target = Vector3(target[0], target[1], target[2]);
-  }
+  if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                              : render::Projection::perspective;
@@ -375,6 +379,18 @@ void addPictureCommands(Registry& registry) {
                 .valueName = "PX,PY,PZ,NX,NY,NZ",
                 .unit = "world units",
                 .counts = {6}},
+               {.name = "zoom",
+                .type = ParameterType::number,
+                .help = "How many times larger than with the whole section in the picture.",
+                .defaultText = "1",
+                .minimum = 0,
+                .minimumExcluded = true},
+               {.name = "target",
+                .type = ParameterType::numbers,
+                .help = "The point in the picture's middle, moved into the plane; the section's middle when left out.",
+                .valueName = "X,Y,Z",
+                .unit = "world units",
+                .counts = {3}},
            },
        .action = runSlice},
       joined(colorParameters(ColorBy::normal, "degree and depth show the cells, distance iso-lines.", "degree"),

@@ -13,6 +13,9 @@ render::GlChoice glChoice(const Arguments& arguments);
 /// Throws `Error` when --cpu and --gl are both given.
 Backend backend(const Arguments& arguments);
 
+/// Of a parameter that takes three numbers and was given.
+Vector3 pointOf(const Arguments& arguments, const char* name);
+
 /// Throws `Error` when plane and axis are both given.
 render::SlicePicture slicePicture(const Arguments& arguments);
 

@@ -36,14 +36,15 @@ void checkSize(int width, int height, int samples) {
                 " samples a pixel takes more than 64 million samples: give a smaller size or fewer samples");
 }
 
-Frame frameOf(const SlicePicture& picture) {
+template <typename Picture>
+Frame frameOf(const Picture& picture) {
   checkSize(picture.width, picture.height, picture.samples);
-  return frame(picture.width, picture.height);
-}
-
-Frame frameOf(const SurfacePicture& picture) {
-  checkSize(picture.width, picture.height, picture.samples);
-  return frame(picture.width, picture.height);
+  Frame result = frame(picture.width, picture.height);
+  if (picture.bare) {
+    result.view = {0, 0, picture.width, picture.height};
+    result.panel = result.caption = {};
+  }
+  return result;
 }
 
 double lineWidthOf(const Frame& frame) { return std::max(0.7, frame.textSize / 15); }
@@ -133,6 +134,33 @@ LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatisti
   LevelMap map(levelsOf(shares));
   addLevelLegend(furniture, frame, degree ? degreeTitles : depthTitles, shares, map);
   return map;
+}
+
+Legend levelLegend(const FieldStatistics& figures, bool degree, const LevelMap& map) {
+  Legend legend{.title = degree ? "polynomial degree" : "octree depth"};
+  for (const auto& [level, share] : degree ? figures.degreeVolume : figures.depthVolume)
+    legend.levels.push_back({level, encodeSrgb(map(level)), share});
+  return legend;
+}
+
+// Of 256 colours that colorAt gives for places 0 to 1.
+std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
+  std::vector<Color> bar;
+  for (int i = 0; i < 256; ++i) bar.push_back(encodeSrgb(colorAt(i / 255.0)));
+  return bar;
+}
+
+Legend distanceLegend(const DistanceScale& scale) {
+  Legend legend{.title = "signed distance", .bar = barOf([](double t) { return divergingColor(2 * t - 1); })};
+  for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0})
+    legend.marks.push_back({0.5 + 0.5 * share, formatNumber(share * scale.range, 3)});
+  return legend;
+}
+
+Legend scaleLegend(const std::string& title, const ColorScale& scale) {
+  Legend legend{.title = title, .bar = barOf(orderedColor)};
+  for (const double value : scaleMarks(scale)) legend.marks.push_back({scale.place(value), formatNumber(value, 3)});
+  return legend;
 }
 
 // What a quantity is called: the first that fits stands above its colour bar, the last in the caption.
@@ -234,11 +262,31 @@ ViewSize viewSize(int pictureWidth, int pictureHeight) {
   return {view.width(), view.height()};
 }
 
-SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height) {
+namespace {
+
+SliceView wholeSection(const Box& domain, const SlicePicture& picture, int width, int height) {
   if (const auto* axis = std::get_if<AxisPlane>(&picture.plane))
-    return axisSlice(field.domain(), axis->axis, axis->offset, width, height);
+    return axisSlice(domain, axis->axis, axis->offset, width, height);
   const auto& plane = std::get<FreePlane>(picture.plane);
-  return planeSlice(field.domain(), plane.point, plane.normal, width, height);
+  return planeSlice(domain, plane.point, plane.normal, width, height);
+}
+
+}  // namespace
+
+SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height) {
+  if (!(picture.zoom > 0) || !std::isfinite(picture.zoom))
+    throw Error("zoom = " + formatNumber(picture.zoom) + " is out of range: give a number above 0");
+  if (picture.target && !picture.target->allFinite())
+    throw Error("the slice's target is not finite: give three coordinates");
+  SliceView view = wholeSection(field.domain(), picture, width, height);
+  if (picture.target)
+    for (const Vector3& side : {view.right, view.up})  // only within the plane: its offset stays exact
+      view.origin += side * (side.dot(*picture.target - view.origin) / side.squaredNorm());
+  if (picture.zoom != 1) {
+    view.right /= picture.zoom;
+    view.up /= picture.zoom;
+  }
+  return view;
 }
 
 SliceView sliceView(const Field& field, const SlicePicture& picture) {
@@ -264,21 +312,25 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
 
   Furniture furniture;
   Image image(picture.width, picture.height, paperColor());
+  Legend legend;
   std::vector<std::string> details;
   if (picture.color == ColorBy::distance) {
     const DistanceScale scale = scaleOf(buffers);
     addDistanceBar(furniture, frame, scale);
+    legend = distanceLegend(scale);
     place(image, colorDistanceSlice(buffers, scale, sampling));
     details = {"distance", describePlane(picture), formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
                "lines every " + formatNumber(scale.step)};
   } else if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     place(image, colorCellSlice(buffers, quantityColors(measured.values, measured.scale), sampling));
     details = {titlesOf(picture.color).back(), describePlane(picture), describeGreatest(measured.values)};
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree);
+    legend = levelLegend(figures, degree, map);
     place(image, colorCellSlice(buffers, levelColors(buffers, map, picture.color), sampling));
     details = {degree ? "degree" : "depth", describePlane(picture)};
   }
@@ -287,7 +339,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
-  return {std::move(image), view, std::move(buffers), samples, !section.empty()};
+  return {std::move(image), view, std::move(buffers), samples, !section.empty(), std::move(legend), std::move(details)};
 }
 
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
@@ -308,11 +360,13 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   Image image(picture.width, picture.height, paperColor());
   for (int y = 0; y < height; ++y)
     std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
+  Legend legend;
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
   std::vector<std::string> details;
   if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     place(image, colorSurface(buffers, view.camera, quantityColors(measured.values, measured.scale), sampling));
     details = {titlesOf(picture.color).back() + " on the " + surface, describeGreatest(measured.values)};
   } else if (picture.color == ColorBy::normal) {
@@ -322,6 +376,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree);
+    legend = levelLegend(figures, degree, map);
     place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), sampling));
     details = {(degree ? "degree on the " : "depth on the ") + surface};
   }
@@ -340,7 +395,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
   const bool seen = std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; });
-  return {std::move(image), view, std::move(buffers), samples, seen};
+  return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), std::move(details)};
 }
 
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,

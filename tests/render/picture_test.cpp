@@ -270,6 +270,47 @@ TEST(Picture, TheRendererIsAskedForTheViewAlone) {
   }
 }
 
+TEST(Picture, ABarePictureIsTheViewAloneAndItsLegendComesWithIt) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  SlicePicture picture{AxisPlane{2, 0.5}, ColorBy::degree, 320, 240};
+  picture.bare = true;
+  const Drawn drawn = drawSlice(renderer, field, picture);
+  EXPECT_EQ(drawn.buffers.width, 320);
+  EXPECT_EQ(drawn.buffers.height, 240);
+  ASSERT_EQ(drawn.legend.levels.size(), 3u);
+  EXPECT_EQ(drawn.legend.levels[2].level, 5);
+  EXPECT_DOUBLE_EQ(drawn.legend.levels[2].share, 0.125);
+  EXPECT_TRUE(drawn.legend.bar.empty());
+  const Color middle = drawn.image.at(100, 60);  // in a cell of degree 2, away from lines
+  EXPECT_EQ(middle, drawn.legend.levels[0].color);
+
+  picture.color = ColorBy::slope;
+  picture.scale = {.limits = std::array{1e-3, 1.0}};
+  const Legend bar = drawSlice(renderer, field, picture).legend;
+  ASSERT_EQ(bar.bar.size(), 256u);
+  ASSERT_EQ(bar.marks.size(), 4u);
+  EXPECT_EQ(bar.marks.front().text, "0.001");
+  EXPECT_NEAR(bar.marks[1].place, 1 / 3.0, 1e-12);
+}
+
+TEST(Picture, ASliceIsZoomedAboutItsTargetWithinItsPlane) {
+  const Field field = planeField();
+  SlicePicture picture{AxisPlane{2, 0.5}, ColorBy::degree, 320, 240};
+  const SliceView whole = sliceView(field, picture);
+  picture.zoom = 4;
+  picture.target = Vector3(0.25, -0.5, 0.875);
+  const SliceView close = sliceView(field, picture);
+  EXPECT_EQ(close.right, whole.right / 4);
+  EXPECT_EQ(close.up, whole.up / 4);
+  EXPECT_EQ(close.origin, Vector3(0.25, -0.5, 0.5));
+  picture.zoom = 0;
+  EXPECT_THROW(sliceView(field, picture), Error);
+  picture.zoom = 1;
+  picture.target = Vector3(0, std::nan(""), 0);
+  EXPECT_THROW(sliceView(field, picture), Error);
+}
+
 TEST(Picture, SizesOutOfRangeAreRefusedBeforeAnythingIsDone) {
   const Field field = planeField();
   FakeRenderer renderer(field);

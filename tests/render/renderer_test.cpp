@@ -498,7 +498,7 @@ TEST(CpuTrace, HitsTheSphereOrthographically) {
 TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
   const Field& field = shape("sphere,radius=0.8");
   const auto renderer = makeCpuRenderer(field);
-  // a pinhole at the centre sees the inside all around
+  // a camera at the centre sees the inside all around
   const Camera centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
   const ViewBuffers inside = renderer->surface({centered, 0}, kWidth, kHeight);
   EXPECT_EQ(hits(inside), inside.cell.size());

@@ -61,6 +61,9 @@ struct SlicePicture {
   int height = 720;
   int samples = 1;  ///< an axis and pixel, 1 to 8
   ScaleOptions scale = {};
+  bool bare = false;                   ///< the view alone, as large as the picture: no legend, no caption
+  double zoom = 1;                     ///< 1 shows the whole section with the domain; above 0
+  std::optional<Vector3> target = {};  ///< what is in the middle, moved into the plane; the section's middle
 };
 
 struct SurfacePicture {
@@ -73,6 +76,7 @@ struct SurfacePicture {
   ScaleOptions scale = {};
   std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, its cells outlined
   bool cracks = false;  ///< mark where the field jumps over the offset between two cells (`ViewBuffers::crack`)
+  bool bare = false;
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
@@ -83,6 +87,23 @@ struct SurfacePicture {
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
+/// What the colours of a picture mean: as it stands in the picture, or for a legend of one's own beside a bare one.
+struct Legend {
+  struct Level {
+    int level;  ///< degree or depth
+    Color color;
+    double share;  ///< of the domain's volume
+  };
+  struct Mark {
+    double place;  ///< on the bar, 0 at its low end, 1 at its high end
+    std::string text;
+  };
+  std::string title = {};          ///< empty where colours mean nothing
+  std::vector<Level> levels = {};  ///< ascending; of colours by degree or depth
+  std::vector<Color> bar = {};     ///< from its low end to its high end; of all others
+  std::vector<Mark> marks = {};
+};
+
 /// A finished picture and the view in its upper left corner.
 struct Drawn {
   Image image;
@@ -90,6 +111,8 @@ struct Drawn {
   ViewBuffers buffers;  ///< samples × samples for each pixel
   int samples = 1;
   bool seen = false;  ///< whether any pixel shows the field
+  Legend legend = {};
+  std::vector<std::string> details = {};  ///< what is shown, the most important first
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
