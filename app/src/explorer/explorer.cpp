@@ -168,7 +168,7 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   }
   const render::OrbitCamera& c = from.camera;
   if (*dragged_ != 0) {  // the target moves with the mouse
-    const auto camera = render::pinhole(c, field.domain(), int(layout.canvas.width()), int(height));
+    const auto camera = render::cameraOf(c, field.domain(), int(layout.canvas.width()), int(height));
     const double distance = c.distance * field.domain().diagonal().norm();
     const Vector3 target =
         c.target.value_or(field.domain().center()) +

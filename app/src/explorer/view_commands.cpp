@@ -165,7 +165,7 @@ void runFly(Session& session, const Arguments& arguments) {
     // what lies in front of it is cut away, unless it is the surface that one looks at
     view.clip.reset();
     if (std::abs(field.value(face.worst) - view.surfaceOffset) > size) {
-      const Vector3 forward = render::pinhole(view.camera, field.domain(), 16, 16).forward;
+      const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
       Eigen::Index axis = 0;
       forward.cwiseAbs().maxCoeff(&axis);
       view.clip = render::ClipPlane{int(axis), face.worst[axis]};
