@@ -10,7 +10,7 @@ namespace {
 void bunnyFrame(benchmark::State& state) {
   const Field& field = bunnyField();
   const auto renderer = render::makeGlRenderer(field, render::GlChoice::software);
-  const render::SurfaceView view{.camera = render::pinhole({}, field.domain(), 1280, 720)};
+  const render::SurfaceView view{.camera = render::cameraOf({}, field.domain(), 1280, 720)};
   renderer->surface(view, 1280, 720);  // compiles the shaders
   for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(renderer->surface(view, 1280, 720));
   state.SetLabel(renderer->description());

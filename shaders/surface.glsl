@@ -2,7 +2,7 @@
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;
-layout(location = 3) uniform dvec3 eye;      // grid coordinates
+layout(location = 3) uniform dvec3 eye;      // grid coordinates; see RayGeometry
 layout(location = 4) uniform dvec3 forward;  // world units
 layout(location = 5) uniform dvec3 right;
 layout(location = 6) uniform dvec3 up;
@@ -12,6 +12,7 @@ layout(location = 9) uniform float offset;
 layout(location = 10) uniform float diagonal;  // of the domain, world units
 layout(location = 15) uniform dvec3 shownLo;   // what of the domain is shown, grid coordinates
 layout(location = 16) uniform dvec3 shownHi;
+layout(location = 17) uniform bool parallel;  // rays
 
 // State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, b,
 // a first guess, -), for a pixel under way (last height, reach, -, -).
@@ -27,30 +28,41 @@ struct Ray {
   dvec3 worldDirection;  // unit
   dvec3 origin;          // where the ray enters what is shown of the domain, grid coordinates
   dvec3 direction;       // grid coordinates per world unit
-  double fromEye;        // world units from the eye to the origin
+  double fromEye;        // world units from the ray's start to the origin
   double length;         // world units within it; negative for a ray that misses it
 };
 
-Ray pixelRay() {
+// The picture's pixel when its middle is given.
+dvec3 onPicture(dvec3 middle) {
   ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
+  return middle + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
+         up * (double(size.y - 2 * pixel.y - 1) * pixelStep.y);
+}
+
+Ray pixelRay() {
   Ray ray;
-  ray.worldDirection = forward + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
-                       up * (double(size.y - 2 * pixel.y - 1) * pixelStep.y);
-  ray.worldDirection /= sqrt(dot(ray.worldDirection, ray.worldDirection));
+  dvec3 start = eye;
+  if (parallel) {
+    start += onPicture(dvec3(0.0lf)) * scale;
+    ray.worldDirection = forward;
+  } else {
+    ray.worldDirection = onPicture(forward);
+    ray.worldDirection /= sqrt(dot(ray.worldDirection, ray.worldDirection));
+  }
   ray.direction = ray.worldDirection * scale;
   double first = 0.0lf;
   double last = 1e300lf;
   for (int axis = 0; axis < 3; ++axis) {
     if (ray.direction[axis] != 0.0lf) {
-      double toLo = (shownLo[axis] - eye[axis]) / ray.direction[axis];
-      double toHi = (shownHi[axis] - eye[axis]) / ray.direction[axis];
+      double toLo = (shownLo[axis] - start[axis]) / ray.direction[axis];
+      double toHi = (shownHi[axis] - start[axis]) / ray.direction[axis];
       first = max(first, min(toLo, toHi));
       last = min(last, max(toLo, toHi));
-    } else if (!(eye[axis] >= shownLo[axis] && eye[axis] <= shownHi[axis])) {
+    } else if (!(start[axis] >= shownLo[axis] && start[axis] <= shownHi[axis])) {
       last = -1.0lf;
     }
   }
-  ray.origin = eye + first * ray.direction;
+  ray.origin = start + first * ray.direction;
   ray.fromEye = first;
   ray.length = first < last ? last - first : -1.0lf;
   return ray;

@@ -3,12 +3,13 @@
 
 layout(location = 11) uniform int mostRefinements;
 
-layout(location = 0) out uvec4 cellLevelsValueDistance;  // degree | depth << 8; value and distance as bits of floats
+layout(location = 0) out uvec4 cellLevelsValueDistance;  // degree | depth << 8 | crack << 16; value, distance as floats' bits
 layout(location = 1) out vec4 normal;
 
 const float kTurned = 1e-4;     // radians, about: how far the gradient may have turned since where it was taken
 const float kInfinity = 1e30;
 const float kConverged = 1e-8;  // in domain diagonals: change of the root between two steps; as in trace.cpp
+const float kCrack = 4e-6;      // in domain diagonals at slope 1: the lowest step at a face that counts; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
   dvec3 inBase = ray.origin - dvec3(cell.base) + t * ray.direction;
@@ -137,7 +138,8 @@ void main() {
   float steepness = length(gradient);
   // a cell of degree 0 has no gradient: face the eye
   normal.xyz = steepness > 0.0 ? gradient / steepness : -vec3(ray.worldDirection);
+  bool crack = !bracketed && abs(gradientValue.w - offset) > kCrack * diagonal * max(1.0, steepness);
   cellLevelsValueDistance =
-      uvec4(at.node.index, uint(at.node.degree) | at.depth << 8, floatBitsToUint(gradientValue.w),
+      uvec4(at.node.index, uint(at.node.degree) | at.depth << 8 | uint(crack) << 16, floatBitsToUint(gradientValue.w),
             floatBitsToUint(float(ray.fromEye + first + double(added))));
 }

@@ -377,11 +377,14 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   }
   if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                             : render::Projection::perspective;
   picture.offset = arguments.number("offset");
   if (arguments.given("clip"))
     picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
   else if (arguments.given("clip-offset"))
     throw Error("clip-offset: needs clip, the axis that it lies on");
+  picture.cracks = arguments.flag("cracks");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
@@ -459,6 +462,7 @@ void addPictureCommands(Registry& registry) {
                     "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
                     "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
                     "hpsdf render bunny.hpsdf -o inside.png --clip z --color degree",
+                    "hpsdf render bunny.hpsdf -o front.png --view front --projection orthographic --cracks",
                     "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
        .parameters =
            {fieldParameter(),
@@ -487,6 +491,12 @@ void addPictureCommands(Registry& registry) {
              .help = "The axis that points up in the picture.",
              .defaultText = "y",
              .choices = {"y", "z"}},
+            {.name = "projection",
+             .type = ParameterType::choice,
+             .help = "orthographic looks along parallel rays, so that lengths can be compared wherever they are; at "
+                     "the target the picture is as high as in perspective.",
+             .defaultText = "perspective",
+             .choices = {"perspective", "orthographic"}},
             {.name = "offset",
              .type = ParameterType::number,
              .help = "The distance whose surface is drawn.",
@@ -501,7 +511,12 @@ void addPictureCommands(Registry& registry) {
              .type = ParameterType::number,
              .help = "Where the cut crosses that axis.",
              .defaultText = "0",
-             .unit = "world units"}},
+             .unit = "world units"},
+            {.name = "cracks",
+             .type = ParameterType::flag,
+             .help = "Mark in magenta where the surface is torn: the field jumps over the distance drawn from one cell "
+                     "to the next. The caption has the widest jump.",
+             .defaultText = "false"}},
        .action = runRender},
       joined(colorParameters(ColorBy::distance,
                              "normal lights the surface; degree and depth show the cells that hold it.", "normal"),

@@ -49,7 +49,7 @@ double frameSeconds(render::Renderer& renderer, const Field& field, const render
   using Clock = std::chrono::steady_clock;
   constexpr int kFrames = 8;
   constexpr std::chrono::seconds kEnough(2);
-  const render::SurfaceView view{render::pinhole(picture.camera, field.domain(), picture.width, picture.height), 0};
+  const render::SurfaceView view{render::cameraOf(picture.camera, field.domain(), picture.width, picture.height), 0};
   renderer.surface(view, picture.width, picture.height);
   const auto start = Clock::now();
   int frames = 0;

@@ -63,6 +63,7 @@ class Session {
   int scriptDepth = 0;
 
   void setField(CurrentField field);
+  bool hasField() const { return field_ != nullptr; }
   /// Throws `Error` when there is none, saying how to get one.
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);

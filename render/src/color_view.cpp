@@ -177,10 +177,11 @@ class Contours {
 };
 
 // Where the samples of a view hit the surface, in the camera's frame: x right, y up, z towards the eye, which is the
-// origin.
+// origin (of parallel rays the middle of the plane where they start).
 class CameraFrame {
  public:
-  CameraFrame(const ViewBuffers& buffers, const Pinhole& camera) : buffers_(buffers) {
+  CameraFrame(const ViewBuffers& buffers, const Camera& camera)
+      : buffers_(buffers), parallel_(camera.projection == Projection::orthographic) {
     axes_.row(0) = camera.right.normalized().cast<float>();
     axes_.row(1) = camera.up.normalized().cast<float>();
     axes_.row(2) = -camera.forward.normalized().cast<float>();
@@ -189,12 +190,13 @@ class CameraFrame {
   }
 
   Eigen::Vector3f ray(int x, int y) const {
-    const float u = 2 * (float(x) + 0.5F) / float(buffers_.width) - 1;
-    const float v = 1 - 2 * (float(y) + 0.5F) / float(buffers_.height);
-    return Eigen::Vector3f(u * halfWidth_, v * halfHeight_, -1).normalized();
+    return parallel_ ? Eigen::Vector3f(0, 0, -1) : onPicture(x, y, -1).normalized();
   }
 
-  Eigen::Vector3f position(int x, int y) const { return buffers_.distance[index(x, y)] * ray(x, y); }
+  Eigen::Vector3f position(int x, int y) const {
+    const float distance = buffers_.distance[index(x, y)];
+    return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
+  }
 
   // Where jumps of the field turn a visible point's normal away from the eye, the nearest that does not: else single
   // dark samples speckle the silhouettes.
@@ -205,14 +207,21 @@ class CameraFrame {
   }
 
   // Height of the view at this distance before the eye.
-  float heightAt(float depth) const { return 2 * halfHeight_ * depth; }
+  float heightAt(float depth) const { return parallel_ ? 2 * halfHeight_ : 2 * halfHeight_ * depth; }
 
  private:
   std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
 
+  Eigen::Vector3f onPicture(int x, int y, float z) const {
+    const float u = 2 * (float(x) + 0.5F) / float(buffers_.width) - 1;
+    const float v = 1 - 2 * (float(y) + 0.5F) / float(buffers_.height);
+    return {u * halfWidth_, v * halfHeight_, z};
+  }
+
   const ViewBuffers& buffers_;
+  bool parallel_;                         // rays
   Eigen::Matrix3f axes_;                  // rows: the camera's axes
-  float halfWidth_ = 0, halfHeight_ = 0;  // at distance 1
+  float halfWidth_ = 0, halfHeight_ = 0;  // in perspective at distance 1
 };
 
 // How open the surface is to the light all around, from the neighbourhood on the screen: what rises above a point's
@@ -295,7 +304,7 @@ struct Lights {
 
 class SurfaceShader {
  public:
-  SurfaceShader(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color)
+  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color)
       : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), color_(color) {}
   SurfaceShader(const SurfaceShader&) = delete;  // openness_ refers to frame_
 
@@ -385,7 +394,7 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color,
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
                    const Sampling& sampling) {
   const SurfaceShader shader(buffers, camera, color);
   std::optional<CellOutlines> outlines;

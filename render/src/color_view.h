@@ -34,7 +34,7 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
 
 /// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded.
 /// A clipping plane's section is flat, its cells outlined.
-Image colorSurface(const ViewBuffers& buffers, const Pinhole& camera, const SampleColor& color,
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
                    const Sampling& sampling);
 
 /// What is drawn where a slice leaves the domain, and under legend and caption.

@@ -50,9 +50,17 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
   }
 }
 
-RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, int h,
+bool eyeAbove(const Camera& camera, const ClipPlane& clip) {
+  constexpr double kAlong = 1e-9;  // of a direction: runs along the plane but for rounding
+  const double ahead = camera.forward[clip.axis];
+  if (camera.projection == Projection::orthographic && std::abs(ahead) > kAlong) return ahead < 0;
+  return camera.eye[clip.axis] >= clip.offset;
+}
+
+RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, int h,
                          const std::optional<ClipPlane>& clip)
-    : eye(space.point(camera.eye)),
+    : parallel(camera.projection == Projection::orthographic),
+      eye(space.point(camera.eye)),
       lo(Vector3::Zero()),
       hi(space.grid),
       forward(camera.forward),
@@ -72,10 +80,10 @@ RayGeometry::RayGeometry(const GridSpace& space, const Pinhole& camera, int w, i
   if (!clip) return;
   if (!std::isfinite(clip->offset)) throw Error("a clipping plane's offset is not finite: give a finite number");
   // a little within what is kept: a cut along faces then starts in cells on that side, in single precision too
-  const bool eyeAbove = camera.eye[clip->axis] >= clip->offset;
+  const bool above = eyeAbove(camera, *clip);
   const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];
-  const double within = cut + (eyeAbove ? -kClipNudge : kClipNudge) * space.grid[clip->axis];
-  (eyeAbove ? hi : lo)[clip->axis] = std::clamp(within, 0.0, space.grid[clip->axis]);
+  const double within = cut + (above ? -kClipNudge : kClipNudge) * space.grid[clip->axis];
+  (above ? hi : lo)[clip->axis] = std::clamp(within, 0.0, space.grid[clip->axis]);
 }
 
 }  // namespace hpsdf::render

@@ -43,23 +43,40 @@ struct SliceGeometry {
 /// How far behind a clipping plane one looks, in parts of the domain.
 constexpr double kClipNudge = 1e-6;
 
-/// The rays of a camera. Pixel (x, y) looks along forward + right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, in world
-/// units; `scale` takes a world direction to grid coordinates.
+/// Whether the eye is on the side of greater coordinates of a clipping plane.
+bool eyeAbove(const Camera& camera, const ClipPlane& clip);
+
+/// The rays of a camera. With across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, pixel (x, y) looks from the
+/// eye along forward + across or, where rays are parallel, from eye + across along forward; across and directions in
+/// world units, which `scale` takes to grid coordinates.
 struct RayGeometry {
-  RayGeometry(const GridSpace& space, const Pinhole& camera, int width, int height,
+  RayGeometry(const GridSpace& space, const Camera& camera, int width, int height,
               const std::optional<ClipPlane>& clip = {});
 
+  /// Where the pixel's ray starts, grid coordinates.
+  Vector3 start(int x, int y) const {
+    return parallel ? Vector3(eye + onPicture(Vector3::Zero(), x, y).cwiseProduct(scale)) : eye;
+  }
+
+  /// World units, unit.
   Vector3 direction(int x, int y) const {
-    const Vector3 d = forward + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
+    if (parallel) return forward;
+    const Vector3 d = onPicture(forward, x, y);
     return d / d.norm();
   }
 
+  bool parallel;               ///< rays: orthographic
   Vector3 eye;                 ///< grid coordinates
   Vector3 lo, hi;              ///< what of the domain is shown, grid coordinates
   Vector3 forward, right, up;  ///< world units
   Vector3 scale;
   int width, height;
   double stepX, stepY;  ///< 1/w, 1/h
+
+ private:
+  Vector3 onPicture(const Vector3& middle, int x, int y) const {
+    return middle + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
+  }
 };
 
 }  // namespace hpsdf::render

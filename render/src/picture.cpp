@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "color_view.h"
+#include "cracks.h"
 #include "describe.h"
 #include "hpsdf/error.h"
 #include "legend.h"
@@ -21,7 +22,7 @@ namespace {
 constexpr int kSmallestSize = 16;
 constexpr int kLargestSize = 16384;
 constexpr int kMostSamples = 8;
-// A sample of a surface takes 26 bytes in the buffers, and as much again while a renderer fills them.
+// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 void checkSize(int width, int height, int samples) {
@@ -231,8 +232,9 @@ Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y)
 }
 
 Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
-  return view.camera.eye + pixelRay(view.camera, x, y, buffers.width, buffers.height) *
-                               buffers.distance[std::size_t(y) * buffers.width + x];
+  return pixelEye(view.camera, x, y, buffers.width, buffers.height) +
+         pixelRay(view.camera, x, y, buffers.width, buffers.height) *
+             buffers.distance[std::size_t(y) * buffers.width + x];
 }
 
 template <typename View>
@@ -246,6 +248,12 @@ std::vector<float> quantityIn(const Field& field, const View& view, const ViewBu
   requireEvidence(quantity, evidence);
   return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, evidence,
                            quantityOfCells(field, quantity, evidence));
+}
+
+std::string describeCracks(const Cracks& cracks) {
+  if (cracks.pixels == 0) return "no cracks";
+  return "cracks (magenta) in " + formatCount(cracks.pixels) + (cracks.pixels == 1 ? " pixel" : " pixels") +
+         ", up to " + formatNumber(cracks.widest, 3);
 }
 
 void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field, const FieldStatistics& figures) {
@@ -362,7 +370,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
-  const SurfaceView view{pinhole(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
+  const SurfaceView view{cameraOf(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
   ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
   addSection(field, view, buffers);
   const Sampling sampling{samples, lineWidthOf(frame), 1};
@@ -395,8 +403,13 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), sampling));
     details = {(degree ? "degree on the " : "depth on the ") + surface};
   }
-  details.push_back("camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
-                    formatNumber(picture.camera.elevationDegrees) + "°" +
+  if (picture.cracks) {
+    markCracks(image, buffers, sampling);
+    details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
+  }
+  const bool parallel = picture.camera.projection == Projection::orthographic;
+  details.push_back((parallel ? "orthographic camera " : "camera ") + formatNumber(picture.camera.azimuthDegrees) +
+                    "°, " + formatNumber(picture.camera.elevationDegrees) + "°" +
                     (picture.camera.target ? " at " + formatVector(*picture.camera.target) : ""));
   if (picture.clip)
     details.push_back(std::string("cut at ") + "xyz"[picture.clip->axis] + " = " + formatNumber(picture.clip->offset));

@@ -11,13 +11,13 @@ namespace hpsdf::render {
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers) {
   if (!view.clip) return;
   buffers.section.assign(buffers.cell.size(), 0);
-  const Pinhole& camera = view.camera;
+  const Camera& camera = view.camera;
   const int axis = view.clip->axis;
-  const double toPlane = view.clip->offset - camera.eye[axis];
+  const bool above = eyeAbove(camera, *view.clip);
   const double nudge = kClipNudge * field.domain().sizes()[axis];
-  const double behind = view.clip->offset + (toPlane > 0 ? nudge : -nudge);
+  const double behind = view.clip->offset + (above ? -nudge : nudge);
   Eigen::Vector3f towardsEye = Eigen::Vector3f::Zero();
-  towardsEye[axis] = toPlane > 0 ? -1.0F : 1.0F;
+  towardsEye[axis] = above ? 1.0F : -1.0F;
   tbb::parallel_for(0, buffers.height, [&](int y) {
     struct Cut {
       std::size_t pixel;
@@ -26,10 +26,11 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
     std::vector<Cut> cuts;
     std::vector<Vector3> points;
     for (int x = 0; x < buffers.width; ++x) {
+      const Vector3 eye = pixelEye(camera, x, y, buffers.width, buffers.height);
       const Vector3 ray = pixelRay(camera, x, y, buffers.width, buffers.height);
-      const double distance = toPlane / ray[axis];
+      const double distance = (view.clip->offset - eye[axis]) / ray[axis];
       if (!(distance > 0)) continue;
-      Vector3 point = camera.eye + distance * ray;
+      Vector3 point = eye + distance * ray;
       if (!field.domain().contains(point)) continue;
       point[axis] = behind;
       cuts.push_back({std::size_t(y) * buffers.width + x, distance});
@@ -47,6 +48,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
       buffers.value[i] = static_cast<float>(values[n]);
       buffers.normal[i] = towardsEye;
       buffers.distance[i] = static_cast<float>(cuts[n].distance);
+      buffers.crack[i] = 0;
       buffers.section[i] = 1;
     }
   });

@@ -78,29 +78,30 @@ class Finder {
     const BlockRect whole{0, 0, columns_, rows_};
     double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
     int behind = 0;
-    std::array<int, 4> beyond{};  // corners beyond each edge of the view, also behind the eye
+    std::array<int, 4> beyond{};  // corners beyond each edge of the view, also those behind the eye
     const Vector3 corner = viewFromGrid_ * (lo - rays_.eye);
     const Eigen::Matrix3d edges = viewFromGrid_ * size;
     for (int i = 0; i < 8; ++i) {
       Vector3 p = corner;
       for (int axis = 0; axis < 3; ++axis)
         if (i >> axis & 1) p += edges.col(axis);
-      beyond[0] += p.y() > p.x();
-      beyond[1] += -p.y() > p.x();
-      beyond[2] += p.z() > p.x();
-      beyond[3] += -p.z() > p.x();
+      const double edge = rays_.parallel ? 1 : p.x();
+      beyond[0] += p.y() > edge;
+      beyond[1] += -p.y() > edge;
+      beyond[2] += p.z() > edge;
+      beyond[3] += -p.z() > edge;
       if (!(p.x() > near_)) {
         ++behind;
-        continue;
+        if (!rays_.parallel) continue;
       }
-      x0 = std::min(x0, p.y() / p.x());
-      x1 = std::max(x1, p.y() / p.x());
-      y0 = std::min(y0, -p.z() / p.x());
-      y1 = std::max(y1, -p.z() / p.x());
+      x0 = std::min(x0, p.y() / edge);
+      x1 = std::max(x1, p.y() / edge);
+      y0 = std::min(y0, -p.z() / edge);
+      y1 = std::max(y1, -p.z() / edge);
     }
     if (!corner.allFinite()) return whole;
     if (behind == 8 || std::ranges::count(beyond, 8) > 0) return {0, 0, 0, 0};
-    if (behind > 0) return whole;
+    if (behind > 0 && !rays_.parallel) return whole;
     // the centre of pixel i is at 2i + 1 = (1 + x) · width; a pixel more on either side
     const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };
     const auto last = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) + 1) / kBlock) + 1; };
@@ -110,10 +111,18 @@ class Finder {
             within(last(x1, rays_.width), columns_), within(last(y1, rays_.height), rows_)};
   }
 
-  /// From the eye to the box, a little less for rounding.
+  /// From where rays start to the box, a little less for rounding.
   float distance(const Vector3& lo, double size) const {
+    constexpr double kLess = 1 - 1e-6;
+    if (rays_.parallel) {
+      const Vector3 toMiddle = lo + Vector3::Constant(0.5 * size) - rays_.eye;
+      const Vector3 half = 0.5 * size * worldFromGrid_;
+      const double toCorner =
+          rays_.forward.dot(toMiddle.cwiseProduct(worldFromGrid_)) - rays_.forward.cwiseAbs().dot(half);
+      return static_cast<float>(kLess * std::max(0.0, toCorner));
+    }
     const Vector3 nearest = rays_.eye.cwiseMax(lo).cwiseMin(lo + Vector3::Constant(size));
-    return static_cast<float>((1 - 1e-6) * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
+    return static_cast<float>(kLess * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
   }
 
   void mark(const BlockRect& rect, float start) {
@@ -128,7 +137,7 @@ class Finder {
   const std::vector<NodeBounds>& bounds_;
   const RayGeometry& rays_;
   double offset_;
-  double near_;  ///< world units: what is closer before the eye counts as beside it
+  double near_;  ///< world units: what is closer before the eye counts as behind it
   Vector3 worldFromGrid_;
   Eigen::Matrix3d viewFromGrid_;  ///< forward, right and up as multiples of the camera's
   float side_;

@@ -1,5 +1,5 @@
 #pragma once
-// Where in a view rays may meet the surface, and how far from the eye at the nearest: so that pixels which see nothing
+// Where in a view rays may meet the surface, and how far along them at the nearest: so that pixels which see nothing
 // of it are not drawn at all, and the others start next to it.
 
 #include <vector>
@@ -14,7 +14,7 @@ constexpr int kBlock = 8;  // pixels a side
 /// A square of kBlock × kBlock pixels.
 struct Block {
   float x, y;   ///< its upper left pixel
-  float start;  ///< world units from the eye: up to there no ray of the block has left `SurfaceBlocks::side`
+  float start;  ///< world units along a ray: up to there no ray of the block has left `SurfaceBlocks::side`
 };
 
 struct SurfaceBlocks {

@@ -11,7 +11,8 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kBorder = 0.025;  // left free around the section, of the picture's width or height
+constexpr double kBorder = 0.025;       // left free around the section, of the picture's width or height
+constexpr double kBeforeDomain = 0.01;  // where parallel rays start, in domain diagonals
 
 std::string text(double x) {
   char buffer[32];
@@ -62,6 +63,11 @@ std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3
       if ((da < 0 && db > 0) || (da > 0 && db < 0)) corners.push_back(a + (da / (da - db)) * (b - a));
     }
   return corners;
+}
+
+/// The picture's pixel when its middle is given.
+Vector3 onPicture(const Camera& camera, const Vector3& middle, int x, int y, int width, int height) {
+  return middle + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
 }
 
 double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
@@ -115,7 +121,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
   return framed(extent.min(), extent.max(), base, right, up, width, height);
 }
 
-Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height) {
+Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height) {
   checkDomain(domain);
   checkViewSize(width, height);
   checkRange("azimuth", camera.azimuthDegrees, true, "a finite angle in degrees");
@@ -134,13 +140,22 @@ Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int hei
   const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
   const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
-  Pinhole result;
+  Camera result;
   const Vector3 target = camera.target.value_or(domain.center());
   checkRange("target", target.sum(), target.allFinite(), "three finite coordinates");
   result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
   result.forward = -towardsEye;
   result.right = right * (halfHeight * width / height);
   result.up = up * halfHeight;
+  if (camera.projection == Projection::orthographic) {
+    const double atTarget = camera.distance * domain.diagonal().norm();
+    result.right *= atTarget;
+    result.up *= atTarget;
+    const double toCorner =
+        (domain.center() - target).dot(towardsEye) + 0.5 * domain.sizes().dot(towardsEye.cwiseAbs());
+    result.eye = target + (toCorner + kBeforeDomain * domain.diagonal().norm()) * towardsEye;
+    result.projection = Projection::orthographic;
+  }
   return result;
 }
 
@@ -148,9 +163,15 @@ Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height) {
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
-Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height) {
-  return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
-      .normalized();
+Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height) {
+  return camera.projection == Projection::orthographic ? onPicture(camera, camera.eye, x, y, width, height)
+                                                       : camera.eye;
+}
+
+Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height) {
+  return camera.projection == Projection::orthographic
+             ? camera.forward
+             : onPicture(camera, camera.forward, x, y, width, height).normalized();
 }
 
 }  // namespace hpsdf::render

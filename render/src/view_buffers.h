@@ -20,6 +20,7 @@ inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   if (surface) {
     buffers.normal.assign(pixels, Eigen::Vector3f::Zero());
     buffers.distance.assign(pixels, 0);
+    buffers.crack.assign(pixels, 0);
   }
   return buffers;
 }

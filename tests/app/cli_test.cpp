@@ -741,6 +741,9 @@ TEST_F(Cli, viewsAreNamedOrAimed) {
   EXPECT_EQ(surface({"--view", "top", "--up", "z"}), surface({"--camera", "0,90,1.1", "--up", "z"}));
   EXPECT_NE(surface({"--view", "left"}), surface({"--view", "top"}));
   EXPECT_NE(surface({"--target", "0.5,0,0"}), surface({}));
+  EXPECT_NE(surface({"--projection", "orthographic"}), surface({}));
+  EXPECT_EQ(surface({"--projection", "perspective"}), surface({}));
+  EXPECT_NE(surface({"--cracks"}), surface({}));
   EXPECT_NE(surface({"--clip", "z"}), surface({}));
   EXPECT_NE(surface({"--clip", "z", "--clip-offset", "0.1"}), surface({"--clip", "z"}));
   EXPECT_EQ(surface({"--clip", "z", "--clip-offset", "50"}), surface({"--clip", "z", "--clip-offset", "40"}));
@@ -1004,8 +1007,9 @@ TEST_F(Cli, expectationsHoldOrEndTheScript) {
 TEST_F(Cli, picksAgreeWithQueries) {
   HPSDF_REQUIRE_GL();
   const Field torus = load(field());
-  for (const char* look : {"slice axis=z offset=0.05 color=degree", "slice plane=0,0,0,1,2,3 color=distance samples=2",
-                           "render camera=40,30,1", "slice axis=x cpu=true"}) {
+  for (const char* look :
+       {"slice axis=z offset=0.05 color=degree", "slice plane=0,0,0,1,2,3 color=distance samples=2",
+        "render camera=40,30,1", "render camera=40,30,1 projection=orthographic", "slice axis=x cpu=true"}) {
     const std::string backend = std::string(look).find("cpu") == std::string::npos ? " gl=software" : "";
     std::string script = "load \"" + field() + "\"\n" + look + backend + " size=320x240 output=" + at("p.png") + "\n";
     for (int n = 0; n < 200; ++n)

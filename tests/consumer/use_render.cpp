@@ -11,7 +11,7 @@ int main() {
   const hpsdf::Field field = torusField();
   const hpsdf::render::OrbitCamera camera{.elevationDegrees = 90, .up = hpsdf::render::UpAxis::z};
   const auto buffers = hpsdf::render::makeCpuRenderer(field)->surface(
-      {.camera = hpsdf::render::pinhole(camera, field.domain(), kSize, kSize)}, kSize, kSize);
+      {.camera = hpsdf::render::cameraOf(camera, field.domain(), kSize, kSize)}, kSize, kSize);
 
   // along the axis of the torus: through its hole, but not past its ring
   const bool hole = !buffers.hit(kSize / 2 * kSize + kSize / 2);

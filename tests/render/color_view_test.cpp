@@ -212,7 +212,7 @@ TEST(DistanceSlice, AlmostFlatValuesMakeNoBlots) {
 TEST(Surface, ShowsTheBackdropWhereARayMisses) {
   ViewBuffers buffers = blank(16, 16);
   std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   const Image image = colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1});
   EXPECT_EQ(image.at(3, 2), encodeSrgb(backdropColor(2.5 / 16)));
   EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
@@ -227,7 +227,7 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
     const auto turned = [&](double x, double y, double z) {
       return Vector3(rotation.cast<double>() * Vector3(x, y, z));
     };
-    const Pinhole camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
+    const Camera camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
     return colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0);
   };
   const Eigen::Vector3f left = Eigen::Vector3f(-1, 1, 1).normalized(), right = Eigen::Vector3f(1, -1, 1).normalized();
@@ -238,28 +238,37 @@ TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
 }
 
 // A wall before the camera whose middle steps back by `depth` in a groove, ten columns wide.
-Image groove(double depth, ColorBy color) {
+Image groove(double depth, ColorBy color, Projection projection) {
   ViewBuffers buffers = blank(200, 200);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const bool parallel = projection == Projection::orthographic;
+  const double half = parallel ? 0.9 : 0.3;  // 0.9 of the wall in either case
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {half, 0, 0}, {0, half, 0}, projection};
   forEachSample(buffers, [&](int x, int y, std::size_t i) {
     const Vector3 ray((2 * (x + 0.5) / 200 - 1) * 0.3, (1 - 2 * (y + 0.5) / 200) * 0.3, -1);
     const bool inGroove = x >= 95 && x < 105;
-    buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * ray.norm());
+    buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * (parallel ? 1 : ray.norm()));
   });
   return colorSurface(buffers, camera, levelColors(buffers, kMap, color), {1, 1, 1});
 }
 
 TEST(Surface, FoldsAreDarkerThanTheOpen) {
-  for (ColorBy color : {ColorBy::normal, ColorBy::depth}) {
-    const Image flat = groove(0, color), folded = groove(0.1, color);
-    for (int x : {95, 100, 104}) EXPECT_LT(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)) - 0.01) << x;
-    for (int x : {20, 60, 140, 180})
-      EXPECT_NEAR(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)), 0.01) << x;
-  }
+  for (ColorBy color : {ColorBy::normal, ColorBy::depth})
+    for (Projection projection : {Projection::perspective, Projection::orthographic}) {
+      const Image flat = groove(0, color, projection), folded = groove(0.1, color, projection);
+      for (int x : {95, 100, 104}) EXPECT_LT(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)) - 0.01) << x;
+      for (int x : {20, 60, 140, 180})
+        EXPECT_NEAR(lightnessOf(folded.at(x, 100)), lightnessOf(flat.at(x, 100)), 0.01) << x;
+    }
+}
+
+TEST(Surface, ParallelRaysShadeAFlatWallAlike) {
+  const Image flat = groove(0, ColorBy::normal, Projection::orthographic);
+  for (int x : {0, 50, 150, 199}) EXPECT_EQ(flat.at(x, 20), flat.at(100, 20)) << x;
+  EXPECT_NE(groove(0, ColorBy::normal, Projection::perspective).at(0, 20), flat.at(0, 20));
 }
 
 TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   const auto shaded = [&](const Eigen::Vector3f& normal) {
     ViewBuffers buffers = blank(1, 1);
     buffers.normal[0] = normal.normalized();
@@ -271,7 +280,7 @@ TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
 TEST(Surface, LevelColorsStayRecognisableUnderShading) {
   const std::vector<int> levels = {2, 3, 4, 5, 6, 7};
   const LevelMap map(levels);
-  const Pinhole camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
+  const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   for (int level : levels)
     for (double tilt : {0.0, 0.4, 0.8}) {
       ViewBuffers buffers = blank(1, 1);

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "cracks.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -90,6 +92,20 @@ TEST(LevelMap, NeighboursAreToldApartByEveryEye) {
         EXPECT_GT(colorDifference(toOklab(seen(map(level - 1), vision)), toOklab(seen(map(level), vision))), 0.05)
             << count << " levels, level " << level << ", vision " << static_cast<int>(vision);
     }
+}
+
+/// From what surfaces are coloured with: the map of levels and quantities, shaded, and clay from light to dark.
+TEST(CrackColor, IsToldFromEveryOtherByEveryEye) {
+  std::vector<LinearColor> others;
+  for (double t = 0; t <= 1; t += 0.02)
+    for (const float light : {0.5F, 0.75F, 1.0F, 1.08F}) others.push_back(orderedColor(t) * light);
+  for (const float light : {0.15F, 0.25F, 0.4F, 0.6F, 0.8F, 1.0F, 1.2F})
+    others.push_back(decodeSrgb({210, 153, 119}) * light);
+  const LinearColor crack = decodeSrgb(kCrackColor);
+  for (Vision vision : {Vision::normal, Vision::protan, Vision::deutan, Vision::tritan})
+    for (const LinearColor& other : others)
+      EXPECT_GT(colorDifference(toOklab(seen(crack, vision)), toOklab(seen(other.cwiseMin(1.0F), vision))), 0.08)
+          << "vision " << static_cast<int>(vision) << ", " << other.transpose();
 }
 
 TEST(LevelMap, TheSimulationSeesWhatDichromatsConfuse) {

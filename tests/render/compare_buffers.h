@@ -17,25 +17,40 @@ struct BufferTolerance {
   double pixels = 1e-3;    ///< fraction whose hit, cell, degree or depth may differ, at edges only
 };
 
-/// Some pixel around (x, y), itself included, sees another cell, or none.
-inline bool atEdge(const ViewBuffers& buffers, int x, int y) {
-  const std::uint32_t cell = buffers.cell[std::size_t(y) * buffers.width + x];
+/// Some pixel around (x, y) differs from it in this one of the buffers.
+template <typename T>
+bool atEdge(const ViewBuffers& buffers, const std::vector<T>& buffer, int x, int y) {
+  const T here = buffer[std::size_t(y) * buffers.width + x];
   for (int v = std::max(0, y - 1); v <= std::min(buffers.height - 1, y + 1); ++v)
     for (int u = std::max(0, x - 1); u <= std::min(buffers.width - 1, x + 1); ++u)
-      if (buffers.cell[std::size_t(v) * buffers.width + u] != cell) return true;
+      if (buffer[std::size_t(v) * buffers.width + u] != here) return true;
   return false;
 }
 
-/// Direction of a pixel's ray, unit.
-inline Vector3 rayDirection(const Pinhole& camera, int width, int height, int x, int y) {
+/// Where a pixel's ray starts.
+inline Vector3 rayStart(const Camera& camera, int width, int height, int x, int y) {
+  if (camera.projection == Projection::perspective) return camera.eye;
+  return camera.eye + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
+}
+
+/// Its direction, unit.
+inline Vector3 rayDirection(const Camera& camera, int width, int height, int x, int y) {
+  if (camera.projection == Projection::orthographic) return camera.forward;
   return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
       .normalized();
 }
 
-/// Cells, degrees and depths agree but for few pixels, each within one pixel of an edge; where they agree, values,
-/// and, for a surface (`camera` given), positions across the surface and normals agree within the tolerances.
+/// What a pixel sees: where it hits.
+inline Vector3 hitPoint(const Camera& camera, const ViewBuffers& buffers, std::size_t pixel) {
+  const int x = static_cast<int>(pixel % buffers.width), y = static_cast<int>(pixel / buffers.width);
+  return rayStart(camera, buffers.width, buffers.height, x, y) +
+         double(buffers.distance[pixel]) * rayDirection(camera, buffers.width, buffers.height, x, y);
+}
+
+/// Cells, degrees, depths and cracks agree but for few pixels, each within one pixel of an edge; where cells agree,
+/// values, and, for a surface (`camera` given), positions across the surface and normals agree within the tolerances.
 inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuffers& actual,
-                                      const BufferTolerance& tolerance, const Pinhole* camera = nullptr) {
+                                      const BufferTolerance& tolerance, const Camera* camera = nullptr) {
   if (expected.width != actual.width || expected.height != actual.height)
     return testing::AssertionFailure() << "sizes differ";
   std::size_t differing = 0;
@@ -46,7 +61,7 @@ inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuf
       if (expected.cell[i] != actual.cell[i] || expected.degree[i] != actual.degree[i] ||
           expected.depth[i] != actual.depth[i]) {
         ++differing;
-        if (!atEdge(expected, x, y) && !atEdge(actual, x, y))
+        if (!atEdge(expected, expected.cell, x, y) && !atEdge(actual, actual.cell, x, y))
           return failure() << "cell " << actual.cell[i] << " instead of " << expected.cell[i] << ", far from any edge";
         continue;
       }
@@ -54,6 +69,11 @@ inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuf
       if (!(std::abs(expected.value[i] - actual.value[i]) <= tolerance.value))
         return failure() << "value " << actual.value[i] << " instead of " << expected.value[i];
       if (camera == nullptr) continue;
+      if (expected.crack[i] != actual.crack[i]) {
+        ++differing;
+        if (!atEdge(expected, expected.crack, x, y) && !atEdge(actual, actual.crack, x, y))
+          return failure() << "crack " << int(actual.crack[i]) << ", far from where cracks end";
+      }
       const Eigen::Vector3f normal = expected.normal[i];
       const double cosine =
           std::abs(rayDirection(*camera, expected.width, expected.height, x, y).dot(normal.cast<double>()));

@@ -67,6 +67,8 @@ class FakeRenderer : public Renderer {
     buffers.distance.assign(buffers.cell.size(), 1);
     for (std::size_t i = buffers.cell.size() / 2; i < buffers.cell.size(); ++i)
       fill(buffers, i, Vector3(kPlane, 0, -0.5));
+    buffers.crack.assign(buffers.cell.size(), 0);
+    buffers.crack.back() = 1;
     return buffers;
   }
 
@@ -187,6 +189,21 @@ TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
     pictures.insert(image.pixels);
   }
   EXPECT_EQ(pictures.size(), 3U);
+}
+
+TEST(Picture, CracksAreMarkedWhereAsked) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  for (const int samples : {1, 2}) {
+    SurfacePicture picture{.camera = {}, .width = 320, .height = 240, .samples = samples};
+    const ViewSize view = viewSize(320, 240);
+    const Color unmarked = draw(renderer, field, picture).at(view.width - 1, view.height - 1);
+    EXPECT_NE(unmarked, (Color{255, 0, 255}));
+    picture.cracks = true;
+    const Image marked = draw(renderer, field, picture);
+    EXPECT_EQ(marked.at(view.width - 1, view.height - 1), (Color{255, 0, 255}));
+    EXPECT_NE(marked.at(view.width - 5, view.height - 5), (Color{255, 0, 255}));
+  }
 }
 
 TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {

@@ -81,7 +81,7 @@ TEST(Quantity, TheDifferenceOfTwoFieldsIsThatOfTheirValues) {
 
 TEST(Quantity, OfASurfaceIsThatOfItsHits) {
   const Seen seen;
-  const SurfaceView view{pinhole({}, seen.field.domain(), 50, 50), 0};
+  const SurfaceView view{cameraOf({}, seen.field.domain(), 50, 50), 0};
   const ViewBuffers buffers = makeCpuRenderer(seen.field)->surface(view, 50, 50);
   const auto error = quantityAt(seen.field, view, buffers, ColorBy::error, seen.evidence);
   int hits = 0;

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -14,6 +16,7 @@
 #include <thread>
 
 #include "compare_buffers.h"
+#include "cracks.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
@@ -49,15 +52,17 @@ BufferTolerance surfaceTolerance(const Field& field) {
   return {.value = 1e-5, .position = 1e-6 * field.domain().sizes().norm(), .normalAngle = 2e-3};
 }
 
-Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
   const Vector3 unit = forward.normalized();
   const Vector3 right = unit.unitOrthogonal();
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
 }
 
+constexpr Projection kProjections[] = {Projection::perspective, Projection::orthographic};
+
 /// Cameras of every kind: orbits near and far, eyes anywhere within the domain (also inside the solid) and eyes beside
-/// the surface looking along it.
-std::vector<Pinhole> cameras(const Field& field, unsigned seed, int count) {
+/// the surface looking along it. The first two also orthographically: from before the domain, and from planes within.
+std::vector<Camera> cameras(const Field& field, unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
   std::normal_distribution<double> normal;
@@ -66,16 +71,23 @@ std::vector<Pinhole> cameras(const Field& field, unsigned seed, int count) {
   const auto somewhere = [&] {
     return Vector3(domain.min() + domain.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random))));
   };
-  std::vector<Pinhole> result;
+  std::vector<Camera> result;
   for (int i = 0; i < count; ++i) {
     if (i % 3 == 0) {
-      const OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
-                              .elevationDegrees = 180 * unit(random) - 90,
-                              .distance = std::exp(4 * unit(random) - 2),
-                              .fieldOfViewDegrees = 20 + 60 * unit(random)};
-      result.push_back(pinhole(orbit, domain, kWidth, kHeight));
+      OrbitCamera orbit{.azimuthDegrees = 360 * unit(random),
+                        .elevationDegrees = 180 * unit(random) - 90,
+                        .distance = std::exp(4 * unit(random) - 2),
+                        .fieldOfViewDegrees = 20 + 60 * unit(random)};
+      for (const Projection projection : kProjections) {
+        orbit.projection = projection;
+        result.push_back(cameraOf(orbit, domain, kWidth, kHeight));
+      }
     } else if (i % 3 == 1) {
-      result.push_back(lookingAt(somewhere(), direction(), 0.2 + unit(random)));
+      Camera camera = lookingAt(somewhere(), direction(), 0.2 + unit(random));
+      for (const Projection projection : kProjections) {
+        camera.projection = projection;
+        result.push_back(camera);
+      }
     } else {
       Vector3 eye = somewhere();
       for (int step = 0; step < 20; ++step) {
@@ -191,28 +203,31 @@ std::optional<std::pair<double, double>> stretchWithin(const Box& box, const Vec
   return std::pair(first, last);
 }
 
-/// Follows every 7th pixel's ray in small steps. Before the hit, and all along the ray where there is none,
-/// `height(point)` must stay on the side of the surface on which it starts, down to -tolerance.
+/// Follows every 7th pixel's ray in small steps. Before the hit (by `nearHit` across the faces of cells, which a ray
+/// may meet at a shallow angle), and all along the ray where there is none, `height(point)` must stay on the side of
+/// the surface on which it starts, down to -tolerance.
 template <typename Height>
 void expectNothingPassed(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int steps,
                          double tolerance, double nearHit, Height&& height) {
   for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
     const int x = static_cast<int>(i % buffers.width);
     const int y = static_cast<int>(i / buffers.width);
+    const Vector3 eye = rayStart(view.camera, buffers.width, buffers.height, x, y);
     const Vector3 direction = rayDirection(view.camera, buffers.width, buffers.height, x, y);
-    const auto stretch = stretchWithin(field.domain(), view.camera.eye, direction);
+    const auto stretch = stretchWithin(field.domain(), eye, direction);
     if (!stretch) {
       EXPECT_FALSE(buffers.hit(i));
       continue;
     }
     const auto [first, last] = *stretch;
-    const double end = buffers.hit(i) ? buffers.distance[i] - nearHit : last - 1e-9;
-    const double start = height(view.camera.eye + (first + 1e-9) * direction) - view.offset;
+    const double shallowest = std::max(0.02, direction.cwiseAbs().minCoeff());
+    const double end = buffers.hit(i) ? buffers.distance[i] - nearHit / shallowest : last - 1e-9;
+    const double start = height(eye + (first + 1e-9) * direction) - view.offset;
     if (std::abs(start) <= tolerance) continue;  // starts on the surface
     for (int step = 1; step < steps; ++step) {
       const double t = first + 1e-9 + (end - first) * step / steps;
       if (t >= end) break;
-      const double here = height(view.camera.eye + t * direction) - view.offset;
+      const double here = height(eye + t * direction) - view.offset;
       ASSERT_GT(start > 0 ? here : -here, -tolerance) << "pixel (" << x << ", " << y << ") at " << t << " of " << end;
     }
   }
@@ -223,7 +238,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheField) {
     const Field& field = shape(name);
     const auto renderer = makeCpuRenderer(field);
     std::size_t seen = 0;
-    for (const Pinhole& camera : cameras(field, 11, 9))
+    for (const Camera& camera : cameras(field, 11, 9))
       for (const double offset : {0.0, 0.05}) {
         const SurfaceView view{camera, offset};
         const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
@@ -238,7 +253,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     const Field field = randomField(seed, {.roughness = seed % 2 ? 1.0 : 0.2, .maxDepth = 5, .maxDegree = 8});
     const auto renderer = makeCpuRenderer(field);
-    for (const Pinhole& camera : cameras(field, seed, 6)) {
+    for (const Camera& camera : cameras(field, seed, 6)) {
       const SurfaceView view{camera, 0};
       const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
       expectNothingPassed(field, view, buffers, 500, 0, 1e-5, [&](const Vector3& p) { return field.value(p); });
@@ -253,32 +268,48 @@ TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
   std::size_t seen = 0;
   for (int axis = 0; axis < 3; ++axis)
     for (const double offset : {-0.3, 0.0, 0.25, 2.0, -2.0})
-      for (const double azimuth : {30.0, 200.0}) {
-        const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25};
-        const Pinhole camera = pinhole(orbit, field.domain(), kWidth, kHeight);
-        const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
-        const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
-        const bool eyeAbove = camera.eye[axis] >= offset;
-        for (int y = 0; y < kHeight; ++y)
-          for (int x = 0; x < kWidth; ++x) {
-            const std::size_t i = std::size_t(y) * kWidth + x;
+      for (const double azimuth : {30.0, 200.0})
+        for (const Projection projection : kProjections) {
+          const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 25, .projection = projection};
+          const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+          const SurfaceView view{camera, 0, ClipPlane{axis, offset}};
+          const ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
+          const bool above =
+              projection == Projection::perspective ? camera.eye[axis] >= offset : camera.forward[axis] < 0;
+          for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
             if (!buffers.hit(i)) continue;
             ++seen;
-            const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, kWidth, kHeight, x, y);
-            EXPECT_LE((hit[axis] - offset) * (eyeAbove ? 1 : -1), 1e-5);
+            EXPECT_LE((hitPoint(camera, buffers, i)[axis] - offset) * (above ? 1 : -1), 1e-5);
           }
-        if (!gl) continue;
-        EXPECT_TRUE(agree(buffers, gl->surface(view, kWidth, kHeight), surfaceTolerance(field), &camera))
-            << axis << " " << offset << " " << azimuth;
-      }
+          if (!gl) continue;
+          EXPECT_TRUE(agree(buffers, gl->surface(view, kWidth, kHeight), surfaceTolerance(field), &camera))
+              << axis << " " << offset << " " << azimuth;
+        }
   EXPECT_GT(seen, 10000u);
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   EXPECT_THROW(cpu->surface({camera, 0, ClipPlane{0, std::nan("")}}, 8, 8), Error);
 }
 
-TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+TEST(Surface, AlongAClippingPlaneParallelRaysSeeTheSideThatPerspectiveSees) {
   const Field field = randomField(5, {.roughness = 0.05});
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const auto cpu = makeCpuRenderer(field);
+  for (const double azimuth : {-90.0, 90.0, 270.0})  // along x, but for rounding
+    for (const double offset : {-0.1, 0.1}) {
+      const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 0, .projection = Projection::orthographic};
+      const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+      const ViewBuffers buffers = cpu->surface({camera, 0, ClipPlane{2, offset}}, kWidth, kHeight);
+      EXPECT_GT(hits(buffers), 500u);
+      for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+        if (!buffers.hit(i)) continue;
+        const double z = hitPoint(camera, buffers, i).z();
+        EXPECT_TRUE(offset > 0 ? z > offset : z < offset) << azimuth << " " << offset;
+      }
+    }
+}
+
+void expectSectionWhereTheSolidIsCut(Projection projection) {
+  const Field field = randomField(5, {.roughness = 0.05});
+  const Camera camera = cameraOf({.projection = projection}, field.domain(), kWidth, kHeight);
   const SurfaceView view{camera, 0, ClipPlane{2, 0.1}};
   ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   const ViewBuffers before = buffers;
@@ -287,8 +318,9 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const std::size_t i = std::size_t(y) * kWidth + x;
+      const Vector3 eye = rayStart(camera, kWidth, kHeight, x, y);
       const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
-      const Vector3 point = camera.eye + (0.1 - camera.eye.z()) / ray.z() * ray;
+      const Vector3 point = eye + (0.1 - eye.z()) / ray.z() * ray;
       const bool cut = field.domain().contains(point) && field.value({point.x(), point.y(), 0.1}) < 0;
       ASSERT_EQ(buffers.section[i] != 0, cut);
       if (!cut) {
@@ -301,7 +333,7 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
       EXPECT_EQ(buffers.cell[i], cell.id);
       EXPECT_EQ(buffers.degree[i], cell.degree);
       EXPECT_LT(buffers.value[i], 0);
-      EXPECT_NEAR(buffers.distance[i], (point - camera.eye).norm(), 1e-5);
+      EXPECT_NEAR(buffers.distance[i], (point - eye).norm(), 1e-5);
       EXPECT_EQ(buffers.normal[i], Eigen::Vector3f::UnitZ());
     }
   EXPECT_GT(inside, 300);
@@ -309,6 +341,10 @@ TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
   ViewBuffers whole = before;
   addSection(field, {camera, 0}, whole);
   EXPECT_TRUE(whole.section.empty());
+}
+
+TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+  for (const Projection projection : kProjections) expectSectionWhereTheSolidIsCut(projection);
 }
 
 /// One cell of degree 2 in [−1, 1]³: the linear terms are 0, `c` in lexicographic order.
@@ -347,11 +383,11 @@ std::vector<Grazing> grazingFields(double dip) {
 void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(const Field&)>& make) {
   for (const double dip : {1e-5, 1e-3, 0.02, 0.05, 0.1})
     for (const Grazing& grazing : grazingFields(dip)) {
-      const Pinhole camera = lookingAt(-3 * grazing.direction, grazing.direction, 0.01);
+      const Camera camera = lookingAt(-3 * grazing.direction, grazing.direction, 0.01);
       const ViewBuffers buffers = make(grazing.field)->surface({camera, 0}, 16, 12);
       EXPECT_EQ(hits(buffers), buffers.cell.size()) << "a dip of " << dip << " is passed";
       for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
-        const Vector3 hit = camera.eye + buffers.distance[i] * rayDirection(camera, 16, 12, int(i % 16), int(i / 16));
+        const Vector3 hit = hitPoint(camera, buffers, i);
         EXPECT_NEAR(grazing.field.value(hit), 0, 1e-5);
         EXPECT_LT(hit.dot(grazing.direction), 0) << "the first crossing is passed, dip " << dip;
       }
@@ -381,16 +417,14 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
     EXPECT_LT(error, 0.01) << name;
     const double tolerance = 1.5 * error + 1e-6;  // the largest error lies between the points that were tried
     const auto renderer = makeCpuRenderer(field);
-    for (const Pinhole& camera : cameras(field, 23, 15)) {
+    for (const Camera& camera : cameras(field, 23, 15)) {
       const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
       expectNothingPassed(field, {camera, 0}, buffers, 300, tolerance, 0, distance);
       for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
         if (!buffers.hit(i)) continue;
-        const Vector3 direction = rayDirection(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
-        const Vector3 hit = camera.eye + double(buffers.distance[i]) * direction;
         // where the ray begins within the error of the surface the field may see it already crossed
-        if (std::abs(distance(camera.eye)) > tolerance) {
-          EXPECT_NEAR(distance(hit), 0, tolerance) << name;
+        if (std::abs(distance(rayStart(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth)))) > tolerance) {
+          EXPECT_NEAR(distance(hitPoint(camera, buffers, i)), 0, tolerance) << name;
         }
       }
     }
@@ -400,7 +434,7 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
 TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
   const double radius = 0.8;
   const Field& field = shape("sphere,radius=0.8");
-  const Pinhole camera = pinhole({}, kCube, kWidth, kHeight);
+  const Camera camera = cameraOf({}, kCube, kWidth, kHeight);
   const ViewBuffers buffers = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
   const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
   const ViewBuffers other = gl ? gl->surface({camera, 0}, kWidth, kHeight) : buffers;
@@ -426,17 +460,52 @@ TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
   EXPECT_GT(compared, 2000);
 }
 
+/// Parallel rays, by the formula; and however far away the camera is said to be, hits are as precise.
+TEST(CpuTrace, HitsTheSphereOrthographically) {
+  const double radius = 0.8;
+  const Field& field = shape("sphere,radius=0.8");
+  const auto cpu = makeCpuRenderer(field);
+  const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
+  for (const double distance : {1.1, 1e7}) {
+    // the same height at the target
+    const double halfHeight = 1.1 * std::tan(17.5 * std::acos(-1.0) / 180) / distance;
+    const OrbitCamera orbit{.distance = distance,
+                            .fieldOfViewDegrees = 2 * std::atan(halfHeight) * 180 / std::acos(-1.0),
+                            .projection = Projection::orthographic};
+    const Camera camera = cameraOf(orbit, kCube, kWidth, kHeight);
+    const ViewBuffers buffers = cpu->surface({camera, 0}, kWidth, kHeight);
+    const ViewBuffers other = gl ? gl->surface({camera, 0}, kWidth, kHeight) : buffers;
+    EXPECT_TRUE(agree(buffers, other, surfaceTolerance(field), &camera));
+    int compared = 0;
+    for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+      const Vector3 start = rayStart(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth));
+      const double toMiddle = -start.dot(camera.forward);
+      const double nearest2 = start.squaredNorm() - toMiddle * toMiddle;
+      if (nearest2 > 1.01 * radius * radius) {
+        EXPECT_FALSE(buffers.hit(i) || other.hit(i));
+      }
+      if (nearest2 > 0.98 * radius * radius) continue;
+      ASSERT_TRUE(buffers.hit(i) && other.hit(i));
+      EXPECT_NEAR(buffers.distance[i], toMiddle - std::sqrt(radius * radius - nearest2), 1e-3);
+      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 1e-6);
+      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 1e-5);
+      ++compared;
+    }
+    EXPECT_GT(compared, 2000) << distance;
+  }
+}
+
 TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
   const Field& field = shape("sphere,radius=0.8");
   const auto renderer = makeCpuRenderer(field);
-  // a pinhole at the centre sees the inside all around
-  const Pinhole centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
+  // a camera at the centre sees the inside all around
+  const Camera centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
   const ViewBuffers inside = renderer->surface({centered, 0}, kWidth, kHeight);
   EXPECT_EQ(hits(inside), inside.cell.size());
   EXPECT_NEAR(inside.distance[kWidth * kHeight / 2 + kWidth / 2], 0.79, 2e-3);
   EXPECT_GT(inside.normal[kWidth * kHeight / 2 + kWidth / 2].x(), 0.99);
 
-  const Pinhole outside = lookingAt(Vector3(4, 0.01, 0.02), Vector3(-1, 0, 0), 0.1);
+  const Camera outside = lookingAt(Vector3(4, 0.01, 0.02), Vector3(-1, 0, 0), 0.1);
   const std::size_t middle = kWidth * kHeight / 2 + kWidth / 2;
   for (const double offset : {-0.3, 0.0, 0.2}) {
     const ViewBuffers buffers = renderer->surface({outside, offset}, kWidth, kHeight);
@@ -454,16 +523,190 @@ TEST(CpuRenderer, RefusesViewsThatAreNone) {
   const Field field = randomField(1);
   const auto renderer = makeCpuRenderer(field);
   const SliceView slice = axisSlice(field.domain(), 2, 0, 8, 8);
-  const Pinhole camera = pinhole({}, field.domain(), 8, 8);
+  const Camera camera = cameraOf({}, field.domain(), 8, 8);
   EXPECT_THROW(renderer->slice(slice, 0, 8), Error);
   EXPECT_THROW(renderer->surface({camera, 0}, 8, -3), Error);
   EXPECT_THAT([&] { renderer->surface({camera, std::nan("")}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("offset")));
   SliceView badSlice = slice;
   badSlice.up.x() = std::nan("");
   EXPECT_THROW(renderer->slice(badSlice, 8, 8), Error);
-  Pinhole badCamera = camera;
+  Camera badCamera = camera;
   badCamera.forward.setZero();
   EXPECT_THAT([&] { renderer->surface({badCamera, 0}, 8, 8); }, ThrowsMessage<Error>(HasSubstr("forward")));
+}
+
+// --- Cracks --------------------------------------------------------------------------------------------------------
+
+/// A polynomial of degree 2 in a cell: in local coordinates, plain Legendre, lexicographic.
+using Quadratic = std::array<double, 10>;
+
+/// 4 × 4 × 4 base cells in [−1, 1]³, some of them divided; each with the polynomial that is given for its centre and
+/// half its size.
+Field pieces(const std::function<Quadratic(const Vector3&, double)>& polynomial) {
+  FieldData data{.domain = Box(-Vector3::Ones(), Vector3::Ones()),
+                 .grid = {4, 4, 4},
+                 .nodes = std::vector<std::uint64_t>(64),
+                 .coefficients = {},
+                 .metadata = {}};
+  std::vector<double> coefficients;
+  const auto leaf = [&](const Vector3& center, double half) {
+    const Quadratic c = polynomial(center, half);
+    coefficients.insert(coefficients.end(), c.begin(), c.end());
+    return node::leaf(2, std::uint32_t(coefficients.size() - c.size()));
+  };
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    const Vector3 center = Vector3(i % 4, i / 4 % 4, i / 16) * 0.5 - Vector3::Constant(0.75);
+    if (i % 3 != 0) {
+      data.nodes[i] = leaf(center, 0.25);
+      continue;
+    }
+    data.nodes[i] = node::internal(std::uint32_t(data.nodes.size()));
+    for (int child = 0; child < 8; ++child)
+      data.nodes.push_back(
+          leaf(center + 0.125 * Vector3(child & 1 ? 1 : -1, child & 2 ? 1 : -1, child & 4 ? 1 : -1), 0.125));
+  }
+  data.coefficients = std::move(coefficients);
+  return Field(std::move(data));
+}
+
+/// value + slope · (x − center)
+Quadratic linear(double value, const Vector3& slope, double half) {
+  return {value, slope.z() * half, 0, slope.y() * half, 0, 0, slope.x() * half};
+}
+
+/// (|x|² − r²) / 2r: of slope 1 on a sphere.
+Quadratic ball(double radius, const Vector3& center, double half) {
+  Quadratic c = linear((center.squaredNorm() + half * half - radius * radius) / (2 * radius), center / radius, half);
+  c[2] = c[5] = c[9] = half * half / (3 * radius);
+  return c;
+}
+
+/// Both, where there is OpenGL.
+std::vector<std::unique_ptr<Renderer>> renderersOf(const Field& field) {
+  std::vector<std::unique_ptr<Renderer>> result;
+  result.push_back(makeCpuRenderer(field));
+  if (support::glProblem().empty()) result.push_back(makeGlRenderer(field, GlChoice::software));
+  return result;
+}
+
+std::size_t crackCount(const ViewBuffers& buffers) {
+  return std::size_t(std::ranges::count(buffers.crack, std::uint8_t{1}));
+}
+
+/// The same polynomial everywhere, a kink at faces, and a surface that lies in faces, which rays meet just behind them;
+/// solids that the walls cut, so that rays enter within them.
+TEST(Cracks, AreNoneInAContinuousField) {
+  struct Continuous {
+    const char* name;
+    Field field;
+  };
+  const Continuous fields[] = {
+      {"sphere", pieces([](const Vector3& c, double half) { return ball(0.8, c, half); })},
+      {"ball beyond the walls", pieces([](const Vector3& c, double half) { return ball(1.2, c, half); })},
+      {"plane in faces", pieces([](const Vector3& c, double half) { return linear(c.z(), Vector3::UnitZ(), half); })},
+      {"oblique plane",
+       pieces([](const Vector3& c, double half) { return linear(c.sum() - 0.3, Vector3::Ones(), half); })},
+      {"kink", pieces([](const Vector3& c, double half) {
+         return linear(c.z() + 0.5 * std::abs(c.x()), Vector3(c.x() < 0 ? -0.5 : 0.5, 0, 1), half);
+       })},
+  };
+  for (const auto& [name, field] : fields) {
+    std::vector<Camera> views = cameras(field, 41, 3);
+    for (const double elevation : {-40.0, 0.0, 30.0, 90.0})
+      for (const Projection projection : kProjections)
+        views.push_back(
+            cameraOf({.elevationDegrees = elevation, .projection = projection}, field.domain(), kWidth, kHeight));
+    std::size_t seen = 0;
+    for (const auto& renderer : renderersOf(field))
+      for (const Camera& camera : views)
+        for (const double offset : {0.0, 0.25}) {
+          const ViewBuffers buffers = renderer->surface({camera, offset}, kWidth, kHeight);
+          seen += hits(buffers);
+          EXPECT_EQ(crackCount(buffers), 0u) << name << ", offset " << offset;
+        }
+    EXPECT_GT(seen, 20000u) << name;
+  }
+}
+
+/// f = z − 0.1 where x < 0, z + 0.1 elsewhere: seen from above and +x a cliff at x = 0.
+TEST(Cracks, AreExactlyWhereTheStepIs) {
+  const Field field = pieces(
+      [](const Vector3& c, double half) { return linear(c.z() + (c.x() < 0 ? -0.1 : 0.1), Vector3::UnitZ(), half); });
+  for (const Projection projection : kProjections) {
+    OrbitCamera orbit{
+        .azimuthDegrees = 60, .elevationDegrees = 25, .distance = 0.6, .up = UpAxis::z, .projection = projection};
+    const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
+    for (const auto& renderer : renderersOf(field)) {
+      const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+      int cliff = 0, others = 0;
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+          const std::size_t i = std::size_t(y) * kWidth + x;
+          const Vector3 start = rayStart(camera, kWidth, kHeight, x, y);
+          const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
+          const Vector3 at = start - start.x() / ray.x() * ray;  // at x = 0
+          // all rays go down: above the lower floor at x = 0, they have not met it before
+          const bool expected = ray.x() < 0 && field.domain().contains(at) && at.z() > -0.1 && at.z() < 0.1;
+          if (std::abs(std::abs(at.z()) - 0.1) < 1e-4) continue;
+          ASSERT_EQ(buffers.crack[i] != 0, expected) << x << ", " << y;
+          if (!expected) {
+            others += buffers.hit(i);
+            continue;
+          }
+          ++cliff;
+          ASSERT_TRUE(buffers.hit(i));
+          EXPECT_NEAR(buffers.value[i], at.z() - 0.1, 1e-5);
+          EXPECT_LT((hitPoint(camera, buffers, i) - at).norm(), 1e-4);
+        }
+      EXPECT_GT(cliff, 500);
+      EXPECT_GT(others, 3000);
+      const Cracks cracks = cracksOf(buffers, 0, 1);
+      EXPECT_NEAR(double(cracks.pixels), cliff, 30);
+      EXPECT_GT(cracks.widest, 0.195);
+      EXPECT_LT(cracks.widest, 0.2 + 1e-5);
+    }
+    // from high above and −x one looks over the cliff
+    orbit.azimuthDegrees = -60;
+    orbit.elevationDegrees = 50;
+    orbit.distance = 0.25;
+    const SurfaceView over{cameraOf(orbit, field.domain(), kWidth, kHeight), 0};
+    for (const auto& renderer : renderersOf(field)) {
+      const ViewBuffers buffers = renderer->surface(over, kWidth, kHeight);
+      EXPECT_EQ(hits(buffers), buffers.cell.size());
+      EXPECT_EQ(crackCount(buffers), 0u);
+    }
+  }
+}
+
+/// Steps a little higher than what the march cannot tell from none, and a little lower.
+TEST(Cracks, OfHardlyAnyHeightAreNone) {
+  const auto stepped = [](double step) {
+    return pieces([step](const Vector3& c, double half) {
+      return linear(c.x() + 0.5 * (c.x() < 0 ? -step : step), Vector3::UnitX(), half);
+    });
+  };
+  const double diagonal = std::sqrt(12.0);
+  const Camera camera = cameraOf({.azimuthDegrees = 80, .distance = 0.3}, kCube, kWidth, kHeight);
+  const Field high = stepped(20e-6 * diagonal), low = stepped(2e-6 * diagonal);
+  for (const auto& renderer : renderersOf(high)) {
+    const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+    EXPECT_EQ(crackCount(buffers), buffers.crack.size());
+  }
+  for (const auto& renderer : renderersOf(low)) {
+    const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
+    EXPECT_EQ(hits(buffers), buffers.cell.size());
+    EXPECT_EQ(crackCount(buffers), 0u);
+  }
+}
+
+TEST(Cracks, AreNotOnTheSectionOfAClippingPlane) {
+  const Field field = randomField(5, {.roughness = 0.2});
+  const SurfaceView view{cameraOf({}, field.domain(), kWidth, kHeight), 0, ClipPlane{2, 0.1}};
+  ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
+  const std::size_t before = crackCount(buffers);
+  addSection(field, view, buffers);
+  EXPECT_LT(crackCount(buffers), before) << "no crack behind the section: the test shows nothing";
+  for (std::size_t i = 0; i < buffers.crack.size(); ++i) EXPECT_FALSE(buffers.crack[i] && buffers.section[i]);
 }
 
 // --- OpenGL against the oracle -------------------------------------------------------------------------------------
@@ -530,7 +773,7 @@ TEST_F(Gl, ViewsLargerThanATile) {
   const Field& field = shape("torus");
   expectSameSlice(field, axisSlice(kCube, 2, 0, 4500, 9), kSliceTolerance, 4500, 9);
   expectSameSlice(field, axisSlice(kCube, 2, 0, 5, 4500), kSliceTolerance, 5, 4500);
-  const Pinhole camera = pinhole({}, kCube, 2100, 64);
+  const Camera camera = cameraOf({}, kCube, 2100, 64);
   EXPECT_TRUE(agree(makeCpuRenderer(field)->surface({camera, 0}, 2100, 64),
                     makeGlRenderer(field, GlChoice::software)->surface({camera, 0}, 2100, 64), surfaceTolerance(field),
                     &camera));
@@ -542,7 +785,7 @@ TEST_F(Gl, SurfacesOfBuiltInShapesFromAnywhere) {
     const auto cpu = makeCpuRenderer(field);
     const auto gl = makeGlRenderer(field, GlChoice::software);
     std::size_t seen = 0;
-    for (const Pinhole& camera : cameras(field, 31, 18))
+    for (const Camera& camera : cameras(field, 31, 18))
       for (const double offset : {0.0, -0.04}) {
         const ViewBuffers expected = cpu->surface({camera, offset}, kWidth, kHeight);
         seen += hits(expected);
@@ -559,13 +802,22 @@ TEST_F(Gl, SurfacesSeenAlongAnAxis) {
     const Field& field = shape(name);
     const auto cpu = makeCpuRenderer(field);
     const auto gl = makeGlRenderer(field, GlChoice::software);
+    struct Direction {
+      int azimuth, elevation;
+      Projection projection;
+    };
+    std::vector<Direction> directions;
     for (const auto& [azimuth, elevation] : {std::pair(0, 0), {90, 0}, {180, 0}, {270, 0}, {0, 90}, {0, -90}, {45, 0}})
+      for (const Projection projection : kProjections) directions.push_back({azimuth, elevation, projection});
+    for (const auto& [azimuth, elevation, projection] : directions)
       for (const auto& [width, height] : {std::pair(96, 64), {97, 65}, {160, 107}}) {
-        const OrbitCamera orbit{.azimuthDegrees = double(azimuth), .elevationDegrees = double(elevation)};
-        const Pinhole camera = pinhole(orbit, field.domain(), width, height);
+        const OrbitCamera orbit{
+            .azimuthDegrees = double(azimuth), .elevationDegrees = double(elevation), .projection = projection};
+        const Camera camera = cameraOf(orbit, field.domain(), width, height);
         const ViewBuffers expected = cpu->surface({camera, 0}, width, height);
         const ViewBuffers actual = gl->surface({camera, 0}, width, height);
-        const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation);
+        const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation) +
+                                  (projection == Projection::perspective ? "" : ", orthographic");
         EXPECT_TRUE(agree(expected, actual, surfaceTolerance(field), &camera)) << where << ", width " << width;
         if (name == "torus") continue;  // whose silhouette is not convex
         EXPECT_EQ(gaps(expected), 0u) << where << ", width " << width;
@@ -590,7 +842,7 @@ TEST_F(Gl, SurfacesOfTheRudestFields) {
     BufferTolerance tolerance = surfaceTolerance(field);
     tolerance.value = 1e-4;
     tolerance.position *= 10;
-    for (const Pinhole& camera : cameras(field, seed, 6))
+    for (const Camera& camera : cameras(field, seed, 6))
       EXPECT_TRUE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
                         tolerance, &camera))
           << seed;
@@ -602,7 +854,7 @@ TEST_F(Gl, SurfacesOfDegree30) {
   const Field field = randomField(9, {.grid = {1, 1, 1}, .maxDepth = 1, .minDegree = 30, .maxDegree = 30});
   const auto cpu = makeCpuRenderer(field);
   const auto gl = makeGlRenderer(field, GlChoice::software);
-  const Pinhole camera = pinhole({}, field.domain(), 64, 48);
+  const Camera camera = cameraOf({}, field.domain(), 64, 48);
   const ViewBuffers expected = cpu->surface({camera, 0}, 64, 48);
   EXPECT_GT(hits(expected), 300u);
   EXPECT_TRUE(agree(expected, gl->surface({camera, 0}, 64, 48), surfaceTolerance(field), &camera));
@@ -612,7 +864,7 @@ TEST_F(Gl, SurfacesOfDegree30) {
 TEST_F(Gl, NegativeControl) {
   const Field field = randomField(2);
   const SliceView slice = axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
-  const Pinhole camera = pinhole({}, field.domain(), kWidth, kHeight);
+  const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
   const ViewBuffers expectedSlice = makeCpuRenderer(field)->slice(slice, kWidth, kHeight);
   const ViewBuffers expectedSurface = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
   const auto rendered = [&](std::uint32_t cell, double change) {
@@ -654,7 +906,7 @@ TEST_F(Gl, SeveralRenderersAtOnceAndOnAnyThread) {
 
 TEST_F(Gl, RepeatsItselfBitByBit) {
   const Field& field = shape("torus");
-  const SurfaceView view{pinhole({}, kCube, kWidth, kHeight), 0};
+  const SurfaceView view{cameraOf({}, kCube, kWidth, kHeight), 0};
   const auto gl = makeGlRenderer(field, GlChoice::software);
   const ViewBuffers once = gl->surface(view, kWidth, kHeight);
   const ViewBuffers again = gl->surface(view, kWidth, kHeight);
@@ -673,7 +925,7 @@ TEST_F(Gl, RefusesViewsThatAreNone) {
   const Field field = randomField(1);
   const auto renderer = makeGlRenderer(field, GlChoice::software);
   EXPECT_THROW(renderer->slice(axisSlice(field.domain(), 2, 0, 8, 8), 0, 8), Error);
-  EXPECT_THROW(renderer->surface({pinhole({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
+  EXPECT_THROW(renderer->surface({cameraOf({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
 }
 
 /// In a fresh process, so that EGL looks for its drivers again: there are none, and the error says all that was tried.

@@ -50,12 +50,13 @@ void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
         ASSERT_LE(found.starts[i], truth.distance[i] * (1 + 1e-6F)) << x << ", " << y;
       }
       if (i % 11 != 0) continue;
+      const Vector3 start = pixelEye(view.camera, x, y, kWidth, kHeight);
       const Vector3 direction = rays.direction(x, y);
-      const double farthest = (view.camera.eye - field.domain().center()).norm() + space.diagonal;
+      const double farthest = (start - field.domain().center()).norm() + space.diagonal;
       const double end = std::min<double>(found.starts[i], farthest);
       if (end <= 1e-5) continue;
       for (int step = 1; step <= 200; ++step) {
-        const Vector3 point = view.camera.eye + (end - 1e-5) * step / 200 * direction;
+        const Vector3 point = start + (end - 1e-5) * step / 200 * direction;
         if (!field.domain().contains(point)) continue;
         const NodeBounds& leaf = bounds[field.cellAt(point).id];
         ASSERT_TRUE(found.side > 0 ? leaf.lo > view.offset : leaf.hi < view.offset) << x << ", " << y;
@@ -63,7 +64,7 @@ void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
     }
 }
 
-Pinhole lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
+Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) {
   const Vector3 unit = forward.normalized();
   const Vector3 right = unit.unitOrthogonal();
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
@@ -83,14 +84,17 @@ TEST(SurfaceBlocks, LeaveNothingOutFromAnywhere) {
       // from far away down to within the domain
       const Vector3 eye = std::exp2(2 - i % 6) * Vector3(unit(random), unit(random), unit(random));
       const Vector3 forward = i % 2 ? Vector3(unit(random), unit(random), unit(random)) : Vector3(-eye);
-      expectNothingLeftOut(field, {lookingAt(eye, forward, 0.3 + 0.5 * (i % 3)), 0.1 * unit(random)});
+      Camera camera = lookingAt(eye, forward, 0.3 + 0.5 * (i % 3));
+      expectNothingLeftOut(field, {camera, 0.1 * unit(random)});
+      camera.projection = Projection::orthographic;
+      expectNothingLeftOut(field, {camera, 0.1 * unit(random)});
     }
   }
 }
 
 TEST(SurfaceBlocks, OfACameraWithoutWidthAreTheWholeView) {
   const Field field = randomField(1);
-  const Pinhole flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
+  const Camera flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
   for (const float start : find(field, {flat, 0}).starts) EXPECT_LT(start, 3);
 }
 
@@ -98,9 +102,9 @@ TEST(SurfaceBlocks, OfACameraWithoutWidthAreTheWholeView) {
 Field sphere() { return randomField(3, {.roughness = 0.02, .refinement = 1, .maxDepth = 4}); }
 
 /// What the blocks are for: few pixels beside the surface are drawn, and rays start close to it.
-TEST(SurfaceBlocks, HugTheSurface) {
+void expectBlocksHugTheSurface(Projection projection) {
   const Field field = sphere();
-  const SurfaceView view{pinhole({}, field.domain(), kWidth, kHeight), 0};
+  const SurfaceView view{cameraOf({.projection = projection}, field.domain(), kWidth, kHeight), 0};
   const Found found = find(field, view);
   const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   int drawn = 0, hit = 0;
@@ -117,18 +121,28 @@ TEST(SurfaceBlocks, HugTheSurface) {
   EXPECT_LT(ahead / hit, 0.1 * field.domain().sizes().norm());
 }
 
+TEST(SurfaceBlocks, HugTheSurface) {
+  expectBlocksHugTheSurface(Projection::perspective);
+  expectBlocksHugTheSurface(Projection::orthographic);
+}
+
 TEST(SurfaceBlocks, AreNoneWhereThereIsNothingToSee) {
   const Field field = sphere();
   const auto count = [&](const SurfaceView& view) {
     const Found found = find(field, view);
     return std::ranges::count_if(found.starts, [](float start) { return std::isfinite(start); });
   };
-  const Pinhole away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
+  const Camera away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
   EXPECT_EQ(count({away, 0}), 0);
   // past the sphere, which lies to both sides of the plane through the eye
-  const Pinhole past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
+  Camera past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
   EXPECT_EQ(count({past, 0}), 0);
-  EXPECT_EQ(count({pinhole({}, field.domain(), kWidth, kHeight), 5}), 0);
+  past.projection = Projection::orthographic;
+  EXPECT_EQ(count({past, 0}), 0);
+  Camera behind = lookingAt(Vector3(0.9, 0.01, 0.02), Vector3(1, 0, 0), 0.5);
+  behind.projection = Projection::orthographic;
+  EXPECT_EQ(count({behind, 0}), 0);
+  EXPECT_EQ(count({cameraOf({}, field.domain(), kWidth, kHeight), 5}), 0);
 }
 
 }  // namespace

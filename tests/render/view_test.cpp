@@ -121,43 +121,43 @@ TEST(PlaneSlice, RefusesWhatCannotBeShown) {
   EXPECT_THROW(planeSlice(kBox, kBox.max(), Vector3(1, 1, 1), 64, 64), Error);
 }
 
-TEST(Pinhole, LooksFromWhereTheAnglesSay) {
+TEST(Camera, LooksFromWhereTheAnglesSay) {
   const Box box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   const double diagonal = std::sqrt(12.0);
   OrbitCamera camera{.azimuthDegrees = 0, .elevationDegrees = 0, .distance = 2, .up = UpAxis::y};
-  Pinhole view = pinhole(camera, box, 100, 100);
+  Camera view = cameraOf(camera, box, 100, 100);
   EXPECT_TRUE(view.eye.isApprox(Vector3(0, 0, 2 * diagonal)));
   EXPECT_TRUE(view.forward.isApprox(-Vector3::UnitZ()));
   EXPECT_TRUE(view.right.normalized().isApprox(Vector3::UnitX()));
   EXPECT_TRUE(view.up.normalized().isApprox(Vector3::UnitY()));
 
   camera.up = UpAxis::z;
-  view = pinhole(camera, box, 100, 100);
+  view = cameraOf(camera, box, 100, 100);
   EXPECT_TRUE(view.eye.isApprox(Vector3(0, -2 * diagonal, 0)));
   EXPECT_TRUE(view.right.normalized().isApprox(Vector3::UnitX()));
   EXPECT_TRUE(view.up.normalized().isApprox(Vector3::UnitZ()));
 
   camera.elevationDegrees = 90;
-  view = pinhole(camera, box, 100, 100);
+  view = cameraOf(camera, box, 100, 100);
   EXPECT_TRUE(view.eye.isApprox(Vector3(0, 0, 2 * diagonal)));
   EXPECT_TRUE(view.up.normalized().isApprox(Vector3::UnitY()));
 }
 
-TEST(Pinhole, CirclesItsTarget) {
+TEST(Camera, CirclesItsTarget) {
   const Vector3 target(0.3, -0.2, 0.7);
-  const Pinhole view =
-      pinhole({.azimuthDegrees = 50, .elevationDegrees = 10, .distance = 0.1, .target = target}, kBox, 64, 64);
+  const Camera view =
+      cameraOf({.azimuthDegrees = 50, .elevationDegrees = 10, .distance = 0.1, .target = target}, kBox, 64, 64);
   EXPECT_NEAR((view.eye - target).norm(), 0.1 * kBox.sizes().norm(), 1e-12);
   EXPECT_TRUE(view.forward.isApprox((target - view.eye).normalized()));
-  EXPECT_THROW(pinhole({.target = Vector3(kNaN, 0, 0)}, kBox, 64, 64), Error);
+  EXPECT_THROW(cameraOf({.target = Vector3(kNaN, 0, 0)}, kBox, 64, 64), Error);
 }
 
-TEST(Pinhole, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
+TEST(Camera, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
   for (const UpAxis up : {UpAxis::y, UpAxis::z})
     for (const double azimuth : {-200.0, 0.0, 30.0, 1000.0})
       for (const double elevation : {-90.0, -30.0, 0.0, 20.0, 90.0}) {
         const OrbitCamera camera{azimuth, elevation, 1.5, 40, up};
-        const Pinhole view = pinhole(camera, kBox, 300, 200);
+        const Camera view = cameraOf(camera, kBox, 300, 200);
         EXPECT_NEAR((view.eye - kBox.center()).norm(), 1.5 * kBox.sizes().norm(), 1e-9);
         EXPECT_NEAR(view.forward.norm(), 1, 1e-12);
         EXPECT_TRUE(view.right.normalized().cross(view.up.normalized()).isApprox(-view.forward, 1e-9));
@@ -169,18 +169,51 @@ TEST(Pinhole, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
       }
 }
 
-TEST(Pinhole, RefusesNumbersOutOfRange) {
+/// What lies in the plane through the target is where perspective shows it; and rays start before the domain, but not
+/// far from it.
+TEST(Camera, OrthographicKeepsTheFramingAndStartsBeforeTheDomain) {
+  const double diagonal = kBox.sizes().norm();
+  for (const double distance : {0.01, 1.1, 1e9})
+    for (const Vector3& target : {Vector3(kBox.center()), Vector3(0.3, -0.2, 0.7), Vector3(50, -60, 70)})
+      for (const double azimuth : {0.0, 33.0, 200.0})
+        for (const double elevation : {-90.0, -20.0, 0.0, 60.0}) {
+          OrbitCamera orbit{
+              .azimuthDegrees = azimuth, .elevationDegrees = elevation, .distance = distance, .target = target};
+          const Camera perspective = cameraOf(orbit, kBox, 300, 200);
+          orbit.projection = Projection::orthographic;
+          const Camera view = cameraOf(orbit, kBox, 300, 200);
+          EXPECT_EQ(view.forward, perspective.forward);
+          for (const auto& [x, y] : {std::pair(0, 0), {299, 0}, {10, 150}}) {
+            const Vector3 ray = pixelRay(perspective, x, y, 300, 200);
+            const double toTarget = distance * diagonal / ray.dot(view.forward);
+            const Vector3 shown = pixelEye(perspective, x, y, 300, 200) + toTarget * ray;
+            const Vector3 start = pixelEye(view, x, y, 300, 200);
+            EXPECT_EQ(pixelRay(view, x, y, 300, 200), view.forward);
+            const Vector3 across = shown - start - (shown - start).dot(view.forward) * view.forward;
+            EXPECT_LT(across.norm(), 1e-9 * std::max(1.0, distance) * diagonal);
+          }
+          double nearest = kInfinity;
+          for (int i = 0; i < 8; ++i) {
+            const Vector3 corner = kBox.corner(static_cast<Box::CornerType>(i));
+            nearest = std::min(nearest, (corner - view.eye).dot(view.forward));
+          }
+          EXPECT_GT(nearest, 0);
+          EXPECT_LT(nearest, 0.05 * diagonal);
+        }
+}
+
+TEST(Camera, RefusesNumbersOutOfRange) {
   const auto with = [](auto change) {
     OrbitCamera camera;
     change(camera);
-    return [camera] { pinhole(camera, kBox, 64, 64); };
+    return [camera] { cameraOf(camera, kBox, 64, 64); };
   };
   EXPECT_THAT(with([](OrbitCamera& c) { c.azimuthDegrees = kNaN; }), ThrowsMessage<Error>(HasSubstr("azimuth")));
   EXPECT_THAT(with([](OrbitCamera& c) { c.elevationDegrees = 91; }), ThrowsMessage<Error>(HasSubstr("elevation 91")));
   EXPECT_THAT(with([](OrbitCamera& c) { c.distance = 0; }), ThrowsMessage<Error>(HasSubstr("distance")));
   EXPECT_THAT(with([](OrbitCamera& c) { c.distance = kInfinity; }), ThrowsMessage<Error>(HasSubstr("distance")));
   EXPECT_THAT(with([](OrbitCamera& c) { c.fieldOfViewDegrees = 180; }), ThrowsMessage<Error>(HasSubstr("view")));
-  EXPECT_THROW(pinhole({}, kBox, 0, 64), Error);
+  EXPECT_THROW(cameraOf({}, kBox, 0, 64), Error);
 }
 
 }  // namespace

@@ -87,6 +87,9 @@ void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& com
     camera(c.azimuthDegrees, *v, c.distance);
   if (const auto v = ui.slider("view/distance", "distance", c.distance, 0.05, 3, "%.3g"))
     camera(c.azimuthDegrees, c.elevationDegrees, *v);
+  choice(ui, "view/projection", "projection", {"perspective", "orthographic"},
+         c.projection == render::Projection::perspective ? "perspective" : "orthographic",
+         "camera projection=", commands);
   choice(ui, "view/up", "up", {"y", "z"}, c.up == render::UpAxis::y ? "y" : "z", "camera up=", commands);
   ui.enable(c.target.has_value());
   if (ui.button("view/center", "back to the center")) commands.push_back("camera target=center");
@@ -94,6 +97,8 @@ void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& com
   const double span = 0.15 * field.domain().diagonal().norm();
   if (const auto v = ui.slider("view/offset", "offset", view.surfaceOffset, -span, span))
     commands.push_back("surface offset=" + number(*v));
+  if (const auto on = ui.checkbox("view/cracks", "mark cracks", view.cracks))
+    commands.push_back(fmt::format("surface cracks={}", *on));
   choice(ui, "view/clip", "cut across", {"none", "x", "y", "z"},
          view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none", "surface clip=", commands);
   if (!view.clip) return;
@@ -185,6 +190,11 @@ void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
     ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
     if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
     return;
+  }
+  if (const auto all = explorer.allSteps()) {
+    const auto steps = double(made.steps.value_or(*all));
+    if (const auto v = ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
+      commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
   }
   ui.enable(!setting("mesh", explorer.session().current().madeFrom()).empty());
   if (ui.button("build/rebuild", "rebuild")) commands.push_back("rebuild");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "building.h"
 #include "commands.h"
@@ -45,6 +46,9 @@ void runCamera(Session& session, const Arguments& arguments) {
   if (arguments.given("view") && arguments.text("view") != "any") turnTo(camera, arguments.text("view"));
   if (arguments.given("target")) camera.target = pointOr(arguments, "target", "center");
   if (arguments.given("up")) camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  if (arguments.given("projection"))
+    camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                       : render::Projection::perspective;
   session.explorer().change(std::move(view));
 }
 
@@ -59,6 +63,7 @@ void checkCamera(const Arguments& arguments) {
 void runSurface(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
+  if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
   if (arguments.given("clip")) {
     const std::string axis = arguments.text("clip");
     if (axis == "none")
@@ -169,7 +174,7 @@ void runFly(Session& session, const Arguments& arguments) {
     // what lies in front of it is cut away, unless it is the surface that one looks at
     view.clip.reset();
     if (std::abs(field.value(face.worst) - view.surfaceOffset) > size) {
-      const Vector3 forward = render::pinhole(view.camera, field.domain(), 16, 16).forward;
+      const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
       Eigen::Index axis = 0;
       forward.cwiseAbs().maxCoeff(&axis);
       view.clip = render::ClipPlane{int(axis), face.worst[axis]};
@@ -205,9 +210,8 @@ void runSettings(Session& session, const Arguments& arguments) {
       session.explorer().setSetting(parameter.name, arguments.text(parameter.name));
 }
 
-void runRebuild(Session& session, const Arguments&) {
-  const std::string line = session.explorer().buildLine();
-  runScript(session, parseScript(session.registry(), "rebuild", line, {}));
+void runRebuild(Session& session, const Arguments& arguments) {
+  session.explorer().rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps")) : std::nullopt);
 }
 
 void runShot(Session& session, const Arguments& arguments) {
@@ -271,22 +275,24 @@ Command cameraCommand() {
   return {.name = "camera",
           .summary = "Move the explorer's camera.",
           .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
-          .parameters = {{.name = "orbit",
-                          .type = ParameterType::numbers,
-                          .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
-                                  "diagonals of the domain; 30,20,1.1 at first.",
-                          .valueName = "AZIMUTH,ELEVATION,DISTANCE",
-                          .counts = {3},
-                          .positional = true},
-                         {.name = "view",
-                          .type = ParameterType::choice,
-                          .help = "A named direction instead; any leaves it.",
-                          .choices = directions},
-                         targetParameter("The point in the picture's middle; center is the domain's."),
-                         {.name = "up",
-                          .type = ParameterType::choice,
-                          .help = "The axis that points up.",
-                          .choices = {"y", "z"}}},
+          .parameters =
+              {{.name = "orbit",
+                .type = ParameterType::numbers,
+                .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
+                        "diagonals of the domain; 30,20,1.1 at first.",
+                .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+                .counts = {3},
+                .positional = true},
+               {.name = "view",
+                .type = ParameterType::choice,
+                .help = "A named direction instead; any leaves it.",
+                .choices = directions},
+               targetParameter("The point in the picture's middle; center is the domain's."),
+               {.name = "up", .type = ParameterType::choice, .help = "The axis that points up.", .choices = {"y", "z"}},
+               {.name = "projection",
+                .type = ParameterType::choice,
+                .help = "How rays run: from the eye, or parallel.",
+                .choices = {"perspective", "orthographic"}}},
           .action = runCamera,
           .check = checkCamera,
           .scriptOnly = true};
@@ -300,6 +306,9 @@ Command surfaceCommand() {
                           .type = ParameterType::number,
                           .help = "The distance whose surface is drawn; 0 at first.",
                           .unit = "world units"},
+                         {.name = "cracks",
+                          .type = ParameterType::flag,
+                          .help = "Mark where the surface is torn at a face between two cells."},
                          {.name = "clip",
                           .type = ParameterType::choice,
                           .help = "Cut across this axis; the half towards the camera is left out.",
@@ -476,7 +485,12 @@ void addViewCommands(Registry& registry) {
   registry.add(settingsCommand());
   registry.add({.name = "rebuild",
                 .summary = "Build the field anew, as 'settings' says.",
-                .examples = {"rebuild"},
+                .examples = {"rebuild", "rebuild max-steps=100"},
+                .parameters = {{.name = "max-steps",
+                                .type = ParameterType::wholeNumber,
+                                .help = "End after so many steps of the refinement: an earlier state of the field.",
+                                .minimum = 0,
+                                .maximum = std::numeric_limits<int>::max()}},
                 .action = runRebuild,
                 .scriptOnly = true});
   registry.add({.name = "shot",

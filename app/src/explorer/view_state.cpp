@@ -21,13 +21,14 @@ std::string planeLine(const ViewState& view) {
 }
 
 std::string cameraLine(const render::OrbitCamera& camera) {
-  return fmt::format("camera {},{},{} target={} up={}\n", camera.azimuthDegrees, camera.elevationDegrees,
+  return fmt::format("camera {},{},{} target={} up={} projection={}\n", camera.azimuthDegrees, camera.elevationDegrees,
                      camera.distance, camera.target ? textOf(*camera.target) : "center",
-                     camera.up == render::UpAxis::y ? "y" : "z");
+                     camera.up == render::UpAxis::y ? "y" : "z",
+                     camera.projection == render::Projection::perspective ? "perspective" : "orthographic");
 }
 
 std::string surfaceLine(const ViewState& view) {
-  std::string line = fmt::format("surface offset={} clip={}", view.surfaceOffset,
+  std::string line = fmt::format("surface offset={} cracks={} clip={}", view.surfaceOffset, view.cracks,
                                  view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
   if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
   return line + "\n";
@@ -75,6 +76,7 @@ render::SurfacePicture surfacePicture(const ViewState& view) {
   picture.camera = view.camera;
   picture.offset = view.surfaceOffset;
   picture.clip = view.clip;
+  picture.cracks = view.cracks;
   picture.color = view.surfaceColors.by;
   picture.scale = view.surfaceColors.scale;
   return picture;

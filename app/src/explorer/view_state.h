@@ -35,6 +35,7 @@ struct ViewState {
   render::OrbitCamera camera;
   double surfaceOffset = 0;
   std::optional<render::ClipPlane> clip;
+  bool cracks = false;
 
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};

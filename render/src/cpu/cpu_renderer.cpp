@@ -1,5 +1,6 @@
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "cpu/trace.h"
@@ -14,14 +15,14 @@ bool inside(const Vector3& p, const Vector3& grid) {
   return (p.array() >= 0).all() && (p.array() <= grid.array()).all();
 }
 
-/// The part of a ray from the eye within what is shown of the domain; t counts from its start. Empty where it misses.
+/// The part of a ray within what is shown of the domain; t counts from the part's start. Empty where the ray misses.
 struct Entry {
   Ray ray;
-  double fromEye;  ///< world units from the eye to the part's start
+  double fromEye;  ///< world units from the ray's start to the part's
 };
 
-std::optional<Entry> enter(const RayGeometry& rays, const Vector3& direction) {
-  const Vector3& eye = rays.eye;
+/// In grid coordinates, of a ray from `eye`.
+std::optional<Entry> enter(const RayGeometry& rays, const Vector3& eye, const Vector3& direction) {
   double first = 0;
   double last = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -75,7 +76,7 @@ class CpuRenderer final : public Renderer {
 
   void surfacePixel(const RayGeometry& geometry, double offset, int x, int y, ViewBuffers& buffers) const {
     const Vector3 direction = geometry.direction(x, y);
-    const auto entry = enter(geometry, direction.cwiseProduct(geometry.scale));
+    const auto entry = enter(geometry, geometry.start(x, y), direction.cwiseProduct(geometry.scale));
     if (!entry) return;
     const auto hit = field_.trace(entry->ray, offset);
     if (!hit) return;
@@ -88,6 +89,8 @@ class CpuRenderer final : public Renderer {
     buffers.normal[pixel] = (length > 0 ? Vector3(gradient / length) : Vector3(-direction)).cast<float>();
     buffers.value[pixel] = static_cast<float>(sample.value);
     buffers.distance[pixel] = static_cast<float>(entry->fromEye + hit->t);
+    const double step = std::abs(sample.value - offset);
+    buffers.crack[pixel] = hit->onFace && step > kCrack * field_.space().diagonal * std::max(1.0, length);
   }
 
   void setCell(const CellPoint& at, std::size_t pixel, ViewBuffers& buffers) const {

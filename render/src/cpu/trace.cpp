@@ -180,11 +180,11 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
       b = t;
       heightB = height;
     }
-    return Hit{t, cell, localAt(cell, t)};
+    return Hit{t, cell, localAt(cell, t), false};
   };
   const auto hitOnFace = [&](double t) {
     const CellPoint cell = leafAt(ray.origin + t * ray.direction);
-    return Hit{t, cell, localFromFraction(cell.fraction)};
+    return Hit{t, cell, localFromFraction(cell.fraction), true};
   };
 
   double t = 0;

@@ -38,7 +38,14 @@ struct Hit {
   double t;
   CellPoint cell;
   Vector3 local;  ///< coordinates within the cell, in [-1, 1] but for rounding
+  bool onFace;    ///< the offset is crossed from one leaf to the next, not within one
 };
+
+/// A hit on a face is a crack where |f − offset| exceeds this, in domain diagonals times the slope there (at least 1,
+/// that of a distance). The march looks into a leaf 1.4e-6 past its face at most, so that it meets a zero that lies
+/// just behind the face of a continuous field there as well, with as little height; single precision adds 2e-7. As in
+/// the shaders.
+constexpr double kCrack = 4e-6;
 
 /// A field made ready for tracing. Keeps a reference to the field.
 class TraceField {

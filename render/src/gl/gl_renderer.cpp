@@ -24,7 +24,7 @@ static_assert(kTile % kBlock == 0);
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
-enum : GLint { kShownLo = 15, kShownHi };
+enum : GLint { kShownLo = 15, kShownHi, kParallel };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
@@ -174,6 +174,7 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
   setVector(program, kScale, rays.scale);
   setVector(program, kShownLo, rays.lo);
   setVector(program, kShownHi, rays.hi);
+  glProgramUniform1i(program.name(), kParallel, rays.parallel);
   glProgramUniform2d(program.name(), kRayStep, rays.stepX, rays.stepY);
   glProgramUniform1f(program.name(), kOffset, static_cast<float>(offset));
   glProgramUniform1f(program.name(), kDiagonal, static_cast<float>(diagonal));
@@ -279,7 +280,8 @@ class GlRenderer final : public Renderer {
         const Texel& texel = integers_[from];
         buffers.cell[to] = texel[0];
         buffers.degree[to] = static_cast<std::uint8_t>(texel[1] & 0xff);
-        buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8);
+        buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8 & 0xff);
+        buffers.crack[to] = static_cast<std::uint8_t>(texel[1] >> 16);
         buffers.value[to] = std::bit_cast<float>(texel[2]);
         buffers.distance[to] = std::bit_cast<float>(texel[3]);
         buffers.normal[to] = {normals_[from][0], normals_[from][1], normals_[from][2]};

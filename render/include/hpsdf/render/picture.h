@@ -82,6 +82,7 @@ struct SurfacePicture {
   int samples = 1;
   ScaleOptions scale = {};
   std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, its cells outlined
+  bool cracks = false;  ///< mark where the field jumps over the offset between two cells (`ViewBuffers::crack`)
   bool bare = false;
 };
 

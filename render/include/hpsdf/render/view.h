@@ -30,7 +30,12 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
 
 enum class UpAxis : std::uint8_t { y, z };
 
-/// A camera that orbits the centre of the domain, or another target; perspective.
+enum class Projection : std::uint8_t {
+  perspective,
+  orthographic,  ///< parallel rays: what is farther away is no smaller
+};
+
+/// A camera that orbits the centre of the domain, or another target.
 struct OrbitCamera {
   double azimuthDegrees = 30;      ///< about the up axis, 0 looks along −z (y up) or from −y (z up)
   double elevationDegrees = 20;    ///< above the horizon, −90 to 90
@@ -38,21 +43,33 @@ struct OrbitCamera {
   double fieldOfViewDegrees = 35;  ///< vertical
   UpAxis up = UpAxis::y;
   std::optional<Vector3> target = {};  ///< world units; the domain's centre when not given
+  Projection projection = Projection::perspective;
 };
 
-/// A pinhole: pixel (x, y) of w × h looks along forward + right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h).
-struct Pinhole {
-  Vector3 eye;
+/// The rays of a view. With across = right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h), pixel (x, y) of w × h looks
+/// * in perspective from the eye along forward + across,
+/// * orthographically from eye + across along forward.
+struct Camera {
+  Vector3 eye;      ///< orthographic: the middle of the plane where rays start; what lies before it is not seen
   Vector3 forward;  ///< unit
-  Vector3 right;    ///< half the width at distance 1
-  Vector3 up;       ///< half the height at distance 1
+  Vector3 right;    ///< half the width, in perspective at distance 1
+  Vector3 up;       ///< half the height, in perspective at distance 1
+  Projection projection = Projection::perspective;
 };
-Pinhole pinhole(const OrbitCamera& camera, const Box& domain, int width, int height);
 
-/// The unit direction in which pixel (x, y) of a view of width × height looks.
-Vector3 pixelRay(const Pinhole& camera, int x, int y, int width, int height);
+/// Orthographic: as high at the target as in perspective from `distance`; but rays start just before the domain,
+/// whatever the distance, so that they do not start within it and lengths along them stay precise.
+/// Throws `Error` for numbers out of range.
+Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
-/// The plane {x_axis = offset}; the half on the eye's side is left out.
+/// Where the ray of pixel (x, y) of a view of width × height starts, world units.
+Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height);
+
+/// The unit direction in which it looks.
+Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
+
+/// The plane {x_axis = offset}; the half on the eye's side is left out. Orthographically the eye is infinitely far
+/// away, and the side that of the target where one looks along the plane.
 struct ClipPlane {
   int axis = 2;
   double offset = 0;  ///< world units
@@ -60,7 +77,7 @@ struct ClipPlane {
 
 /// The zero set, or that of f − offset, as seen by a camera. Where a clipping plane cuts the solid, one looks into it.
 struct SurfaceView {
-  Pinhole camera;
+  Camera camera;
   double offset = 0;
   std::optional<ClipPlane> clip = {};
 };
@@ -77,7 +94,10 @@ struct ViewBuffers {
   std::vector<std::uint8_t> depth;
   std::vector<float> value;             ///< f at the point; along a ray, at the hit (near the offset)
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f, made a unit vector; not filled for slices
-  std::vector<float> distance;          ///< from the eye to the hit, world units; not filled for slices
+  std::vector<float> distance;          ///< from where the ray starts to the hit, world units; not filled for slices
+  /// 1 where the field jumps over the offset at a face between two cells instead of passing it within one: f − offset
+  /// is the height of the step on the far side. Not filled for slices.
+  std::vector<std::uint8_t> crack;
   /// 1 where a pixel shows the section of the solid with a clipping plane; filled by `addSection`, else empty.
   std::vector<std::uint8_t> section;
 
