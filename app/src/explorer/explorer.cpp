@@ -197,15 +197,21 @@ void Explorer::inputWhileWorking(const Input& event) {
 }
 
 void Explorer::letGo() {
+  const auto act = [this](const Input& event) {
+    try {
+      input(event);
+    } catch (const Error&) {
+    }
+  };
   for (int button = 0; button < 3; ++button)
-    if (ui_.holds(button)) input({.kind = Input::Kind::release, .button = button});
+    if (ui_.holds(button)) act({.kind = Input::Kind::release, .button = button});
   const auto pointer = ui_.pointer();
   // a click on nothing
-  input({.kind = Input::Kind::move, .at = {-1, -1}});
-  input({.kind = Input::Kind::press});
-  input({.kind = Input::Kind::release});
+  act({.kind = Input::Kind::move, .at = {-1, -1}});
+  act({.kind = Input::Kind::press});
+  act({.kind = Input::Kind::release});
   const bool inside = UiRect{0, 0, double(view_.width), double(view_.height)}.contains(pointer[0], pointer[1]);
-  if (inside) input({.kind = Input::Kind::move, .at = pointer});
+  if (inside) act({.kind = Input::Kind::move, .at = pointer});
 }
 
 void Explorer::input(const Input& event) {

@@ -49,7 +49,7 @@ class Explorer {
   /// work is under way, all that can be done is to cancel it.
   void input(const Input& event);
   /// Lets go of the mouse's buttons, closes lists, gives up a text that is being typed: what no script leads to. The
-  /// pointer stays where it is. Throws what letting go of a button throws.
+  /// pointer stays where it is. Mistakes in what is given up are passed over.
   void letGo();
 
   /// Of the panels as they stand now.

@@ -13,9 +13,8 @@ Recording::~Recording() { explorer_.onCommand = nullptr; }
 
 void Recording::add(const std::string& line, bool replaces) {
   // a window that is resized asks for each size on the way
-  constexpr std::string_view kSize = "show size=";
-  const bool resized = line.starts_with(kSize) && !lines_.empty() && lines_.back().starts_with(kSize);
-  if (replaces || resized)
+  const auto isSize = [](const std::string& any) { return any.starts_with("show size=") && any.rfind(' ') == 4; };
+  if (replaces || (isSize(line) && !lines_.empty() && isSize(lines_.back())))
     lines_.back() = line;
   else
     lines_.push_back(line);

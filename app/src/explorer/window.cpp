@@ -330,17 +330,23 @@ class Window {
   /// During long work.
   void refresh() {
     glfwPollEvents();
+    std::deque<std::optional<Input>> later;
     while (!events_.empty()) {
       const auto event = events_.front();
       events_.pop_front();
-      if (event) explorer_.input(*event);
+      if (event)
+        explorer_.input(*event);
+      else
+        later.emplace_back();
     }
+    events_ = std::move(later);
     if (ended()) explorer_.cancelWanted = true;
     screen_.show(explorer_.frame());
   }
 
   void putAway() {
-    attempt([&] { explorer_.letGo(); });
+    attempt([&] { explorer_.letGo(); });  // a button that is let go may start what is cancelled
+    frame(1);                             // the recording leads to a view that can be drawn
     explorer_.message.clear();
     recording_.notePointer();
   }
