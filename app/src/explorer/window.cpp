@@ -32,7 +32,9 @@ constexpr int kLeastSize = 64, kGreatestSize = 8192;  // as `show` has it
 std::string glfwProblem() {
   const char* description = nullptr;
   glfwGetError(&description);
-  return description == nullptr ? "no reason given" : description;
+  std::string text = description == nullptr ? "no reason given" : description;
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text;
 }
 
 /// The desktop.
@@ -289,7 +291,13 @@ class Window {
       glfwSetClipboardString(screen_.window(), text.c_str());
   }
 
-  /// What goes wrong is told in the window, which stays open.
+  /// In the window, and where the panel is closed that shows it.
+  void tell(const std::string& mistake) {
+    explorer_.message = withoutPlaces(mistake);
+    explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
+  }
+
+  /// What goes wrong is told, and the window stays open.
   template <typename Action>
   void attempt(const Action& action) {
     try {
@@ -297,9 +305,9 @@ class Window {
     } catch (const Cancelled&) {
       explorer_.message = "cancelled: all is as it was";
     } catch (const Error& error) {
-      explorer_.message = withoutPlaces(error.what());
+      tell(error.what());
     } catch (const std::bad_alloc&) {
-      explorer_.message = "not enough memory; a larger target error or a smaller grid needs less";
+      tell("not enough memory; a larger target error or a smaller grid needs less");
     }
   }
 
@@ -311,7 +319,7 @@ class Window {
       } catch (const Error& error) {
         if (!explorer_.canUndo()) throw;
         explorer_.run("undo");
-        explorer_.message = withoutPlaces(error.what());
+        tell(error.what());
       }
     }
   }
