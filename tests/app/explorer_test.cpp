@@ -268,6 +268,39 @@ TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   EXPECT_EQ(bench.session.current().field.metadata().source.name, "builtin:torus");
 }
 
+TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string same = folder / "same.hpsdf", coarse = folder / "coarse.hpsdf";
+  bench.run("build analytic:torus target-error=1e-2 output=" + coarse);
+  bench.run(std::string(kTorus) + "save output=" + same + "; panel all=false; show size=800x300");
+  const auto halves = [&] {
+    const render::Image frame = bench.explorer().frame();
+    std::size_t differing = 0;
+    for (int y = 40; y < frame.height; ++y)  // below the names
+      for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
+    return differing;
+  };
+  for (const char* view :
+       {"show slice; color degree", "color value-jump", "color error", "show surface; color depth"}) {
+    bench.run(view);
+    bench.run("beside " + same);
+    EXPECT_EQ(halves(), 0u) << view;
+    bench.run("beside " + coarse);
+    EXPECT_GT(halves(), 1000u) << view;
+  }
+  bench.run("show slice; color degree; ui hover beside");
+  bench.explorer().frame();
+  const auto readout = bench.explorer().readout();
+  ASSERT_TRUE(readout);
+  const Field& other = bench.session.other(coarse).field;
+  EXPECT_EQ(readout->value, other.value(readout->pick.position));
+  EXPECT_EQ(readout->pick.cell, other.cellAt(readout->pick.position).id);
+  EXPECT_THAT(bench.failure("beside " + (folder / "none.hpsdf").string()), HasSubstr("no such file"));
+  bench.run("beside none");
+  EXPECT_GT(halves(), 1000u) << "one picture over the whole width";
+}
+
 TEST(Explorer, everyLayoutHasRoomForThePicture) {
   for (const int width : {64, 200, 400, 700, 1280})
     for (const int height : {64, 150, 240, 720}) {

@@ -20,6 +20,7 @@ namespace hpsdf::app {
 struct Layout {
   UiRect bar, left, right, readout;
   UiRect canvas;  ///< of the picture
+  UiRect beside;  ///< of the other field's
 };
 Layout layoutOf(const ViewState& view);
 
@@ -76,7 +77,7 @@ class Explorer {
   bool cancelWanted = false;
 
   std::string message;  ///< shown below until the next command: what went wrong, or what was done
-  Session& session() { return session_; }
+  Session& session() const { return session_; }
   /// As it was drawn last: the view alone.
   const std::optional<render::Drawn>& picture() const { return picture_; }
   /// Of the current field; kept.
@@ -91,6 +92,8 @@ class Explorer {
   /// `build`'s parameters that made the current field, as far as it tells.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
+  render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::Evidence& evidence,
+                      const render::ScaleOptions& scale, int shrink) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settle();
   void runAll(const std::vector<std::string>& commands);
@@ -112,6 +115,7 @@ class Explorer {
   std::optional<JumpKind> worstBy_;  ///< of worst_
 
   std::optional<render::Drawn> picture_;
+  std::optional<render::Drawn> beside_;  ///< of the other field
   std::string drawnFor_;
   int shrunk_ = 1;
   std::size_t fields_ = 0;  ///< counts the fields there have been

@@ -141,6 +141,13 @@ void runPanel(Session& session, const Arguments& arguments) {
   session.explorer().change(std::move(view));
 }
 
+void runBeside(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  view.beside = arguments.text("field") == "none" ? "" : arguments.text("field");
+  if (!view.beside.empty()) session.other(view.beside);  // an unreadable one shows now
+  session.explorer().change(std::move(view));
+}
+
 void runWorst(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   if (arguments.given("by")) {
@@ -224,7 +231,7 @@ void runShot(Session& session, const Arguments& arguments) {
   const render::Image frame = explorer.frame();
   savePng(frame, file);
   render::Drawn picture = *explorer.picture();
-  const UiRect canvas = layoutOf(explorer.view()).canvas;
+  const UiRect canvas = layoutOf(explorer.view()).canvas;  // of a field beside it, nothing can be picked
   picture.image = frame;
   picture.corner = {int(canvas.x0), int(canvas.y0)};
   session.setPicture(std::move(picture));
@@ -459,6 +466,20 @@ void addViewCommands(Registry& registry) {
   registry.add(surfaceCommand());
   registry.add(planeCommand());
   registry.add(colorCommand());
+  registry.add({.name = "beside",
+                .summary = "Show another field beside the current one, in the same way.",
+                .help =
+                    "Left is the current field, right the other one; camera, plane, colours and their scale are the "
+                    "same for both. 'color difference' shows how far they are apart.",
+                .examples = {"beside coarse.hpsdf", "beside none"},
+                .parameters = {{.name = "field",
+                                .type = ParameterType::text,
+                                .help = "The other field's file; none for the current one alone.",
+                                .valueName = "FIELD",
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runBeside,
+                .scriptOnly = true});
   registry.add(panelCommand());
   registry.add({.name = "worst",
                 .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",

@@ -88,6 +88,7 @@ std::string scriptOf(const ViewState& view) {
                      view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") +
+         fmt::format("beside {}\n", view.beside.empty() ? "none" : scriptWord(view.beside)) +
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstPage + 1) +
          panelLine(view);

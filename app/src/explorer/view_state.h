@@ -38,6 +38,8 @@ struct ViewState {
   std::optional<render::ClipPlane> clip;
   bool cracks = false;
 
+  std::string beside;  ///< file of another field, seen beside the current one in the same way; or empty
+
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
   JumpKind worstBy = JumpKind::value;  ///< of the list of interfaces
