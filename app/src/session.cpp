@@ -9,6 +9,13 @@
 #include "long_work.h"
 
 namespace hpsdf::app {
+namespace {
+
+std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
+  return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+}
+
+}  // namespace
 
 Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
 Session::~Session() = default;
@@ -63,18 +70,35 @@ render::Evidence Session::evidence(render::ColorBy color, const std::string& sur
   if (color == render::ColorBy::valueJump || color == render::ColorBy::gradientJump) evidence.jumps = &jumps();
   if (color == render::ColorBy::error) evidence.exact = &exact(surface);
   if (color == render::ColorBy::difference) {
-    if (!other_ || otherFile_ != other) other_ = std::make_unique<Field>(load(other));
-    otherFile_ = other;
-    evidence.other = other_.get();
+    evidence.other = &this->other(other).field;
   }
   return evidence;
+}
+
+const Session::Other& Session::other(const std::string& file) {
+  if (!other_ || other_->file != file) other_ = std::make_unique<Other>(Other{file, load(file)});
+  return *other_;
+}
+
+const Jumps& Session::otherJumps(const std::string& file) {
+  const Field& field = other(file).field;
+  if (!other_->jumps)
+    other_->jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
+  return *other_->jumps;
+}
+
+render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
+  const Field& field = other(file).field;
+  if (!other_->renderer || other_->backend != backend) other_->renderer = makeRenderer(field, backend);
+  other_->backend = backend;
+  return *other_->renderer;
 }
 
 render::Renderer& Session::renderer(const Backend& backend) {
   const Field& field = current().field;
   if (renderer_ && backend_ == backend) return *renderer_;
   renderer_.reset();
-  renderer_ = backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+  renderer_ = makeRenderer(field, backend);
   backend_ = backend;
   lastRenderer_ = renderer_->description();
   return *renderer_;

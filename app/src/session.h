@@ -102,6 +102,18 @@ class Session {
   /// Made when first asked for.
   Explorer& explorer();
 
+  /// A field to compare the current one with: read from its file when first asked for, and kept.
+  struct Other {
+    std::string file;
+    Field field;
+    std::optional<Jumps> jumps = {};
+    std::unique_ptr<render::Renderer> renderer = {};
+    Backend backend = {};
+  };
+  const Other& other(const std::string& file);
+  const Jumps& otherJumps(const std::string& file);
+  render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
+
   /// What pictures with these colours need: for errors the mesh `surface` or what is known, for differences the field
   /// of the file `other`, read once. Good until it is asked for again.
   render::Evidence evidence(render::ColorBy color, const std::string& surface, const std::string& other = "");
@@ -118,8 +130,7 @@ class Session {
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
   std::optional<render::Drawn> picture_;
-  std::unique_ptr<Field> other_;  // for differences
-  std::string otherFile_;
+  std::unique_ptr<Other> other_;  // its renderer refers to it
   std::shared_ptr<const DistanceFunction> exact_;
   std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
   std::unique_ptr<render::Renderer> renderer_;

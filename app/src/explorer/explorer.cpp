@@ -69,6 +69,11 @@ Layout layoutOf(const ViewState& view) {
       open(Panel::legend) || open(Panel::histograms) || open(Panel::statistics) || open(Panel::worst);
   if (anyFigures && roomForColumn()) layout.right = {right -= kColumnWidth, top, width, bottom};
   layout.canvas = {left, top, right, bottom};
+  if (!view.beside.empty()) {
+    const double half = std::floor((right - left) / 2);
+    layout.canvas.x1 = left + half;
+    layout.beside = {right - half, top, right, bottom};
+  }
   return layout;
 }
 
@@ -178,6 +183,7 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
   // beforehand: whoever listens to long work may draw panels
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
+  if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
@@ -241,14 +247,16 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
     if (event.key == Key::y && canRedo()) return "redo";
     if (event.key == Key::c) return "copy-view";
   }
-  if (event.kind == Input::Kind::press && !dragged_ && !ui_.wantsMouse() && layout.canvas.contains(x, y)) {
+  if (event.kind == Input::Kind::press && !dragged_ && !ui_.wantsMouse() &&
+      (layout.canvas.contains(x, y) || layout.beside.contains(x, y))) {
     dragged_ = event.button;
     dragFrom_ = {x, y};
     viewAtPress_ = view_;
   }
   if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
   const double height = layout.canvas.height();
-  if (event.kind == Input::Kind::wheel && !ui_.wantsMouse() && layout.canvas.contains(x, y)) {
+  if (event.kind == Input::Kind::wheel && !ui_.wantsMouse() &&
+      (layout.canvas.contains(x, y) || layout.beside.contains(x, y))) {
     if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, event.turn));
     const render::OrbitCamera& c = view_.camera;
     return fmt::format("camera {},{},{:.5g}", c.azimuthDegrees, c.elevationDegrees,
@@ -287,21 +295,48 @@ std::string Explorer::pictureKey() const {
   return fmt::format("{} {}x{} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_);
 }
 
-void Explorer::drawPicture(int shrink) {
-  const Field& field = session_.current().field;
+render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::Evidence& evidence,
+                              const render::ScaleOptions& scale, int shrink) const {
   const UiRect canvas = layoutOf(view_).canvas;
   const auto fit = [&](auto picture) {
     picture.width = std::max(16, int(canvas.width()) / shrink);
     picture.height = std::max(16, int(canvas.height()) / shrink);
     picture.samples = shrink > 1 ? 1 : view_.samples;
     picture.bare = true;
+    picture.scale = scale;
     return picture;
   };
-  const render::Evidence evidence = session_.evidence(view_.colors().by, "", view_.colors().other);
-  render::Renderer& renderer = session_.renderer(view_.backend);
-  picture_ = view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, field)), evidence)
-                         : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);
-  canvas_ = picture_->image;
+  // planes and cameras are those of the current field, so that both show the same part of space
+  const Field& current = session_.current().field;
+  return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), evidence)
+                     : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);
+}
+
+void Explorer::drawPicture(int shrink) {
+  const Coloring& colors = view_.colors();
+  const Field& field = session_.current().field;
+  render::ScaleOptions scale = colors.scale;
+  const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
+  const auto levels = [&](const Field& of) {
+    const FieldStatistics all = statistics(of);
+    for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
+      scale.levels.push_back(level);
+  };
+  if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
+    levels(field);
+    levels(*other);
+    std::ranges::sort(scale.levels);
+    scale.levels.erase(std::ranges::unique(scale.levels).begin(), scale.levels.end());
+  }
+  render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
+  picture_ = drawn(session_.renderer(view_.backend), field, evidence, scale, shrink);
+  beside_.reset();
+  if (other != nullptr) {
+    if (evidence.jumps != nullptr) evidence.jumps = &session_.otherJumps(view_.beside);
+    beside_ = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, evidence, picture_->scale, shrink);
+  }
+  shown_ = {picture_->image};
+  if (beside_) shown_.push_back(beside_->image);
   shrunk_ = shrink;
   drawnFor_ = pictureKey();
 }
@@ -310,13 +345,15 @@ render::Image Explorer::frame(int shrink) {
   if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
   settle();
   render::Image image(view_.width, view_.height, {250, 250, 248});
-  const UiRect canvas = layoutOf(view_).canvas;
-  const int width = int(canvas.width()), height = int(canvas.height());
-  const bool fits = canvas_.width == width && canvas_.height == height;
-  if (!canvas_.pixels.empty()) {
-    const render::Image view = fits ? canvas_ : enlarged(canvas_, width, height);
-    for (int y = 0; y < height; ++y) std::copy_n(&view.at(0, y), width, &image.at(int(canvas.x0), int(canvas.y0) + y));
-  }
+  const Layout layout = layoutOf(view_);
+  const auto place = [&](const render::Image& drawn, const UiRect& rect) {
+    const int width = int(rect.width()), height = int(rect.height());
+    const bool fits = drawn.width == width && drawn.height == height;
+    const render::Image view = fits ? drawn : enlarged(drawn, width, height);
+    for (int y = 0; y < height; ++y) std::copy_n(&view.at(0, y), width, &image.at(int(rect.x0), int(rect.y0) + y));
+  };
+  const std::array rects = {layout.canvas, layout.beside};
+  for (std::size_t i = 0; i < shown_.size(); ++i) place(shown_[i], rects[i]);
   ui_.paint(image);
   return image;
 }
@@ -334,14 +371,18 @@ const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
 }
 
 std::optional<Readout> Explorer::readout() {
-  if (work || !picture_ || shrunk_ != 1 || ui_.wantsMouse() || dragged_) return std::nullopt;
-  const UiRect canvas = layoutOf(view_).canvas;
+  if (work || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
+  const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
-  if (!canvas.contains(x, y) || x - canvas.x0 >= picture_->image.width || y - canvas.y0 >= picture_->image.height)
-    return std::nullopt;
-  const auto pick = render::pickAt(*picture_, int(x - canvas.x0), int(y - canvas.y0));
+  const auto pickIn = [&](const std::optional<render::Drawn>& drawn, const UiRect& rect) {
+    const bool inside = drawn && rect.contains(x, y) && x - rect.x0 < drawn->image.width;
+    return inside ? render::pickAt(*drawn, int(x - rect.x0), int(y - rect.y0)) : std::nullopt;
+  };
+  if (const auto pick = pickIn(picture_, layout.canvas)) return readoutAt(session_, *pick);
+  const auto pick = pickIn(beside_, layout.beside);
   if (!pick) return std::nullopt;
-  return readoutAt(session_, *pick);
+  return readoutAt(session_.other(view_.beside).field, session_.otherJumps(view_.beside),
+                   session_.knowsExact() ? &session_.exact("") : nullptr, *pick);
 }
 
 }  // namespace hpsdf::app

@@ -20,6 +20,7 @@ namespace hpsdf::app {
 struct Layout {
   UiRect bar, left, right, readout;
   UiRect canvas;  ///< of the picture
+  UiRect beside;  ///< of the other field's
 };
 Layout layoutOf(const ViewState& view);
 
@@ -85,7 +86,8 @@ class Explorer {
   bool cancelWanted = false;
 
   std::string message;  ///< shown below until the next command: what went wrong, or what was done
-  Session& session() { return session_; }
+  Session& session() const { return session_; }
+  /// As it was drawn last: the view alone.
   const std::optional<render::Drawn>& picture() const { return picture_; }
   /// Of the current field; kept.
   const FieldStatistics& figures();
@@ -99,6 +101,8 @@ class Explorer {
   /// `build`'s parameters that made the current field, as far as it tells.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
+  render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::Evidence& evidence,
+                      const render::ScaleOptions& scale, int shrink) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settle();
   void inputWhileWorking(const Input& event);
@@ -129,7 +133,8 @@ class Explorer {
   std::optional<JumpKind> worstBy_;  ///< of worst_
 
   std::optional<render::Drawn> picture_;
-  render::Image canvas_;  ///< what the last one looked like
+  std::optional<render::Drawn> beside_;  ///< of the other field
+  std::vector<render::Image> shown_;     ///< what they looked like last
   std::string drawnFor_;
   int shrunk_ = 1;
   std::size_t fields_ = 0;  ///< counts the fields there have been

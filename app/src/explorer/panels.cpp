@@ -131,6 +131,8 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   };
   if (colors.by == render::ColorBy::difference)
     if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + scriptWord(*file));
+  if (colors.by == render::ColorBy::error)
+    if (const auto mesh = ui.field("view/mesh", "made from", colors.mesh)) change("mesh=" + scriptWord(*mesh));
   if (!render::isQuantity(colors.by)) return;
   choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
          fmt::format("color {} scale=", colorName(colors.by)), commands);
@@ -149,6 +151,22 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(fmt::format("{}", low), *text);
 }
 
+/// Which half of the picture shows which field.
+void drawNames(const Explorer& explorer, const Layout& layout) {
+  if (layout.beside.width() <= 0) return;
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const auto name = [&](const UiRect& rect, const std::string& text) {
+    const float x = float(rect.x0) + 8, y = float(rect.y0) + 6;
+    list.AddRectFilled({x - 4, y - 2}, {x + widthOf(text) + 4, y + ImGui::GetTextLineHeight() + 2},
+                       IM_COL32(250, 250, 248, 255), 2);
+    list.AddText({x, y}, IM_COL32(32, 34, 44, 255), text.c_str());
+  };
+  name(layout.canvas, explorer.session().current().name);
+  name(layout.beside, explorer.view().beside);
+  list.AddLine({float(layout.beside.x0), float(layout.beside.y0)}, {float(layout.beside.x0), float(layout.beside.y1)},
+               IM_COL32(98, 102, 116, 255));
+}
+
 void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
   const ViewState& view = explorer.view();
   const Field& field = explorer.session().current().field;
@@ -157,6 +175,8 @@ void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
   else
     drawCamera(ui, view, field, commands);
   drawColors(ui, view, explorer.picture(), commands);
+  if (const auto file = ui.field("view/beside", "beside", view.beside))
+    commands.push_back("beside " + (file->empty() ? "none" : scriptWord(*file)));
 }
 
 void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
@@ -384,7 +404,9 @@ void drawPanels(Ui& ui, Explorer& explorer, Commands& commands) {
     section(ui, view, Panel::worst, "Worst interfaces", commands, [&] { drawWorst(ui, explorer, commands); });
   });
   if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+  drawNames(explorer, layout);
   ui.place("canvas", layout.canvas);
+  if (layout.beside.width() > 0) ui.place("beside", layout.beside);
 }
 
 }  // namespace hpsdf::app

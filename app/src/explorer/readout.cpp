@@ -27,17 +27,16 @@ double distanceTo(const Interface& face, const Vector3& domainSizes, const Field
 
 }  // namespace
 
-Readout readoutAt(Session& session, const render::Pick& pick) {
-  const Field& field = session.current().field;
+Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick) {
   const auto [value, gradient] = field.valueAndGradient(pick.position);
   Readout readout{pick, gradient, value, {}, {}, {}, std::numeric_limits<double>::infinity()};
-  if (session.knowsExact()) {
-    double exact = 0;
-    session.exact("")(std::span(&pick.position, 1), std::span(&exact, 1));
-    readout.exact = exact;
+  if (exact != nullptr) {
+    double distance = 0;
+    (*exact)(std::span(&pick.position, 1), std::span(&distance, 1));
+    readout.exact = distance;
   }
   const Vector3 sizes = field.domain().sizes();
-  for (const Interface& face : session.jumps().interfaces) {
+  for (const Interface& face : jumps.interfaces) {
     if (face.cells[0] != pick.cell && face.cells[1] != pick.cell) continue;
     const double distance = distanceTo(face, sizes, field, pick.position);
     if (!(distance < readout.toFace)) continue;
@@ -46,6 +45,11 @@ Readout readoutAt(Session& session, const render::Pick& pick) {
     readout.gradientJump = face.gradient;
   }
   return readout;
+}
+
+Readout readoutAt(Session& session, const render::Pick& pick) {
+  const DistanceFunction* exact = session.knowsExact() ? &session.exact("") : nullptr;
+  return readoutAt(session.current().field, session.jumps(), exact, pick);
 }
 
 std::vector<std::string> readoutText(const Readout& r) {

@@ -19,7 +19,9 @@ struct Readout {
   double toFace;                 ///< distance to that face, world units
 };
 
-/// Measures the field's jumps when they are not known yet.
+Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick);
+
+/// Of the current field; measures its jumps when they are not known yet.
 Readout readoutAt(Session& session, const render::Pick& pick);
 
 /// Two lines.

@@ -113,6 +113,7 @@ void runColor(Session& session, const Arguments& arguments) {
   if (by != colors.by) colors.scale.limits.reset();  // of another quantity
   colors.by = by;
   if (arguments.given("other")) colors.other = arguments.text("other");
+  if (arguments.given("mesh")) colors.mesh = arguments.text("mesh");
   if (by == render::ColorBy::difference && colors.other.empty())
     throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
@@ -137,6 +138,13 @@ void runPanel(Session& session, const Arguments& arguments) {
     if (arguments.given(kPanelNames[panel])) view.open[panel] = arguments.flag(kPanelNames[panel]);
   if (arguments.given("left-scroll")) view.scroll[0] = arguments.number("left-scroll");
   if (arguments.given("right-scroll")) view.scroll[1] = arguments.number("right-scroll");
+  session.explorer().change(std::move(view));
+}
+
+void runBeside(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  view.beside = arguments.text("field") == "none" ? "" : arguments.text("field");
+  if (!view.beside.empty()) session.other(view.beside);  // an unreadable one shows now
   session.explorer().change(std::move(view));
 }
 
@@ -219,8 +227,14 @@ void runShot(Session& session, const Arguments& arguments) {
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   checkWritable(file);
   session.current();
-  const render::Image frame = session.explorer().frame();
+  Explorer& explorer = session.explorer();
+  const render::Image frame = explorer.frame();
   savePng(frame, file);
+  render::Drawn picture = *explorer.picture();
+  const UiRect canvas = layoutOf(explorer.view()).canvas;  // of a field beside it, nothing can be picked
+  picture.image = frame;
+  picture.corner = {int(canvas.x0), int(canvas.y0)};
+  session.setPicture(std::move(picture));
   if (session.wantsJson(arguments))
     return printJson(
         session.console().out,
@@ -392,7 +406,11 @@ Command colorCommand() {
                          {.name = "other",
                           .type = ParameterType::path,
                           .help = "For difference: the field to compare with.",
-                          .valueName = "FIELD"}},
+                          .valueName = "FIELD"},
+                         {.name = "mesh",
+                          .type = ParameterType::text,
+                          .help = "For error: what the field was made from, where the field does not know it.",
+                          .valueName = "MESH"}},
           .action = runColor,
           .scriptOnly = true};
 }
@@ -448,6 +466,20 @@ void addViewCommands(Registry& registry) {
   registry.add(surfaceCommand());
   registry.add(planeCommand());
   registry.add(colorCommand());
+  registry.add({.name = "beside",
+                .summary = "Show another field beside the current one, in the same way.",
+                .help =
+                    "Left is the current field, right the other one; camera, plane, colours and their scale are the "
+                    "same for both. 'color difference' shows how far they are apart.",
+                .examples = {"beside coarse.hpsdf", "beside none"},
+                .parameters = {{.name = "field",
+                                .type = ParameterType::text,
+                                .help = "The other field's file; none for the current one alone.",
+                                .valueName = "FIELD",
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runBeside,
+                .scriptOnly = true});
   registry.add(panelCommand());
   registry.add({.name = "worst",
                 .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
@@ -479,7 +511,8 @@ void addViewCommands(Registry& registry) {
                 .scriptOnly = true});
   registry.add({.name = "undo",
                 .summary = "Take back the last change of what the explorer shows.",
-                .help = "Changes by show, camera, surface, plane, color, panel, worst and fly; what the mouse does in "
+                .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, color, "
+                        "panel, worst and fly; what the mouse does in "
                         "one go is one change. The field itself is not changed back.",
                 .examples = {"undo"},
                 .action = runUndo,

@@ -36,10 +36,11 @@ std::string surfaceLine(const ViewState& view) {
 
 std::string colorLine(const Coloring& colors, const char* of) {
   const render::ScaleOptions& scale = colors.scale;
-  return fmt::format("color {} of={} range={} scale={}{}\n", colorName(colors.by), of,
+  return fmt::format("color {} of={} range={} scale={}{}{}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
                      scale.logarithmic ? "log" : "linear",
-                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other));
+                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other),
+                     colors.mesh.empty() ? "" : " mesh=" + scriptWord(colors.mesh));
 }
 
 std::string panelLine(const ViewState& view) {
@@ -80,6 +81,7 @@ std::string scriptOf(const ViewState& view) {
                      view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") +
+         fmt::format("beside {}\n", view.beside.empty() ? "none" : scriptWord(view.beside)) +
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstPage + 1) +
          panelLine(view);

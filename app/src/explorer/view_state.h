@@ -21,6 +21,7 @@ struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
   std::string other = {};  ///< of difference: the other field's file
+  std::string mesh = {};   ///< of error: what the field was made from; empty where that is known
 };
 
 struct ViewState {
@@ -36,6 +37,8 @@ struct ViewState {
   double surfaceOffset = 0;
   std::optional<render::ClipPlane> clip;
   bool cracks = false;
+
+  std::string beside;  ///< file of another field, seen beside the current one in the same way; or empty
 
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
