@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -155,12 +156,74 @@ void addValues(const Field& field, int y0, const std::vector<PixelRay>& rays, Vi
   for (std::size_t n = 0; n < pixels.size(); ++n) buffers.value[pixels[n]] = static_cast<float>(values[n]);
 }
 
-/// A straight line in space as it is seen, and how strongly.
-struct Edge {
+/// A straight line in space.
+struct Segment {
   Vector3 a, b;
-  PicturePoint from, to;
-  float strength;
 };
+
+/// As it is seen.
+struct Edge {
+  Segment segment;
+  PicturePoint from, to;
+  float strength = 0;  ///< 0 where it is not
+};
+
+/// Names an edge of a cell, the same from each of the cells of one size that share it.
+struct EdgeName {
+  std::array<std::uint64_t, 3> from;  ///< in cells of the greatest depth
+  std::uint64_t kind;                 ///< axis and depth
+  bool operator==(const EdgeName&) const = default;
+};
+
+/// Edges that have been met before.
+class KnownEdges {
+ public:
+  explicit KnownEdges(std::size_t most) : slots_(std::bit_ceil(2 * most + 1), 0) { names_.reserve(most); }
+
+  /// Whether it is a new one.
+  bool add(const EdgeName& name) {
+    std::uint64_t hash = name.kind;
+    for (const std::uint64_t x : name.from) hash = (hash ^ x) * 0x9e3779b97f4a7c15;
+    for (std::size_t slot = hash >> 32;; ++slot) {
+      std::uint32_t& known = slots_[slot & (slots_.size() - 1)];
+      if (known == 0) {
+        names_.push_back(name);
+        known = static_cast<std::uint32_t>(names_.size());
+        return true;
+      }
+      if (names_[known - 1] == name) return false;
+    }
+  }
+
+ private:
+  std::vector<std::uint32_t> slots_;  ///< one more than an index, 0 where free
+  std::vector<EdgeName> names_;
+};
+
+/// The edges of cells, each once, cut by the clipping plane.
+std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells) {
+  const Vector3 lower = field.domain().min();
+  const Vector3 perUnit =
+      Vector3(field.grid()[0], field.grid()[1], field.grid()[2]).cwiseQuotient(field.domain().sizes()) *
+      std::ldexp(1.0, kMaxDepth);
+  KnownEdges known(12 * cells.size());
+  std::vector<Segment> segments;
+  for (const Cell& cell : cells) {
+    const Box box = clipped(cell.box, view);
+    if (box.isEmpty()) continue;
+    const Vector3 first = (cell.box.min() - lower).cwiseProduct(perUnit);
+    const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
+    const std::array<Vector3, 8> corners = cornersOf(box);
+    for (int i = 0; i < 8; ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        if (i >> axis & 1) continue;
+        EdgeName name{{}, std::uint64_t(cell.depth) * 3 + axis};
+        for (int k = 0; k < 3; ++k) name.from[k] = std::uint64_t(std::llround(first[k])) + (i >> k & 1 ? size : 0);
+        if (known.add(name)) segments.push_back({corners[i], corners[i | 1 << axis]});
+      }
+  }
+  return segments;
+}
 
 float smoothStep(double low, double high, double x) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
@@ -172,14 +235,38 @@ class EdgePainter {
  public:
   EdgePainter(const Camera& camera, const Box& domain, const ViewBuffers& buffers, double lineWidth,
               std::vector<float>& coverage)
-      : camera_(camera), buffers_(buffers), width_(lineWidth), reach_(lineWidth / 2 + 0.5), coverage_(coverage) {
+      : camera_(camera),
+        buffers_(buffers),
+        width_(lineWidth),
+        reach_(lineWidth / 2 + 0.5),
+        closest_(kNearestLine * domain.diagonal().norm()),
+        coverage_(coverage) {
     const double middle = (domain.center() - camera.eye).dot(camera.forward);
     const double half = 0.5 * domain.sizes().dot(camera.forward.cwiseAbs());
     nearest_ = std::max(0.0, middle - half);
     farthest_ = std::max(middle + half, nearest_ + 1e-9 * half);
   }
 
+  /// What of it lies before the eye.
+  Edge seen(Segment segment) const {
+    const auto place = [&](const Vector3& point) { return project(camera_, point, buffers_.width, buffers_.height); };
+    Edge edge{segment, place(segment.a), place(segment.b)};
+    if (std::max(edge.from.depth, edge.to.depth) <= closest_) return edge;
+    const double depth = std::max(0.5 * (edge.from.depth + edge.to.depth), closest_);
+    const double size = (segment.b - segment.a).norm() / pixelSize(camera_, depth, buffers_.height);
+    edge.strength = smoothStep(kLinesGoneBelow * width_, kLinesFadeBelow * width_, size);
+    if (std::min(edge.from.depth, edge.to.depth) >= closest_) return edge;
+    const double share = (closest_ - edge.from.depth) / (edge.to.depth - edge.from.depth);
+    const Vector3 cut = segment.a + share * (segment.b - segment.a);
+    const bool fromBehind = edge.from.depth < closest_;
+    (fromBehind ? edge.segment.a : edge.segment.b) = cut;
+    (fromBehind ? edge.from : edge.to) = place(cut);
+    return edge;
+  }
+
+  /// Empty for an edge that is not seen.
   Extent extentOf(const Edge& edge) const {
+    if (edge.strength <= 0) return {};
     const auto low = [&](double p, double q, int most) {
       return int(std::clamp(std::floor(std::min(p, q) - reach_), 0.0, double(most)));
     };
@@ -208,8 +295,9 @@ class EdgePainter {
   void paintPixel(const Edge& edge, double dx, double dy, double length, int x, int y) const {
     const double fromX = x + 0.5 - edge.from.x, fromY = y + 0.5 - edge.from.y;
     const double t = length > 0 ? std::clamp((fromX * dx + fromY * dy) / (length * length), 0.0, 1.0) : 0.0;
-    const double covered = std::clamp(reach_ - std::hypot(fromX - t * dx, fromY - t * dy), 0.0, 1.0);
-    if (covered <= 0) return;
+    const double acrossX = fromX - t * dx, acrossY = fromY - t * dy, square = acrossX * acrossX + acrossY * acrossY;
+    if (square >= reach_ * reach_) return;
+    const double covered = std::min(reach_ - std::sqrt(square), 1.0);
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     // straight in the picture, but in perspective not even in depth
     const bool parallel = camera_.projection == Projection::orthographic;
@@ -217,7 +305,8 @@ class EdgePainter {
     const double s = toNear / (toFar + toNear);
     const double depth = edge.from.depth + s * (edge.to.depth - edge.from.depth);
     if (buffers_.hit(i)) {
-      const double distance = parallel ? depth : (edge.a + s * (edge.b - edge.a) - camera_.eye).norm();
+      const double distance =
+          parallel ? depth : (edge.segment.a + s * (edge.segment.b - edge.segment.a) - camera_.eye).norm();
       // what it lies on may be sampled a pixel or two away from it
       const double tolerance = (width_ + 2) * pixelSize(camera_, depth, buffers_.height);
       if (distance > double(buffers_.distance[i]) + tolerance) return;
@@ -229,7 +318,7 @@ class EdgePainter {
 
   const Camera& camera_;
   const ViewBuffers& buffers_;
-  double width_, reach_;
+  double width_, reach_, closest_;
   double nearest_, farthest_;  // depths of the domain
   std::vector<float>& coverage_;
 };
@@ -275,41 +364,18 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
   });
 }
 
-std::vector<float> cellLines(const SurfaceView& view, const Box& domain, const std::vector<Cell>& cells,
+std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth) {
-  const Camera& camera = view.camera;
-  const int width = buffers.width, height = buffers.height;
-  const double nearest = kNearestLine * domain.diagonal().norm();
-  const auto seen = [&](const Vector3& point) { return project(camera, point, width, height); };
-  std::vector<Edge> edges;
-  for (const Cell& cell : cells) {
-    const Box box = clipped(cell.box, view);
-    if (box.isEmpty()) continue;
-    const double depth = std::max(seen(cell.box.center()).depth, nearest);
-    const double size = cell.box.sizes().maxCoeff() / pixelSize(camera, depth, height);
-    const float strength = smoothStep(kLinesGoneBelow * lineWidth, kLinesFadeBelow * lineWidth, size);
-    if (strength <= 0 || extentOf(box, camera, width, height).empty()) continue;
-    const std::array<Vector3, 8> corners = cornersOf(box);
-    for (int i = 0; i < 8; ++i)
-      for (int bit = 1; bit < 8; bit *= 2) {
-        if (i & bit) continue;
-        Edge edge{corners[i], corners[i | bit], seen(corners[i]), seen(corners[i | bit]), strength};
-        if (std::max(edge.from.depth, edge.to.depth) <= nearest) continue;
-        if (std::min(edge.from.depth, edge.to.depth) < nearest) {
-          const Vector3 cut =
-              edge.a + (nearest - edge.from.depth) / (edge.to.depth - edge.from.depth) * (edge.b - edge.a);
-          (edge.from.depth < nearest ? edge.a : edge.b) = cut;
-          (edge.from.depth < nearest ? edge.from : edge.to) = seen(cut);
-        }
-        edges.push_back(edge);
-      }
-  }
-  if (edges.empty()) return {};
+  const std::vector<Segment> segments = edgesOf(field, view, cells);
   std::vector<float> coverage(buffers.cell.size(), 0.0F);
-  const EdgePainter painter(camera, domain, buffers, lineWidth, coverage);
-  std::vector<Extent> extents(edges.size());
-  tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t n) { extents[n] = painter.extentOf(edges[n]); });
-  forStrips(height, extents, [&](int y0, int y1, const std::vector<std::uint32_t>& inStrip) {
+  const EdgePainter painter(view.camera, field.domain(), buffers, lineWidth, coverage);
+  std::vector<Edge> edges(segments.size());
+  std::vector<Extent> extents(segments.size());
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t n) {
+    edges[n] = painter.seen(segments[n]);
+    extents[n] = painter.extentOf(edges[n]);
+  });
+  forStrips(buffers.height, extents, [&](int y0, int y1, const std::vector<std::uint32_t>& inStrip) {
     for (const std::uint32_t n : inStrip) painter.paint(edges[n], y0, y1);
   });
   return coverage;

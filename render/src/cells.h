@@ -21,8 +21,8 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
 
 /// How strongly each pixel of the buffers is covered by the cells' edges, 0 to 1, lines of `lineWidth` pixels; hidden
 /// where something in the buffers is nearer. Lines fade with their distance, and those of cells that are small in the
-/// picture altogether. A clipping plane cuts cells. Empty where no edge is seen.
-std::vector<float> cellLines(const SurfaceView& view, const Box& domain, const std::vector<Cell>& cells,
+/// picture altogether. A clipping plane cuts cells.
+std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth);
 
 }  // namespace hpsdf::render

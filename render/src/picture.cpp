@@ -97,15 +97,23 @@ std::string describePlane(const std::string& name, const Plane& plane) {
   return name + " through " + formatVector(free.point) + " with normal " + formatVector(free.normal);
 }
 
+/// "2, 4–6" of ascending levels.
+std::string describeRuns(const std::vector<int>& levels) {
+  std::string text;
+  for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {
+    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1;) ++last;
+    text += (i == 0 ? "" : ", ") + std::to_string(levels[i]);
+    if (last > i) text += "–" + std::to_string(levels[last]);
+  }
+  return text;
+}
+
 std::string describeCells(const ShownCells& cells) {
-  const auto levels = [](const char* name, const std::vector<int>& chosen) {
-    std::string text;
-    for (const int level : chosen)
-      text += (text.empty() ? std::string(" of ") + name + " " : ", ") + std::to_string(level);
-    return text;
-  };
-  return (cells.style == CellStyle::lines ? "edges of cells" : "cells") + levels("degree", cells.degrees) +
-         levels("depth", cells.depths);
+  std::string text = cells.style == CellStyle::lines ? "edges of cells" : "cells";
+  if (!cells.degrees.empty()) text += " of degree " + describeRuns(cells.degrees);
+  if (!cells.depths.empty())
+    text += std::string(cells.degrees.empty() ? " of" : ",") + " depth " + describeRuns(cells.depths);
+  return text;
 }
 
 std::vector<int> levelsOf(const std::map<int, double>& shares) {
@@ -386,7 +394,7 @@ Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& pict
   if (picture.cells.style == CellStyle::boxes)
     addBoxes(field, view, cells, scene.buffers);
   else
-    scene.lines = cellLines(view, field.domain(), cells, scene.buffers, lineWidth);
+    scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
   return scene;
 }
 
@@ -419,23 +427,24 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   };
   Legend legend;
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
+  const std::string onSurface = picture.surface ? " on the " + surface : "";
   std::vector<std::string> details;
   if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
     legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     colorScene(quantityColors(measured.values, measured.scale));
-    details = {titlesOf(picture.color).back() + " on the " + surface, describeGreatest(measured.values)};
+    details = {titlesOf(picture.color).back() + onSurface, describeGreatest(measured.values)};
   } else if (picture.color == ColorBy::normal) {
     addFieldFacts(furniture, frame, field, figures);
     colorScene({});
-    details = {surface};
+    if (picture.surface) details = {surface};
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree);
     legend = levelLegend(figures, degree, map);
     colorScene(levelColors(buffers, map, picture.color));
-    details = {(degree ? "degree on the " : "depth on the ") + surface};
+    details = {(degree ? "degree" : "depth") + onSurface};
   }
   if (picture.cracks) {
     markCracks(image, buffers, sampling);

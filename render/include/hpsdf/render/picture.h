@@ -78,8 +78,8 @@ enum class CellStyle : std::uint8_t {
 /// Which of the octree's leaves stand in a picture, and how.
 struct ShownCells {
   CellStyle style = CellStyle::none;
-  std::vector<int> degrees = {};  ///< all when empty
-  std::vector<int> depths = {};   ///< all when empty
+  std::vector<int> degrees = {};  ///< ascending; all when empty
+  std::vector<int> depths = {};   ///< likewise
 };
 
 struct SurfacePicture {
