@@ -138,6 +138,7 @@ void setBox(const Piece& piece, const Entry& entry, const PixelRay& ray, std::si
   buffers.depth[i] = static_cast<std::uint8_t>(piece.cell->depth);
   buffers.normal[i] = (ray.direction[entry.axis] > 0 ? -1.0F : 1.0F) * Eigen::Vector3f::Unit(entry.axis);
   buffers.distance[i] = static_cast<float>(entry.distance);
+  buffers.crack[i] = 0;
   buffers.shown[i] = Shown::box;
 }
 
@@ -200,8 +201,10 @@ class KnownEdges {
   std::vector<EdgeName> names_;
 };
 
-/// The edges of cells, each once, cut by the clipping plane.
-std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells) {
+/// The edges of the cells that `mayShow`, each once, cut by the clipping plane.
+template <typename MayShow>
+std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
+                             const MayShow& mayShow) {
   const Vector3 lower = field.domain().min();
   const Vector3 perUnit =
       Vector3(field.grid()[0], field.grid()[1], field.grid()[2]).cwiseQuotient(field.domain().sizes()) *
@@ -210,7 +213,7 @@ std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const 
   std::vector<Segment> segments;
   for (const Cell& cell : cells) {
     const Box box = clipped(cell.box, view);
-    if (box.isEmpty()) continue;
+    if (box.isEmpty() || !mayShow(box)) continue;
     const Vector3 first = (cell.box.min() - lower).cwiseProduct(perUnit);
     const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
     const std::array<Vector3, 8> corners = cornersOf(box);
@@ -247,13 +250,19 @@ class EdgePainter {
     farthest_ = std::max(middle + half, nearest_ + 1e-9 * half);
   }
 
+  /// False where all of a box's edges are too small in the picture, or behind the eye.
+  bool mayShow(const Box& box) const {
+    const double middle = (box.center() - camera_.eye).dot(camera_.forward);
+    const double half = 0.5 * box.sizes().dot(camera_.forward.cwiseAbs());
+    return middle + half > closest_ && sizeAt(box.sizes().maxCoeff(), middle - half) > kLinesGoneBelow * width_;
+  }
+
   /// What of it lies before the eye.
   Edge seen(Segment segment) const {
     const auto place = [&](const Vector3& point) { return project(camera_, point, buffers_.width, buffers_.height); };
     Edge edge{segment, place(segment.a), place(segment.b)};
     if (std::max(edge.from.depth, edge.to.depth) <= closest_) return edge;
-    const double depth = std::max(0.5 * (edge.from.depth + edge.to.depth), closest_);
-    const double size = (segment.b - segment.a).norm() / pixelSize(camera_, depth, buffers_.height);
+    const double size = sizeAt((segment.b - segment.a).norm(), 0.5 * (edge.from.depth + edge.to.depth));
     edge.strength = smoothStep(kLinesGoneBelow * width_, kLinesFadeBelow * width_, size);
     if (std::min(edge.from.depth, edge.to.depth) >= closest_) return edge;
     const double share = (closest_ - edge.from.depth) / (edge.to.depth - edge.from.depth);
@@ -292,6 +301,11 @@ class EdgePainter {
   }
 
  private:
+  /// Pixels that a length takes at a depth.
+  double sizeAt(double length, double depth) const {
+    return length / pixelSize(camera_, std::max(depth, closest_), buffers_.height);
+  }
+
   void paintPixel(const Edge& edge, double dx, double dy, double length, int x, int y) const {
     const double fromX = x + 0.5 - edge.from.x, fromY = y + 0.5 - edge.from.y;
     const double t = length > 0 ? std::clamp((fromX * dx + fromY * dy) / (length * length), 0.0, 1.0) : 0.0;
@@ -366,9 +380,10 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
 
 std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth) {
-  const std::vector<Segment> segments = edgesOf(field, view, cells);
   std::vector<float> coverage(buffers.cell.size(), 0.0F);
   const EdgePainter painter(view.camera, field.domain(), buffers, lineWidth, coverage);
+  const auto mayShow = [&](const Box& box) { return painter.mayShow(box); };
+  const std::vector<Segment> segments = edgesOf(field, view, cells, mayShow);
   std::vector<Edge> edges(segments.size());
   std::vector<Extent> extents(segments.size());
   tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t n) {
