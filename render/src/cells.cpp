@@ -160,6 +160,7 @@ void addValues(const Field& field, int y0, const std::vector<PixelRay>& rays, Vi
 /// A straight line in space.
 struct Segment {
   Vector3 a, b;
+  double whole;  ///< length of the edge, of which it may be a part
 };
 
 /// As it is seen.
@@ -213,7 +214,7 @@ std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const 
   std::vector<Segment> segments;
   for (const Cell& cell : cells) {
     const Box box = clipped(cell.box, view);
-    if (box.isEmpty() || !mayShow(box)) continue;
+    if (box.isEmpty() || !mayShow(cell.box)) continue;
     const Vector3 first = (cell.box.min() - lower).cwiseProduct(perUnit);
     const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
     const std::array<Vector3, 8> corners = cornersOf(box);
@@ -222,7 +223,7 @@ std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const 
         if (i >> axis & 1) continue;
         EdgeName name{{}, std::uint64_t(cell.depth) * 3 + axis};
         for (int k = 0; k < 3; ++k) name.from[k] = std::uint64_t(std::llround(first[k])) + (i >> k & 1 ? size : 0);
-        if (known.add(name)) segments.push_back({corners[i], corners[i | 1 << axis]});
+        if (known.add(name)) segments.push_back({corners[i], corners[i | 1 << axis], cell.box.sizes()[axis]});
       }
   }
   return segments;
@@ -240,6 +241,8 @@ class EdgePainter {
               std::vector<float>& coverage)
       : camera_(camera),
         buffers_(buffers),
+        parallel_(camera.projection == Projection::orthographic),
+        pixel_(pixelSize(camera, 1, buffers.height)),
         width_(lineWidth),
         reach_(lineWidth / 2 + 0.5),
         closest_(kNearestLine * domain.diagonal().norm()),
@@ -262,7 +265,7 @@ class EdgePainter {
     const auto place = [&](const Vector3& point) { return project(camera_, point, buffers_.width, buffers_.height); };
     Edge edge{segment, place(segment.a), place(segment.b)};
     if (std::max(edge.from.depth, edge.to.depth) <= closest_) return edge;
-    const double size = sizeAt((segment.b - segment.a).norm(), 0.5 * (edge.from.depth + edge.to.depth));
+    const double size = sizeAt(segment.whole, 0.5 * (edge.from.depth + edge.to.depth));
     edge.strength = smoothStep(kLinesGoneBelow * width_, kLinesFadeBelow * width_, size);
     if (std::min(edge.from.depth, edge.to.depth) >= closest_) return edge;
     const double share = (closest_ - edge.from.depth) / (edge.to.depth - edge.from.depth);
@@ -314,24 +317,25 @@ class EdgePainter {
     const double covered = std::min(reach_ - std::sqrt(square), 1.0);
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     // straight in the picture, but in perspective not even in depth
-    const bool parallel = camera_.projection == Projection::orthographic;
-    const double toFar = parallel ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel ? t : t * edge.from.depth;
+    const double toFar = parallel_ ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel_ ? t : t * edge.from.depth;
     const double s = toNear / (toFar + toNear);
     const double depth = edge.from.depth + s * (edge.to.depth - edge.from.depth);
-    if (buffers_.hit(i)) {
-      const double distance =
-          parallel ? depth : (edge.segment.a + s * (edge.segment.b - edge.segment.a) - camera_.eye).norm();
-      // what it lies on may be sampled a pixel or two away from it
-      const double tolerance = (width_ + 2) * pixelSize(camera_, depth, buffers_.height);
-      if (distance > double(buffers_.distance[i]) + tolerance) return;
-    }
     const double place = std::clamp((depth - nearest_) / (farthest_ - nearest_), 0.0, 1.0);
     const float strength = edge.strength * static_cast<float>(covered * (1 + place * (kFarthestLine - 1)));
-    coverage_[i] = std::max(coverage_[i], strength);
+    if (strength <= coverage_[i]) return;
+    if (buffers_.hit(i)) {
+      const Vector3 p = edge.segment.a + s * (edge.segment.b - edge.segment.a);
+      // what it lies on may be sampled a pixel or two away from it
+      const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth);
+      if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance) return;
+    }
+    coverage_[i] = strength;
   }
 
   const Camera& camera_;
   const ViewBuffers& buffers_;
+  bool parallel_;  ///< rays
+  double pixel_;   ///< what one covers at depth 1
   double width_, reach_, closest_;
   double nearest_, farthest_;  // depths of the domain
   std::vector<float>& coverage_;
