@@ -11,6 +11,8 @@ Registry makeRegistry() {
   addPictureCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);
+  addViewCommands(registry);
+  addUiCommand(registry);
   addReportCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);

@@ -13,6 +13,8 @@ void addPictureCommands(Registry& registry);  ///< slice, render
 void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
+void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
+void addUiCommand(Registry& registry);
 void addCheckCommands(Registry& registry);  ///< check, accept
 void addToolCommands(Registry& registry);   ///< run, set, mesh, shapes, doctor, help
 

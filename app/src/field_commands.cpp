@@ -26,7 +26,7 @@ void runBuild(Session& session, const Arguments& arguments) {
   if (saves) checkWritable(arguments.text("output"));
   const InterruptGuard guard;  // until the file is whole
   BuiltField built = buildField(console, surface, arguments);
-  session.setField({std::move(built.field), saves ? arguments.text("output") : surface});
+  session.setField({std::move(built.field), saves ? arguments.text("output") : surface, {}, surface});
   session.setExact(std::move(built.exact));
   if (saves) saveCurrent(session, arguments.text("output"));
   if (session.wantsJson(arguments)) {

@@ -222,23 +222,44 @@ constexpr NamedView kViews[] = {{"front", 0, 0},
                                 {"bottom", 0, -90},
                                 {"corner", 45, 35.264389682754654}};
 
+}  // namespace
+
 std::vector<std::string> viewNames() {
   std::vector<std::string> names;
   for (const NamedView& view : kViews) names.emplace_back(view.name);
   return names;
 }
 
-std::vector<std::string> colorNames(ColorBy without) {
+void turnTo(render::OrbitCamera& camera, std::string_view view) {
+  const NamedView& named = *std::ranges::find(kViews, view, &NamedView::name);
+  camera.azimuthDegrees = named.azimuthDegrees;
+  camera.elevationDegrees = named.elevationDegrees;
+}
+
+std::string viewName(const render::OrbitCamera& camera) {
+  for (const NamedView& view : kViews)
+    if (view.azimuthDegrees == camera.azimuthDegrees && view.elevationDegrees == camera.elevationDegrees)
+      return std::string(view.name);
+  return {};
+}
+
+std::vector<std::string> colorNames(std::optional<ColorBy> without) {
   std::vector<std::string> names;
   for (const auto& [name, color] : kColors)
     if (color != without) names.emplace_back(name);
   return names;
 }
 
+std::string_view colorName(ColorBy color) {
+  return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
+}
+
 /// One of the names above: the registry has seen to that.
 ColorBy colorNamed(std::string_view name) {
   return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
 }
+
+namespace {
 
 render::ScaleOptions scaleOptions(const Arguments& arguments) {
   render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
@@ -388,9 +409,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   picture.camera.distance = camera[2];
   if (arguments.given("view")) {
     if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
-    const NamedView& view = *std::ranges::find(kViews, arguments.text("view"), &NamedView::name);
-    picture.camera.azimuthDegrees = view.azimuthDegrees;
-    picture.camera.elevationDegrees = view.elevationDegrees;
+    turnTo(picture.camera, arguments.text("view"));
   }
   if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;

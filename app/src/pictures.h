@@ -1,6 +1,11 @@
 #pragma once
 // From validated arguments to the settings of render.
 
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "hpsdf/render/picture.h"
 #include "registry.h"
 #include "session.h"
@@ -12,6 +17,18 @@ render::GlChoice glChoice(const Arguments& arguments);
 
 /// Throws `Error` when --cpu and --gl are both given.
 Backend backend(const Arguments& arguments);
+
+/// Names of colours, as commands spell them.
+std::string_view colorName(render::ColorBy color);
+std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
+render::ColorBy colorNamed(std::string_view name);
+
+/// Names of directions of a camera: front, back, …
+std::vector<std::string> viewNames();
+/// Turns the camera. The name is one of those.
+void turnTo(render::OrbitCamera& camera, std::string_view view);
+/// The name of its direction; "" where it has none.
+std::string viewName(const render::OrbitCamera& camera);
 
 /// Of a parameter that takes three numbers and was given.
 Vector3 pointOf(const Arguments& arguments, const char* name);

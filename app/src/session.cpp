@@ -3,10 +3,19 @@
 #include <utility>
 
 #include "building.h"
+#include "explorer/explorer.h"
 #include "hpsdf/error.h"
 #include "long_work.h"
 
 namespace hpsdf::app {
+
+Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
+Session::~Session() = default;
+
+Explorer& Session::explorer() {
+  if (!explorer_) explorer_ = std::make_unique<Explorer>(*this);
+  return *explorer_;
+}
 
 void Session::setField(CurrentField field) {
   renderer_.reset();
@@ -14,6 +23,7 @@ void Session::setField(CurrentField field) {
   exact_.reset();
   picture_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
+  if (explorer_) explorer_->fieldChanged();
 }
 
 const CurrentField& Session::current() const {

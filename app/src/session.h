@@ -29,6 +29,10 @@ struct CurrentField {
   Field field;
   std::string name;                              ///< file or mesh that it came from
   std::optional<std::uintmax_t> fileBytes = {};  ///< of one that was loaded or saved
+  std::string surface = {};                      ///< mesh file or shape that it was built from just now
+
+  /// What it can be built from again: as far as is known.
+  const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
 
 /// Which renderer draws.
@@ -38,10 +42,15 @@ struct Backend {
   bool operator==(const Backend&) const = default;
 };
 
-/// What lives from command to command: the current field and its renderer.
+class Explorer;
+
+/// What lives from command to command: the current field, its renderer, and what the explorer shows.
 class Session {
  public:
-  Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
+  Session(const Registry& registry, Console console);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
 
   const Registry& registry() const { return registry_; }
   const Console& console() const { return console_; }
@@ -72,6 +81,9 @@ class Session {
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
 
+  /// Made when first asked for.
+  Explorer& explorer();
+
   /// What pictures with these colours need.
   render::Evidence evidence(render::ColorBy color, const std::string& surface);
 
@@ -92,6 +104,7 @@ class Session {
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
   std::string lastRenderer_;
+  std::unique_ptr<Explorer> explorer_;
 };
 
 }  // namespace hpsdf::app

@@ -180,7 +180,7 @@ Legend distanceLegend(const DistanceScale& scale) {
 }
 
 Legend scaleLegend(const std::string& title, const ColorScale& scale) {
-  Legend legend{.title = title, .bar = barOf(orderedColor)};
+  Legend legend{.title = title, .bar = barOf(orderedColor), .limits = std::array{scale.low(), scale.high()}};
   for (const double value : scaleMarks(scale)) legend.marks.push_back({scale.place(value), formatNumber(value, 3)});
   return legend;
 }

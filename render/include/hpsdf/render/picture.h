@@ -125,6 +125,7 @@ struct Legend {
   std::vector<Level> levels = {};  ///< ascending; of colours by degree or depth
   std::vector<Color> bar = {};     ///< from its low end to its high end; of all others
   std::vector<Mark> marks = {};
+  std::optional<std::array<double, 2>> limits = {};  ///< of a quantity: what the bar's ends stand for
 };
 
 /// A finished picture and the view in its upper left corner.

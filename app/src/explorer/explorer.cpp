@@ -1,0 +1,245 @@
+#include "explorer/explorer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictures.h"
+#include "script.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr double kBarHeight = 30, kReadoutHeight = 46, kColumnWidth = 268;
+constexpr double kSmallestCanvas = 160;
+constexpr double kDegreesAPixel = 0.4;
+
+double rounded(double value, double step) { return std::round(value / step) * step; }
+
+std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
+
+/// Each sample of a small picture as a square of the large one.
+render::Image enlarged(const render::Image& image, int width, int height) {
+  render::Image result(width, height, {});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      result.at(x, y) = image.at(std::min(image.width - 1, x * image.width / width),
+                                 std::min(image.height - 1, y * image.height / height));
+  return result;
+}
+
+}  // namespace
+
+Layout layoutOf(const ViewState& view) {
+  const double width = view.width, height = view.height;
+  const auto open = [&](Panel panel) { return view.isOpen(panel); };
+  Layout layout;
+  double top = 0, bottom = height, left = 0, right = width;
+  if (open(Panel::bar) && height >= kSmallestCanvas) layout.bar = {0, 0, width, top = kBarHeight};
+  if (open(Panel::readout) && bottom - top - kReadoutHeight >= kSmallestCanvas)
+    layout.readout = {0, bottom -= kReadoutHeight, width, height};
+  const auto roomForColumn = [&] { return right - left - kColumnWidth >= kSmallestCanvas; };
+  if ((open(Panel::view) || open(Panel::build)) && roomForColumn()) layout.left = {0, top, left = kColumnWidth, bottom};
+  const bool anyFigures =
+      open(Panel::legend) || open(Panel::histograms) || open(Panel::statistics) || open(Panel::worst);
+  if (anyFigures && roomForColumn()) layout.right = {right -= kColumnWidth, top, width, bottom};
+  layout.canvas = {left, top, right, bottom};
+  return layout;
+}
+
+void Explorer::change(ViewState next) {
+  if (next == view_) return;
+  if (!gestureKept_) {
+    undone_.push_back(view_);
+    redone_.clear();
+  }
+  gestureKept_ = ui_.busy();
+  view_ = std::move(next);
+}
+
+bool Explorer::undo() {
+  if (undone_.empty()) return false;
+  redone_.push_back(std::exchange(view_, undone_.back()));
+  undone_.pop_back();
+  return true;
+}
+
+bool Explorer::redo() {
+  if (redone_.empty()) return false;
+  undone_.push_back(std::exchange(view_, redone_.back()));
+  redone_.pop_back();
+  return true;
+}
+
+std::string Explorer::buildLine() const {
+  const auto mesh = settings_.find("mesh");
+  const std::string& surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
+  if (surface.empty()) throw Error("the field does not say what it was made from: give 'settings mesh=FILE'");
+  std::string line = "build " + scriptWord(surface);
+  for (const auto& [name, value] : settings_)
+    if (name != "mesh") line += " " + name + "=" + scriptWord(value);
+  return line;
+}
+
+void Explorer::fieldChanged() {
+  picture_.reset();
+  figures_.reset();
+  worst_.clear();
+  ++fields_;
+}
+
+void Explorer::run(const std::string& line) {
+  message.clear();
+  const std::string verb = line.substr(0, line.find(' '));
+  const bool sameGesture = ui_.busy() && verb == lastVerb_;
+  lastVerb_ = ui_.busy() ? verb : "";
+  runScript(session_, parseScript(session_.registry(), "panel", line, {}));
+  if (onCommand) onCommand(line, sameGesture);
+}
+
+void Explorer::runAll(const std::vector<std::string>& commands) {
+  for (const std::string& command : commands) run(command);
+}
+
+void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
+  ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
+}
+
+/// Until the panels show the present state: what they hold may depend on where things came to stand.
+void Explorer::settle() {
+  for (int i = 0; i < 3; ++i) {
+    std::vector<std::string> ignored;  // scrolling as far as there is something to scroll
+    drawPanels(nullptr, ignored);
+  }
+}
+
+void Explorer::input(const Input& event) {
+  std::vector<std::string> commands;
+  drawPanels(&event, commands);
+  if (const auto command = canvasCommand(event)) commands.push_back(*command);
+  runAll(commands);
+  // a list that opens needs to be drawn once before it takes input
+  std::vector<std::string> late;
+  drawPanels(nullptr, late);
+  runAll(late);
+  if (!ui_.busy()) {
+    gestureKept_ = false;
+    lastVerb_.clear();
+  }
+}
+
+const std::map<std::string, Widget>& Explorer::widgets() {
+  settle();
+  return ui_.widgets();
+}
+
+/// What the mouse does over the picture, and keys that no field takes.
+std::optional<std::string> Explorer::canvasCommand(const Input& event) {
+  const Layout layout = layoutOf(view_);
+  const auto [x, y] = ui_.pointer();
+  if (event.kind == Input::Kind::key && event.control && !ui_.editing()) {
+    if (event.key == Key::z && canUndo()) return "undo";
+    if (event.key == Key::y && canRedo()) return "redo";
+    if (event.key == Key::c) return "copy-view";
+  }
+  if (event.kind == Input::Kind::press && !dragged_ && !ui_.wantsMouse() && layout.canvas.contains(x, y)) {
+    dragged_ = event.button;
+    dragFrom_ = {x, y};
+    viewAtPress_ = view_;
+  }
+  if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
+  const double height = layout.canvas.height();
+  if (event.kind == Input::Kind::wheel && !ui_.wantsMouse() && layout.canvas.contains(x, y)) {
+    if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, event.turn));
+    const render::OrbitCamera& c = view_.camera;
+    return fmt::format("camera {},{},{:.5g}", c.azimuthDegrees, c.elevationDegrees,
+                       c.distance * std::pow(1.15, -event.turn));
+  }
+  if (event.kind != Input::Kind::move || !dragged_) return std::nullopt;
+  const double dx = x - dragFrom_[0], dy = y - dragFrom_[1];
+  const Field& field = session_.current().field;
+  const ViewState& from = viewAtPress_;
+  if (view_.slice) {
+    const render::SliceView plane =
+        render::sliceView(field, slicePicture(from, field), int(layout.canvas.width()), int(height));
+    const Vector3 target = plane.origin - plane.right * (dx / layout.canvas.width()) + plane.up * (dy / height);
+    return "plane target=" + vectorWord(target);
+  }
+  const render::OrbitCamera& c = from.camera;
+  if (*dragged_ != 0) {  // the target moves with the mouse
+    const auto camera = render::cameraOf(c, field.domain(), int(layout.canvas.width()), int(height));
+    const double distance = c.distance * field.domain().diagonal().norm();
+    const Vector3 target =
+        c.target.value_or(field.domain().center()) +
+        distance * (-camera.right * (2 * dx / layout.canvas.width()) + camera.up * (2 * dy / height));
+    return "camera target=" + vectorWord(target);
+  }
+  return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesAPixel * dx, 0.1),
+                     std::clamp(rounded(c.elevationDegrees + kDegreesAPixel * dy, 0.1), -90.0, 90.0), c.distance);
+}
+
+std::string Explorer::pictureKey() const {
+  ViewState shown = view_;  // without what is not in the picture
+  const Layout layout = layoutOf(view_);
+  shown.open = {};
+  shown.scroll = {};
+  shown.worstPage = 0;
+  return fmt::format("{} {}x{} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_);
+}
+
+void Explorer::drawPicture(int shrink) {
+  const Field& field = session_.current().field;
+  const UiRect canvas = layoutOf(view_).canvas;
+  const auto fit = [&](auto picture) {
+    picture.width = std::max(16, int(canvas.width()) / shrink);
+    picture.height = std::max(16, int(canvas.height()) / shrink);
+    picture.samples = shrink > 1 ? 1 : view_.samples;
+    picture.bare = true;
+    return picture;
+  };
+  const render::Evidence evidence = session_.evidence(view_.color(), "");
+  render::Renderer& renderer = session_.renderer(view_.backend);
+  picture_ = view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, field)), evidence)
+                         : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);
+  shrunk_ = shrink;
+  drawnFor_ = pictureKey();
+}
+
+render::Image Explorer::frame(int shrink) {
+  if (isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
+  settle();
+  render::Image image(view_.width, view_.height, {250, 250, 248});
+  const UiRect canvas = layoutOf(view_).canvas;
+  const render::Image view =
+      shrunk_ == 1 ? picture_->image : enlarged(picture_->image, int(canvas.width()), int(canvas.height()));
+  for (int y = 0; y < view.height; ++y)
+    std::copy_n(&view.at(0, y), view.width, &image.at(int(canvas.x0), int(canvas.y0) + y));
+  ui_.paint(image);
+  return image;
+}
+
+const FieldStatistics& Explorer::figures() {
+  if (!figures_) figures_ = statistics(session_.current().field);
+  return *figures_;
+}
+
+const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
+  if (worstBy_ != view_.worstBy || worst_.size() < count)
+    worst_ = worstInterfaces(session_.jumps(), view_.worstBy, std::max<std::size_t>(count, 100));
+  worstBy_ = view_.worstBy;
+  return worst_;
+}
+
+std::optional<Readout> Explorer::readout() {
+  if (!picture_ || shrunk_ != 1 || ui_.wantsMouse() || dragged_) return std::nullopt;
+  const UiRect canvas = layoutOf(view_).canvas;
+  const auto [x, y] = ui_.pointer();
+  if (!canvas.contains(x, y) || x - canvas.x0 >= picture_->image.width || y - canvas.y0 >= picture_->image.height)
+    return std::nullopt;
+  const auto pick = render::pickAt(*picture_, int(x - canvas.x0), int(y - canvas.y0));
+  if (!pick) return std::nullopt;
+  return readoutAt(session_, *pick);
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,364 @@
+// What stands around the picture. Each control shows part of the state and asks for a command; it changes nothing
+// itself.
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "explorer/explorer.h"
+#include "hpsdf/field.h"
+#include "pictures.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::size_t kWorstRows = 8;
+
+using Commands = std::vector<std::string>;
+
+std::string number(double value) { return fmt::format("{:.6g}", value); }
+
+ImU32 packed(const render::Color& c) { return IM_COL32(c[0], c[1], c[2], 255); }
+
+ImVec2 cursor() { return ImGui::GetCursorScreenPos(); }
+float widthLeft() { return ImGui::GetContentRegionAvail().x; }
+
+void textAt(float x, float y, const std::string& text, ImU32 color) {
+  ImGui::GetWindowDrawList()->AddText({std::round(x), std::round(y)}, color, text.c_str());
+}
+
+float widthOf(const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; }
+
+/// A panel with its heading, where it is open.
+template <typename Content>
+void section(Ui& ui, const ViewState& view, Panel panel, const char* title, Commands& commands,
+             const Content& content) {
+  if (!view.isOpen(panel)) return;
+  const std::string name = kPanelNames[static_cast<std::size_t>(panel)];
+  if (ui.heading(name + "/close", title)) commands.push_back("panel " + name + "=false");
+  content();
+}
+
+void drawBar(Ui& ui, const Explorer& explorer, Commands& commands) {
+  const ViewState& view = explorer.view();
+  const auto nextTo = [](float space = 6) { ImGui::SameLine(0, space); };
+  if (ui.button("bar/surface", "surface", !view.slice)) commands.push_back("show surface");
+  nextTo(2);
+  if (ui.button("bar/slice", "slice", view.slice)) commands.push_back("show slice");
+  nextTo(24);
+  for (std::size_t panel = 1; panel < kPanels; ++panel) {  // not the bar itself
+    const char* name = kPanelNames[panel];
+    if (ui.button(fmt::format("bar/{}", name), name, view.open[panel]))
+      commands.push_back(fmt::format("panel {}={}", name, !view.open[panel]));
+    nextTo(panel + 1 < kPanels ? 2 : 24);
+  }
+  ui.enable(explorer.canUndo());
+  if (ui.button("bar/undo", "undo")) commands.push_back("undo");
+  nextTo(2);
+  ui.enable(explorer.canRedo());
+  if (ui.button("bar/redo", "redo")) commands.push_back("redo");
+  ui.enable(true);
+  nextTo(24);
+  if (ui.button("bar/copy-view", "copy view")) commands.push_back("copy-view");
+}
+
+/// A list of names that runs a command with the one chosen.
+void choice(Ui& ui, const std::string& path, const char* label, const std::vector<std::string>& names,
+            const std::string& current, const std::string& command, Commands& commands) {
+  const auto found = std::ranges::find(names, current);
+  const int at = found == names.end() ? 0 : static_cast<int>(found - names.begin());
+  if (const auto chosen = ui.combo(path, label, names, at)) commands.push_back(command + names[std::size_t(*chosen)]);
+}
+
+void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
+  const render::OrbitCamera& c = view.camera;
+  std::vector<std::string> directions = viewNames();
+  directions.insert(directions.begin(), "any");
+  choice(ui, "view/direction", "direction", directions, viewName(c), "camera view=", commands);
+  const auto camera = [&](double azimuth, double elevation, double distance) {
+    commands.push_back(fmt::format("camera {},{},{}", number(azimuth), number(elevation), number(distance)));
+  };
+  if (const auto v = ui.slider("view/azimuth", "azimuth", std::remainder(c.azimuthDegrees, 360), -180, 180, "%.1f°"))
+    camera(*v, c.elevationDegrees, c.distance);
+  if (const auto v = ui.slider("view/elevation", "elevation", c.elevationDegrees, -90, 90, "%.1f°"))
+    camera(c.azimuthDegrees, *v, c.distance);
+  if (const auto v = ui.slider("view/distance", "distance", c.distance, 0.05, 3, "%.3g"))
+    camera(c.azimuthDegrees, c.elevationDegrees, *v);
+  choice(ui, "view/up", "up", {"y", "z"}, c.up == render::UpAxis::y ? "y" : "z", "camera up=", commands);
+  ui.enable(c.target.has_value());
+  if (ui.button("view/center", "back to the center")) commands.push_back("camera target=center");
+  ui.enable(true);
+  const double span = 0.15 * field.domain().diagonal().norm();
+  if (const auto v = ui.slider("view/offset", "offset", view.surfaceOffset, -span, span))
+    commands.push_back("surface offset=" + number(*v));
+  choice(ui, "view/clip", "cut across", {"none", "x", "y", "z"},
+         view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none", "surface clip=", commands);
+  if (!view.clip) return;
+  const Box& domain = field.domain();
+  if (const auto v = ui.slider("view/clip-offset", "cut at", view.clip->offset, domain.min()[view.clip->axis],
+                               domain.max()[view.clip->axis]))
+    commands.push_back("surface clip-offset=" + number(*v));
+}
+
+void drawPlane(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
+  choice(ui, "view/axis", "across", {"x", "y", "z"}, std::string(1, "xyz"[view.axis]), "plane axis=", commands);
+  const Box& domain = field.domain();
+  if (const auto v =
+          ui.slider("view/plane-offset", "offset", view.planeOffset.value_or(defaultOffset(domain, view.axis)),
+                    domain.min()[view.axis], domain.max()[view.axis]))
+    commands.push_back("plane offset=" + number(*v));
+  if (const auto v = ui.slider("view/zoom", "zoom", view.zoom, 1, 32, "%.3g"))
+    commands.push_back("plane zoom=" + number(*v));
+  ui.enable(view.sliceTarget || view.zoom != 1);
+  if (ui.button("view/whole", "whole section")) commands.push_back("plane zoom=1 target=center");
+  ui.enable(true);
+}
+
+void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn>& picture, Commands& commands) {
+  const render::ColorBy without = view.slice ? render::ColorBy::normal : render::ColorBy::distance;
+  choice(ui, "view/color", "color", colorNames(without), std::string(colorName(view.color())), "color ", commands);
+  if (!render::isQuantity(view.color())) return;
+  choice(ui, "view/scale", "scale", {"log", "linear"}, view.scale.logarithmic ? "log" : "linear",
+         fmt::format("color {} scale=", colorName(view.color())), commands);
+  const auto range = [&](double low, double high) {
+    commands.push_back(fmt::format("color {} range={},{}", colorName(view.color()), low, high));
+  };
+  const auto shown = picture ? picture->legend.limits : std::nullopt;
+  if (const auto pinned = ui.checkbox("view/pinned", "pinned range", view.scale.limits.has_value())) {
+    if (!*pinned)
+      commands.push_back(fmt::format("color {} range=auto", colorName(view.color())));
+    else if (shown)
+      range((*shown)[0], (*shown)[1]);
+  }
+  if (!view.scale.limits) return;
+  const auto [low, high] = *view.scale.limits;
+  const auto typed = [&](const std::string& text) {
+    const auto value = parseNumber(text);
+    if (!value) throw Error(fmt::format("range: expected a number, found '{}'", text));
+    return *value;
+  };
+  if (const auto text = ui.field("view/low", "from", shortNumber(low))) range(typed(*text), high);
+  if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(low, typed(*text));
+}
+
+void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
+  const ViewState& view = explorer.view();
+  const Field& field = explorer.session().current().field;
+  if (view.slice)
+    drawPlane(ui, view, field, commands);
+  else
+    drawCamera(ui, view, field, commands);
+  drawColors(ui, view, explorer.picture(), commands);
+}
+
+void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
+  const FieldMetadata& made = explorer.session().current().field.metadata();
+  const auto& grid = explorer.session().current().field.grid();
+  const auto setting = [&](const char* name, const std::string& standard) {
+    const auto found = explorer.settings().find(name);
+    return found == explorer.settings().end() ? standard : found->second;
+  };
+  const auto field = [&](const char* name, const std::string& standard) {
+    if (const auto text = ui.field(fmt::format("build/{}", name), name, setting(name, standard)))
+      commands.push_back(fmt::format("settings {}={}", name, scriptWord(*text)));
+  };
+  const auto slider = [&](const char* name, double standard, double low, double high, const char* format) {
+    const double value = parseNumber(setting(name, number(standard))).value_or(standard);
+    if (const auto v = ui.slider(fmt::format("build/{}", name), name, value, low, high, format))
+      commands.push_back(fmt::format("settings {}={}", name, number(*v)));
+  };
+  field("mesh", explorer.session().current().madeFrom());
+  field("target-error", shortNumber(made.targetError));
+  field("grid", fmt::format("{},{},{}", grid[0], grid[1], grid[2]));
+  slider("nearness", made.nearness, 0, 8, "%.1f");
+  slider("max-degree", made.maxDegree, 1, kMaxDegree, "%.0f");
+  slider("max-depth", made.maxDepth, 0, kMaxDepth, "%.0f");
+  choice(ui, "build/strategy", "strategy", {"hp", "h1", "h2"}, setting("strategy", strategyName(made.strategy)),
+         "settings strategy=", commands);
+  if (explorer.work) {
+    ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
+    if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
+    return;
+  }
+  ui.enable(!setting("mesh", explorer.session().current().madeFrom()).empty());
+  if (ui.button("build/rebuild", "rebuild")) commands.push_back("rebuild");
+  ui.enable(true);
+}
+
+void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = cursor();
+  const float width = widthLeft() / float(std::max<std::size_t>(levels.size(), 1)), height = 20;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const float x0 = std::round(from.x + width * float(i)), x1 = std::round(from.x + width * float(i + 1));
+    list.AddRectFilled({x0, from.y}, {x1, from.y + height}, packed(levels[i].color));
+    const std::string label = std::to_string(levels[i].level);
+    const bool dark = 2 * levels[i].color[0] + 5 * levels[i].color[1] + levels[i].color[2] < 4 * 255;
+    if (widthOf(label) + 2 <= x1 - x0)
+      textAt((x0 + x1 - widthOf(label)) / 2, from.y + 3, label, dark ? IM_COL32_WHITE : IM_COL32(20, 20, 30, 255));
+  }
+  ImGui::Dummy({widthLeft(), height});
+}
+
+void drawColorBar(const render::Legend& legend) {
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = cursor();
+  const float inset = 12, width = widthLeft() - 2 * inset, height = 16;
+  for (int x = 0; x < int(width); ++x) {
+    const auto& color = legend.bar[std::size_t(x) * (legend.bar.size() - 1) / std::size_t(width)];
+    list.AddRectFilled({from.x + inset + float(x), from.y}, {from.x + inset + float(x) + 1, from.y + height},
+                       packed(color));
+  }
+  float free = from.x;
+  for (const auto& mark : legend.marks) {
+    const float x = std::round(from.x + inset + float(mark.place) * (width - 1));
+    list.AddRectFilled({x, from.y + height}, {x + 1, from.y + height + 4}, IM_COL32(60, 64, 78, 255));
+    const float half = widthOf(mark.text) / 2, right = from.x + widthLeft();
+    const float left = std::clamp(x - half, from.x, right - 2 * half);
+    if (left < free) continue;
+    textAt(left, from.y + height + 4, mark.text, IM_COL32(32, 34, 44, 255));
+    free = left + 2 * half + 6;
+  }
+  ImGui::Dummy({widthLeft(), height + 20});
+}
+
+void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
+  if (!picture) return;
+  const render::Legend& legend = picture->legend;
+  if (legend.title.empty()) {
+    ui.text("light only: choose a color", true);
+    return;
+  }
+  ui.text(legend.title);
+  if (!legend.levels.empty()) drawLevelSwatches(legend.levels);
+  if (!legend.bar.empty()) drawColorBar(legend);
+}
+
+/// Shares of the volume as columns, in the legend's colours where it is theirs.
+void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend) {
+  ui.text(title);
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = cursor();
+  const float height = 36, line = ImGui::GetTextLineHeight();
+  const float width = std::min(44.0F, widthLeft() / float(std::max<std::size_t>(shares.size(), 1)));
+  double greatest = 0;
+  for (const auto& [level, share] : shares) greatest = std::max(greatest, share);
+  float x = from.x;
+  for (const auto& [level, share] : shares) {
+    const float bar = std::max(1.0F, std::round(height * float(share / greatest)));
+    const float bottom = from.y + line + height;
+    ImU32 color = IM_COL32(115, 148, 199, 255);
+    if (legend != nullptr)
+      for (const auto& known : legend->levels)
+        if (known.level == level) color = packed(known.color);
+    list.AddRectFilled({std::round(x) + 2, bottom - bar}, {std::round(x + width) - 2, bottom}, color);
+    const auto centred = [&](const std::string& text, float y, ImU32 ink) {
+      if (widthOf(text) <= width) textAt(x + (width - widthOf(text)) / 2, y, text, ink);
+    };
+    const double percent = 100 * share;
+    centred(percent < 0.1    ? "<.1"
+            : percent < 9.95 ? fmt::format("{:.1f}", percent)
+                             : fmt::format("{:.0f}", percent),
+            bottom - bar - line, IM_COL32(98, 102, 116, 255));
+    centred(std::to_string(level), bottom + 2, IM_COL32(32, 34, 44, 255));
+    x += width;
+  }
+  ImGui::Dummy({widthLeft(), height + 2 * line + 2});
+}
+
+void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
+  const auto& picture = explorer.picture();
+  const auto legendOf = [&](render::ColorBy color) {
+    return picture && explorer.view().color() == color ? &picture->legend : nullptr;
+  };
+  drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
+  drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+}
+
+void drawStatistics(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
+  const Field& field = explorer.session().current().field;
+  const Jumps& jumps = explorer.session().jumps();
+  const std::pair<std::string, std::string> rows[] = {
+      {"cells", grouped(figures.leaves)},
+      {"coefficients", grouped(figures.coefficients)},
+      {"memory", bytesText(double(figures.bytes))},
+      {"target error", shortNumber(field.metadata().targetError)},
+      {"RMS estimate", shortNumber(field.metadata().rmsEstimate(field.domain()))},
+      {"jump of f, RMS", shortNumber(jumps.value.rms)},
+      {"jump of gradient, RMS", shortNumber(jumps.gradient.rms)},
+  };
+  ui.facts(rows);
+}
+
+void drawWorst(Ui& ui, Explorer& explorer, Commands& commands) {
+  const ViewState& view = explorer.view();
+  const Jumps& jumps = explorer.session().jumps();
+  choice(ui, "worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
+         "worst by=", commands);
+  const std::size_t first = std::size_t(view.worstPage) * kWorstRows;
+  const auto& worst = explorer.worst(first + kWorstRows);
+  const std::size_t last = std::min(worst.size(), first + kWorstRows);
+  for (std::size_t rank = first; rank < last; ++rank) {
+    const Interface& face = jumps.interfaces[worst[rank]];
+    const Vector3& x = face.worst;
+    const std::array cells = {fmt::format("{}. {}", rank + 1, shortNumber(jumpOf(face, view.worstBy).max)),
+                              fmt::format("({:.2f}, {:.2f}, {:.2f})", x.x(), x.y(), x.z())};
+    if (ui.row(fmt::format("worst/{}", rank - first + 1), cells, 90))
+      commands.push_back(fmt::format("fly {}", rank + 1));
+  }
+  ui.enable(view.worstPage > 0);
+  if (ui.button("worst/previous", "previous")) commands.push_back(fmt::format("worst page={}", view.worstPage));
+  ImGui::SameLine();
+  ui.enable(last < jumps.interfaces.size());
+  if (ui.button("worst/next", "next")) commands.push_back(fmt::format("worst page={}", view.worstPage + 2));
+  ui.enable(true);
+}
+
+void drawReadout(Ui& ui, Explorer& explorer) {
+  if (!explorer.message.empty()) {
+    ui.text(explorer.message);
+    return;
+  }
+  if (const auto readout = explorer.readout()) {
+    for (const std::string& line : readoutText(*readout)) ui.text(line);
+    return;
+  }
+  if (!explorer.picture()) return;
+  std::string line;
+  for (const std::string& detail : explorer.picture()->details) line += (line.empty() ? "" : "   ") + detail;
+  ui.text(explorer.session().current().name + "   " + line);
+  ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
+}
+
+}  // namespace
+
+void drawPanels(Ui& ui, Explorer& explorer, Commands& commands) {
+  const ViewState& view = explorer.view();
+  const Layout layout = layoutOf(view);
+  const bool empty = layout.right.width() <= 0;
+  const FieldStatistics figures = empty ? FieldStatistics{} : explorer.figures();
+  const auto scrolling = [&](const char* name, const UiRect& rect, double scroll, const auto& content) {
+    if (rect.width() <= 0) return;
+    const double now = ui.column(name, rect, scroll, content);
+    if (std::abs(now - scroll) > 0.5) commands.push_back(fmt::format("panel {}-scroll={}", name, now));
+  };
+  if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(ui, explorer, commands); });
+  scrolling("left", layout.left, view.scroll[0], [&] {
+    section(ui, view, Panel::view, view.slice ? "Slice" : "Surface", commands,
+            [&] { drawView(ui, explorer, commands); });
+    section(ui, view, Panel::build, "Construction", commands, [&] { drawBuild(ui, explorer, commands); });
+  });
+  scrolling("right", layout.right, view.scroll[1], [&] {
+    section(ui, view, Panel::legend, "Legend", commands, [&] { drawLegend(ui, explorer.picture()); });
+    section(ui, view, Panel::histograms, "Histograms", commands, [&] { drawHistograms(ui, explorer, figures); });
+    section(ui, view, Panel::statistics, "Statistics", commands, [&] { drawStatistics(ui, explorer, figures); });
+    section(ui, view, Panel::worst, "Worst interfaces", commands, [&] { drawWorst(ui, explorer, commands); });
+  });
+  if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+  ui.place("canvas", layout.canvas);
+}
+
+}  // namespace hpsdf::app

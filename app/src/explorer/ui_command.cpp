@@ -1,0 +1,145 @@
+// ui: a real mouse and keyboard on the explorer's widgets.
+
+#include <fmt/format.h>
+
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "hpsdf/nearest_name.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr int kDragSteps = 4;
+
+using Point = std::array<double, 2>;
+
+std::optional<Point> pointIn(const std::string& text) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos) return std::nullopt;
+  const auto x = parseNumber(text.substr(0, comma)), y = parseNumber(text.substr(comma + 1));
+  if (!x || !y) return std::nullopt;
+  return Point{*x, *y};
+}
+
+/// The middle of a widget, or the pixel itself.
+Point placeOf(Explorer& explorer, const std::string& target) {
+  if (const auto pixel = pointIn(target)) return *pixel;
+  const auto& widgets = explorer.widgets();
+  const auto found = widgets.find(target);
+  if (found == widgets.end()) {
+    std::vector<std::string> known;
+    for (const auto& [path, widget] : widgets) known.push_back(path);
+    const std::string near = nearestName(target, known);
+    throw Error(fmt::format("the frame has no widget '{}'; {}", target,
+                            near.empty() ? "'ui list' names them" : fmt::format("did you mean '{}'?", near)));
+  }
+  const UiRect& rect = found->second.rect;
+  if (!(rect.width() > 0 && rect.height() > 0))
+    throw Error(fmt::format("widget '{}' is scrolled out of sight: scroll its column, or close panels", target));
+  if (!found->second.enabled) throw Error(fmt::format("widget '{}' takes no input now", target));
+  return {std::floor((rect.x0 + rect.x1) / 2), std::floor((rect.y0 + rect.y1) / 2)};
+}
+
+void moveTo(Explorer& explorer, const Point& place) { explorer.input({.kind = Input::Kind::move, .at = place}); }
+
+void runUi(Session& session, const Arguments& arguments) {
+  session.current();
+  Explorer& explorer = session.explorer();
+  const std::string action = arguments.text("action");
+  const std::string target = arguments.textOr("target", "");
+  const std::string value = arguments.textOr("value", "");
+  const int button = arguments.text("button") == "right" ? 1 : 0;
+  explorer.frame();  // what lies over the picture depends on it
+  if (action == "list") {
+    for (const auto& [path, widget] : explorer.widgets())
+      session.console().out << path << (widget.enabled ? "" : " (takes no input now)") << '\n';
+    return;
+  }
+  if (action == "key") {
+    explorer.input({.kind = Input::Kind::key, .key = *keyNamed(target), .control = arguments.flag("control")});
+    return;
+  }
+  const Point at = placeOf(explorer, target);
+  const bool control = arguments.flag("control") || action == "type";
+  const auto press = [&] { explorer.input({.kind = Input::Kind::press, .button = button, .control = control}); };
+  const auto release = [&] { explorer.input({.kind = Input::Kind::release, .button = button}); };
+  moveTo(explorer, at);
+  if (action == "wheel") {
+    explorer.input({.kind = Input::Kind::wheel, .turn = *parseNumber(value)});
+  } else if (action == "drag") {
+    press();
+    const Point by = *pointIn(value);
+    for (int step = 1; step <= kDragSteps; ++step)
+      moveTo(explorer, {at[0] + by[0] * step / kDragSteps, at[1] + by[1] * step / kDragSteps});
+    release();
+  } else if (action == "click" || action == "type") {
+    press();
+    release();
+  }
+  if (action != "type") return;
+  // a slider turns into a field that holds its number marked; what is typed takes its place
+  explorer.input({.kind = Input::Kind::type, .text = value});
+  explorer.input({.kind = Input::Kind::key, .key = Key::enter});
+}
+
+void checkUi(const Arguments& arguments) {
+  const std::string action = arguments.text("action");
+  if (action == "list") return;
+  if (!arguments.has("target")) throw Error(fmt::format("ui {}: say on which widget, or X,Y for a pixel", action));
+  const bool takesValue = action == "drag" || action == "type" || action == "wheel";
+  if (takesValue != arguments.has("value"))
+    throw Error(fmt::format("ui {}: {}", action, takesValue ? "a value is missing" : "takes no value"));
+  if (action == "drag" && !pointIn(arguments.text("value")))
+    throw Error(fmt::format("ui drag: expected DX,DY pixels, found '{}'", arguments.text("value")));
+  if (action == "wheel" && !parseNumber(arguments.text("value")))
+    throw Error(fmt::format("ui wheel: expected a number of notches, found '{}'", arguments.text("value")));
+  if (action == "key" && !keyNamed(arguments.text("target"))) {
+    const auto names = keyNames();
+    const std::string near = nearestName(arguments.text("target"), names);
+    throw Error(fmt::format(
+        "ui key: unknown key '{}'; {}", arguments.text("target"),
+        near.empty() ? fmt::format("expected {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", near)));
+  }
+}
+
+}  // namespace
+
+void addUiCommand(Registry& registry) {
+  registry.add(
+      {.name = "ui",
+       .summary = "Use the explorer's widgets as a person does, by mouse and keyboard.",
+       .help = "A widget is named panel/name, an entry of an open list panel/name/entry, the picture canvas; "
+               "'ui list' names those of the frame. X,Y is a pixel of the frame, from its upper left.",
+       .examples = {"ui click bar/slice", "ui click view/color ; ui click view/color/depth",
+                    "ui type build/target-error 1e-5", "ui drag canvas 120,-40", "ui hover 640,360",
+                    "ui wheel canvas 2"},
+       .parameters =
+           {{.name = "action",
+             .type = ParameterType::choice,
+             .help = "click; drag: by DX,DY pixels; type: a text into a field or slider, then "
+                     "Enter; hover: move the mouse there; wheel: notches, away from you; key: of "
+                     "the keyboard, by its name; list: name the widgets.",
+             .choices = {"click", "drag", "type", "hover", "wheel", "key", "list"},
+             .positional = true,
+             .need = Need::always},
+            {.name = "target",
+             .type = ParameterType::text,
+             .help = "The widget, the pixel, or the key.",
+             .valueName = "WIDGET|X,Y|KEY",
+             .positional = true},
+            {.name = "value", .type = ParameterType::text, .help = "What drag, type and wheel do.", .positional = true},
+            {.name = "button",
+             .type = ParameterType::choice,
+             .help = "Of the mouse.",
+             .defaultText = "left",
+             .choices = {"left", "right"}},
+            {.name = "control",
+             .type = ParameterType::flag,
+             .help = "With the Ctrl key held down.",
+             .defaultText = "false"}},
+       .action = runUi,
+       .check = checkUi,
+       .scriptOnly = true});
+}
+
+}  // namespace hpsdf::app

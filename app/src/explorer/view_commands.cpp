@@ -1,0 +1,486 @@
+// The verbs of the explorer: what it shows, and its picture as a file. Each sets what it is given and leaves the rest.
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "building.h"
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "hpsdf/output_file.h"
+#include "pictures.h"
+#include "script.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// Nothing for the word that stands in its place.
+std::optional<Vector3> pointOr(const Arguments& arguments, const char* name, std::string_view word) {
+  if (arguments.text(name) == word) return std::nullopt;
+  return pointOf(arguments, name);
+}
+
+void runShow(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("kind")) view.slice = arguments.text("kind") == "slice";
+  if (arguments.given("size")) {
+    view.width = arguments.size("size")[0];
+    view.height = arguments.size("size")[1];
+  }
+  if (arguments.given("samples")) view.samples = arguments.whole("samples");
+  if (arguments.given("cpu") || arguments.given("gl")) view.backend = backend(arguments);
+  session.explorer().change(std::move(view));
+}
+
+void runCamera(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  render::OrbitCamera& camera = view.camera;
+  if (arguments.given("orbit")) {
+    const auto n = arguments.numbers("orbit");
+    camera.azimuthDegrees = n[0];
+    camera.elevationDegrees = n[1];
+    camera.distance = n[2];
+  }
+  if (arguments.given("view") && arguments.text("view") != "any") turnTo(camera, arguments.text("view"));
+  if (arguments.given("target")) camera.target = pointOr(arguments, "target", "center");
+  if (arguments.given("up")) camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  session.explorer().change(std::move(view));
+}
+
+void checkCamera(const Arguments& arguments) {
+  if (!arguments.given("orbit")) return;
+  if (arguments.given("view")) throw Error("view: excludes azimuth, elevation and distance; give one or the other");
+  const auto n = arguments.numbers("orbit");
+  if (!(std::abs(n[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+  if (!(n[2] > 0)) throw Error("camera: expected a distance above 0, in domain diagonals");
+}
+
+void runSurface(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
+  if (arguments.given("clip")) {
+    const std::string axis = arguments.text("clip");
+    if (axis == "none")
+      view.clip.reset();
+    else
+      view.clip = render::ClipPlane{axis[0] - 'x', view.clip ? view.clip->offset : 0};
+  }
+  if (arguments.given("clip-offset")) {
+    if (!view.clip) throw Error("clip-offset: needs clip, the axis that it lies on");
+    view.clip->offset = arguments.number("clip-offset");
+  }
+  session.explorer().change(std::move(view));
+}
+
+void runPlane(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("through")) {
+    const auto n = arguments.numbers("through");
+    view.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
+  }
+  if (arguments.given("axis")) {
+    view.axis = arguments.text("axis")[0] - 'x';
+    view.plane.reset();
+  }
+  if (arguments.given("offset")) {
+    const bool automatic = arguments.text("offset") == "auto";
+    view.planeOffset = automatic ? std::nullopt : std::optional(arguments.numbers("offset")[0]);
+    view.plane.reset();
+  }
+  if (arguments.given("zoom")) view.zoom = arguments.number("zoom");
+  if (arguments.given("target")) view.sliceTarget = pointOr(arguments, "target", "center");
+  session.explorer().change(std::move(view));
+}
+
+void checkPlane(const Arguments& arguments) {
+  if (arguments.given("through") && (arguments.given("axis") || arguments.given("offset")))
+    throw Error("through: excludes axis and offset; give one or the other");
+}
+
+void runColor(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  const bool slice = arguments.given("of") ? arguments.text("of") == "slice" : view.slice;
+  const render::ColorBy color = colorNamed(arguments.text("by"));
+  if (color == (slice ? render::ColorBy::normal : render::ColorBy::distance))
+    throw Error(
+        fmt::format("by: {} is not for a {}; give another colour", colorName(color), slice ? "slice" : "surface"));
+  (slice ? view.sliceColor : view.surfaceColor) = color;
+  if (arguments.given("range")) {
+    view.scale.limits.reset();
+    if (arguments.text("range") != "auto") {
+      const auto n = arguments.numbers("range");
+      view.scale.limits = {n[0], n[1]};
+    }
+  }
+  if (arguments.given("scale")) view.scale.logarithmic = arguments.text("scale") == "log";
+  if (view.scale.limits && !((*view.scale.limits)[0] < (*view.scale.limits)[1]))
+    throw Error("range: expected LOW,HIGH with LOW below HIGH");
+  if (view.scale.limits && view.scale.logarithmic && !((*view.scale.limits)[0] > 0))
+    throw Error("range: a logarithmic scale needs limits above 0; give others, or scale=linear");
+  session.explorer().change(std::move(view));
+}
+
+void runPanel(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("all")) view.open.fill(arguments.flag("all"));
+  for (std::size_t panel = 0; panel < kPanels; ++panel)
+    if (arguments.given(kPanelNames[panel])) view.open[panel] = arguments.flag(kPanelNames[panel]);
+  if (arguments.given("left-scroll")) view.scroll[0] = arguments.number("left-scroll");
+  if (arguments.given("right-scroll")) view.scroll[1] = arguments.number("right-scroll");
+  session.explorer().change(std::move(view));
+}
+
+void runWorst(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("by")) {
+    view.worstBy = arguments.text("by") == "value" ? JumpKind::value : JumpKind::gradient;
+    view.worstPage = 0;
+  }
+  if (arguments.given("page")) view.worstPage = arguments.whole("page") - 1;
+  session.explorer().change(std::move(view));
+}
+
+/// So near that the smaller of the two cells takes about a sixth of the picture.
+void runFly(Session& session, const Arguments& arguments) {
+  Explorer& explorer = session.explorer();
+  const Field& field = session.current().field;
+  const auto rank = static_cast<std::size_t>(arguments.whole("rank"));
+  const auto& worst = explorer.worst(rank);
+  if (rank > worst.size())
+    throw Error(fmt::format("rank: the field has {} interfaces; give one of them", session.jumps().interfaces.size()));
+  const Interface& face = session.jumps().interfaces[worst[rank - 1]];
+  const int depth = std::max(face.depths[0], face.depths[1]);
+  const double size = std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
+  ViewState view = explorer.view();
+  if (view.slice) {
+    view.plane.reset();
+    view.axis = face.axis == 2 ? 1 : 2;  // so that the face is seen from its edge
+    view.planeOffset = face.worst[view.axis];
+    view.zoom = std::max(1.0, field.domain().sizes().maxCoeff() / (6 * size));
+    view.sliceTarget = face.worst;
+  } else {
+    view.camera.target = face.worst;
+    view.camera.distance = 10 * size / field.domain().diagonal().norm();
+    // what lies in front of it is cut away, unless it is the surface that one looks at
+    view.clip.reset();
+    if (std::abs(field.value(face.worst) - view.surfaceOffset) > size) {
+      const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
+      Eigen::Index axis = 0;
+      forward.cwiseAbs().maxCoeff(&axis);
+      view.clip = render::ClipPlane{int(axis), face.worst[axis]};
+    }
+  }
+  explorer.change(std::move(view));
+}
+
+void runUndo(Session& session, const Arguments&) {
+  if (!session.explorer().undo()) throw Error("there is nothing to undo");
+}
+
+void runRedo(Session& session, const Arguments&) {
+  if (!session.explorer().redo())
+    throw Error("there is nothing to redo: nothing was undone, or something was done since");
+}
+
+void runCopyView(Session& session, const Arguments& arguments) {
+  const std::string script = scriptOf(session.explorer().view());
+  session.explorer().setClipboard(script);
+  if (!arguments.has("output")) {
+    session.console().out << script;
+    return;
+  }
+  OutputFile out(arguments.text("output"));
+  out.write(script);
+  out.commit();
+}
+
+void runSettings(Session& session, const Arguments& arguments) {
+  for (const Parameter& parameter : session.registry().command("settings").parameters)
+    if (arguments.given(parameter.name) && parameter.name != "json")
+      session.explorer().setSetting(parameter.name, arguments.text(parameter.name));
+}
+
+void runRebuild(Session& session, const Arguments&) {
+  const std::string line = session.explorer().buildLine();
+  runScript(session, parseScript(session.registry(), "rebuild", line, {}));
+}
+
+void runShot(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  checkWritable(file);
+  session.current();
+  const render::Image frame = session.explorer().frame();
+  savePng(frame, file);
+  if (session.wantsJson(arguments))
+    return printJson(
+        session.console().out,
+        {{"output", file}, {"width", frame.width}, {"height", frame.height}, {"renderer", session.lastRenderer()}});
+  session.console().out << fmt::format("{}: {}x{}, {}\n", file, frame.width, frame.height, session.lastRenderer());
+}
+
+Command showCommand() {
+  Command command{.name = "show",
+                  .summary = "Choose what the explorer shows: the surface in space, or the flat picture of a plane.",
+                  .help =
+                      "The explorer is a picture of the current field with panels around it: 'shot' writes it, "
+                      "'hpsdf view' opens it in a window. camera and surface lead the one, plane the other.",
+                  .examples = {"show slice size=1280x720", "show surface samples=2 gl=software"},
+                  .parameters = {{.name = "kind",
+                                  .type = ParameterType::choice,
+                                  .help = "The surface, or a slice.",
+                                  .choices = {"surface", "slice"},
+                                  .positional = true},
+                                 {.name = "size",
+                                  .type = ParameterType::size,
+                                  .help = "Of the whole frame, panels included; 1280x720 at first.",
+                                  .unit = "pixels",
+                                  .minimum = 64,
+                                  .maximum = 8192,
+                                  .whole = true,
+                                  .counts = {2}},
+                                 {.name = "samples",
+                                  .type = ParameterType::wholeNumber,
+                                  .help = "Samples a pixel along each axis; 1 at first.",
+                                  .minimum = 1,
+                                  .maximum = 8}},
+                  .action = runShow,
+                  .scriptOnly = true};
+  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  return command;
+}
+
+Parameter targetParameter(const std::string& help) {
+  return {.name = "target",
+          .type = ParameterType::numbers,
+          .help = help,
+          .valueName = "X,Y,Z",
+          .unit = "world units",
+          .choices = {"center"},
+          .counts = {3}};
+}
+
+Command cameraCommand() {
+  std::vector<std::string> directions = viewNames();
+  directions.insert(directions.begin(), "any");
+  return {.name = "camera",
+          .summary = "Move the explorer's camera.",
+          .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
+          .parameters = {{.name = "orbit",
+                          .type = ParameterType::numbers,
+                          .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
+                                  "diagonals of the domain; 30,20,1.1 at first.",
+                          .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+                          .counts = {3},
+                          .positional = true},
+                         {.name = "view",
+                          .type = ParameterType::choice,
+                          .help = "A named direction instead; any leaves it.",
+                          .choices = directions},
+                         targetParameter("The point in the picture's middle; center is the domain's."),
+                         {.name = "up",
+                          .type = ParameterType::choice,
+                          .help = "The axis that points up.",
+                          .choices = {"y", "z"}}},
+          .action = runCamera,
+          .check = checkCamera,
+          .scriptOnly = true};
+}
+
+Command surfaceCommand() {
+  return {.name = "surface",
+          .summary = "Choose which surface the explorer shows, and where it is cut open.",
+          .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
+          .parameters = {{.name = "offset",
+                          .type = ParameterType::number,
+                          .help = "The distance whose surface is drawn; 0 at first.",
+                          .unit = "world units"},
+                         {.name = "clip",
+                          .type = ParameterType::choice,
+                          .help = "Cut across this axis; the half towards the camera is left out.",
+                          .choices = {"none", "x", "y", "z"}},
+                         {.name = "clip-offset",
+                          .type = ParameterType::number,
+                          .help = "Where the cut crosses that axis.",
+                          .unit = "world units"}},
+          .action = runSurface,
+          .scriptOnly = true};
+}
+
+Command planeCommand() {
+  return {.name = "plane",
+          .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
+          .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
+          .parameters = {{.name = "axis",
+                          .type = ParameterType::choice,
+                          .help = "The plane is perpendicular to this axis; z at first.",
+                          .choices = {"x", "y", "z"}},
+                         {.name = "offset",
+                          .type = ParameterType::numbers,
+                          .help = "Where the plane crosses that axis; auto is 0, or the domain's middle where 0 lies "
+                                  "outside.",
+                          .valueName = "NUMBER",
+                          .unit = "world units",
+                          .choices = {"auto"},
+                          .counts = {1}},
+                         {.name = "through",
+                          .type = ParameterType::numbers,
+                          .help = "A point of the plane and its normal instead.",
+                          .valueName = "PX,PY,PZ,NX,NY,NZ",
+                          .unit = "world units",
+                          .counts = {6}},
+                         {.name = "zoom",
+                          .type = ParameterType::number,
+                          .help = "How many times larger than with the whole section in the picture.",
+                          .minimum = 0,
+                          .minimumExcluded = true},
+                         targetParameter("The point in the picture's middle, moved into the plane; center is the "
+                                         "section's middle.")},
+          .action = runPlane,
+          .check = checkPlane,
+          .scriptOnly = true};
+}
+
+Command colorCommand() {
+  return {.name = "color",
+          .summary = "Choose what the explorer's colours mean.",
+          .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
+          .parameters = {{.name = "by",
+                          .type = ParameterType::choice,
+                          .help = "As in 'slice' and 'render'. normal is for surfaces, distance for slices.",
+                          .choices = colorNames(),
+                          .positional = true,
+                          .need = Need::always},
+                         {.name = "of",
+                          .type = ParameterType::choice,
+                          .help = "Of which picture; of the one that is shown when left out.",
+                          .choices = {"surface", "slice"}},
+                         {.name = "range",
+                          .type = ParameterType::numbers,
+                          .help = "What the ends of the scale of a jump, slope or error stand for; auto chooses.",
+                          .valueName = "LOW,HIGH",
+                          .choices = {"auto"},
+                          .counts = {2}},
+                         {.name = "scale",
+                          .type = ParameterType::choice,
+                          .help = "How such colours run between them; log at first.",
+                          .choices = {"log", "linear"}}},
+          .action = runColor,
+          .scriptOnly = true};
+}
+
+Command panelCommand() {
+  Command command{.name = "panel",
+                  .summary = "Open or close parts of the explorer's frame.",
+                  .examples = {"panel all=false", "panel build=false worst=true"},
+                  .action = runPanel,
+                  .scriptOnly = true};
+  command.parameters.push_back({.name = "all", .type = ParameterType::flag, .help = "Every part, before the others."});
+  constexpr std::array kHelp = {"The buttons on top.",
+                                "What is shown.",
+                                "Settings of the construction.",
+                                "What the colours mean.",
+                                "Shares of the volume by degree and depth.",
+                                "Figures of the whole field.",
+                                "The worst interfaces between cells.",
+                                "What the pointer is over."};
+  for (std::size_t panel = 0; panel < kPanels; ++panel)
+    command.parameters.push_back({.name = kPanelNames[panel], .type = ParameterType::flag, .help = kHelp[panel]});
+  for (const char* side : {"left", "right"})
+    command.parameters.push_back({.name = fmt::format("{}-scroll", side),
+                                  .type = ParameterType::number,
+                                  .help = fmt::format("How far the {} column is scrolled.", side),
+                                  .unit = "pixels",
+                                  .minimum = 0});
+  return command;
+}
+
+Command settingsCommand() {
+  Command command{.name = "settings",
+                  .summary = "Set how 'rebuild' builds; what is not set is as 'build' has it.",
+                  .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
+                  .parameters = {{.name = "mesh",
+                                  .type = ParameterType::text,
+                                  .help = "Mesh file, builtin:SHAPE or analytic:SHAPE; at first what the current field "
+                                          "was made from.",
+                                  .valueName = "MESH"}},
+                  .action = runSettings,
+                  .scriptOnly = true};
+  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
+  return command;
+}
+
+}  // namespace
+
+void addViewCommands(Registry& registry) {
+  registry.add(showCommand());
+  registry.add(cameraCommand());
+  registry.add(surfaceCommand());
+  registry.add(planeCommand());
+  registry.add(colorCommand());
+  registry.add(panelCommand());
+  registry.add({.name = "worst",
+                .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
+                .examples = {"worst by=gradient page=2"},
+                .parameters = {{.name = "by",
+                                .type = ParameterType::choice,
+                                .help = "Greatest jump of the value, or of the gradient.",
+                                .choices = {"value", "gradient"}},
+                               {.name = "page",
+                                .type = ParameterType::wholeNumber,
+                                .help = "Of eight interfaces each.",
+                                .minimum = 1,
+                                .maximum = 1000}},
+                .action = runWorst,
+                .scriptOnly = true});
+  registry.add({.name = "fly",
+                .summary = "Take a close look at one of the worst interfaces between cells.",
+                .help = "A slice goes through it; a camera looks at it, and what lies before it is cut away.",
+                .examples = {"fly 1"},
+                .parameters = {{.name = "rank",
+                                .type = ParameterType::wholeNumber,
+                                .help = "Its place in the list, 1 for the worst.",
+                                .minimum = 1,
+                                .maximum = 8000,
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runFly,
+                .scriptOnly = true});
+  registry.add({.name = "undo",
+                .summary = "Take back the last change of what the explorer shows.",
+                .examples = {"undo"},
+                .action = runUndo,
+                .scriptOnly = true});
+  registry.add({.name = "redo",
+                .summary = "Do again what 'undo' took back.",
+                .examples = {"redo"},
+                .action = runRedo,
+                .scriptOnly = true});
+  registry.add({.name = "copy-view",
+                .summary = "Write the lines of script that lead the explorer to what it shows.",
+                .help = "To the file, or else to the standard output; in the window to its clipboard too.",
+                .examples = {"copy-view", "copy-view output=view.hps"},
+                .parameters =
+                    {{.name = "output", .type = ParameterType::outputPath, .help = "The script's file.", .alias = 'o'}},
+                .action = runCopyView,
+                .scriptOnly = true});
+  registry.add(settingsCommand());
+  registry.add({.name = "rebuild",
+                .summary = "Build the field anew, as 'settings' says.",
+                .examples = {"rebuild"},
+                .action = runRebuild,
+                .scriptOnly = true});
+  registry.add({.name = "shot",
+                .summary = "Write the explorer's frame: the picture and the panels around it.",
+                .examples = {"shot output=frame.png"},
+                .parameters = {{.name = "output",
+                                .type = ParameterType::outputPath,
+                                .help = "*.png.",
+                                .alias = 'o',
+                                .need = Need::always}},
+                .action = runShot,
+                .scriptOnly = true});
+}
+
+}  // namespace hpsdf::app

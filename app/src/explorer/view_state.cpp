@@ -1,0 +1,103 @@
+#include "explorer/view_state.h"
+
+#include <fmt/format.h>
+
+#include "pictures.h"
+
+namespace hpsdf::app {
+namespace {
+
+// {} of a double is the shortest text that reads as the same number
+std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
+
+std::string planeLine(const ViewState& view) {
+  std::string line = "plane ";
+  if (view.plane)
+    line += fmt::format("through={},{}", textOf(view.plane->point), textOf(view.plane->normal));
+  else
+    line += fmt::format("axis={} offset={}", "xyz"[view.axis],
+                        view.planeOffset ? fmt::format("{}", *view.planeOffset) : "auto");
+  return line + fmt::format(" zoom={} target={}\n", view.zoom, view.sliceTarget ? textOf(*view.sliceTarget) : "center");
+}
+
+std::string cameraLine(const render::OrbitCamera& camera) {
+  return fmt::format("camera {},{},{} target={} up={}\n", camera.azimuthDegrees, camera.elevationDegrees,
+                     camera.distance, camera.target ? textOf(*camera.target) : "center",
+                     camera.up == render::UpAxis::y ? "y" : "z");
+}
+
+std::string surfaceLine(const ViewState& view) {
+  std::string line = fmt::format("surface offset={} clip={}", view.surfaceOffset,
+                                 view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
+  if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
+  return line + "\n";
+}
+
+std::string scaleText(const render::ScaleOptions& scale) {
+  return fmt::format("range={} scale={}",
+                     scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
+                     scale.logarithmic ? "log" : "linear");
+}
+
+std::string backendText(const Backend& backend) {
+  if (backend.cpu) return "cpu=true";
+  return std::string("gl=") + (backend.gl == render::GlChoice::software   ? "software"
+                               : backend.gl == render::GlChoice::hardware ? "hardware"
+                                                                          : "auto");
+}
+
+std::string panelLine(const ViewState& view) {
+  std::string line = "panel";
+  for (std::size_t panel = 0; panel < kPanels; ++panel)
+    line += fmt::format(" {}={}", kPanelNames[panel], view.open[panel]);
+  return line + fmt::format(" left-scroll={} right-scroll={}\n", view.scroll[0], view.scroll[1]);
+}
+
+}  // namespace
+
+render::SlicePicture slicePicture(const ViewState& view, const Field& field) {
+  render::SlicePicture picture;
+  if (view.plane)
+    picture.plane = *view.plane;
+  else
+    picture.plane = render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
+  picture.zoom = view.zoom;
+  picture.target = view.sliceTarget;
+  picture.color = view.sliceColor;
+  picture.scale = view.scale;
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const ViewState& view) {
+  render::SurfacePicture picture;
+  picture.camera = view.camera;
+  picture.offset = view.surfaceOffset;
+  picture.clip = view.clip;
+  picture.color = view.surfaceColor;
+  picture.scale = view.scale;
+  return picture;
+}
+
+std::string scriptOf(const ViewState& view) {
+  return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
+                     view.samples, backendText(view.backend)) +
+         cameraLine(view.camera) + surfaceLine(view) + planeLine(view) +
+         fmt::format("color {} of=surface\ncolor {} of=slice {}\n", colorName(view.surfaceColor),
+                     colorName(view.sliceColor), scaleText(view.scale)) +
+         fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
+                     view.worstPage + 1) +
+         panelLine(view);
+}
+
+std::string scriptWord(const std::string& word) {
+  if (!word.empty() && word.find_first_of(" \t\r;#=$\"\\") == std::string::npos) return word;
+  std::string quoted = "\"";
+  for (const char c : word) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (c == '$') quoted += '$';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+}  // namespace hpsdf::app
