@@ -151,6 +151,13 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "10",
        .minimum = 0,
        .maximum = kMaxDepth},
+      {.name = "max-steps",
+       .type = ParameterType::wholeNumber,
+       .help =
+           "End after so many steps of the refinement, each of which raises one cell's degree or halves it along "
+           "each axis, though the target has not been reached: 0 for the base cells alone. When left out, no limit.",
+       .minimum = 0,
+       .maximum = std::numeric_limits<int>::max()},
       {.name = "domain",
        .type = ParameterType::numbers,
        .help =
@@ -243,6 +250,7 @@ BuildOptions buildOptions(const Arguments& arguments) {
                                               : CoefficientType::automatic;
   }
   options.band = arguments.number("band");
+  if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
   options.threads = arguments.whole("threads");
   return options;
 }

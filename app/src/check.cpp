@@ -14,6 +14,7 @@
 #include "hpsdf/nearest_name.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/render/compare.h"
+#include "output_folder.h"
 
 namespace hpsdf::app {
 namespace {
@@ -304,21 +305,12 @@ std::vector<CheckedItem> strayBaselines(const CheckRequest& request, const std::
   return items;
 }
 
-/// Empties the folder of an earlier check's files, or makes it.
-void prepareOutput(const fs::path& folder) {
-  const fs::path results = folder / kCheckResults;
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw Error(fmt::format("{}: cannot make this folder ({}); name another with --out", folder.string(),
-                            error ? error.message() : "a file of that name exists"));
-  if (!fs::is_empty(folder) && !fs::exists(results))
-    throw Error(
-        fmt::format("{}: holds other things than an earlier check; name another folder with --out", folder.string()));
-  OutputFile marker(results);  // first, so that a check that was broken off is known again
-  marker.write("{}\n");
-  marker.commit();
-  for (const char* old : {"actual", "difference", "wrong", "index.html"}) fs::remove_all(folder / old);
+void prepareOutput(const fs::path& path) {
+  OutputFolder folder(path);
+  folder.requireOwn(kCheckResults);
+  folder.startAnew(kCheckResults, [](const std::string& name) {
+    return name == "actual" || name == "difference" || name == "wrong" || name == "index.html";
+  });
 }
 
 }  // namespace

@@ -9,6 +9,7 @@ Registry makeRegistry() {
   addFieldCommands(registry);
   addJumpsCommand(registry);
   addPictureCommands(registry);
+  addMotionCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);
   addViewCommands(registry);

@@ -10,13 +10,14 @@ Registry makeRegistry();
 void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
 void addJumpsCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render
+void addMotionCommands(Registry& registry);   ///< turntable, frames: after those above, whose parameters they share
 void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
 void addUiCommand(Registry& registry);
 void addCheckCommands(Registry& registry);  ///< check, accept
-void addToolCommands(Registry& registry);   ///< run, set, mesh, shapes, doctor, help
+void addToolCommands(Registry& registry);   ///< run, set, include, mesh, shapes, doctor, help, docs
 
 /// The parameter `field` of commands that look at a field, and what they do with it: load it, or keep the current one.
 Parameter fieldParameter();

@@ -112,10 +112,10 @@ std::string overviewHelp(const Registry& registry) {
       "\n"
       "Commands:\n";
   for (const Command& command : registry.commands())
-    if (!command.scriptOnly) text += fmt::format("  {:<8} {}\n", command.name, command.summary);
+    if (!command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
   text += "\nIn scripts also:\n";
   for (const Command& command : registry.commands())
-    if (command.scriptOnly) text += fmt::format("  {:<8} {}\n", command.name, command.summary);
+    if (command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
   text +=
       "\n'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its options; 'hpsdf --version' tells "
       "the "
@@ -140,7 +140,7 @@ std::string commandHelp(const Command& command) {
 std::string commandsMarkdown(const Registry& registry) {
   std::string text =
       "# Commands\n\n"
-      "Written by `hpsdf help --markdown`, from the registry that the program itself reads. In a script an option\n"
+      "Written by `hpsdf docs`, from the registry that the program itself reads. In a script an option\n"
       "`--name value` is written `name=value` (see [scripts.md](scripts.md)).\n";
   for (const Command& command : registry.commands()) {
     text += fmt::format("\n## {}\n\n{}{}\n\n```\n{}\n```\n\n{}\n", command.name, command.summary,

@@ -83,11 +83,11 @@ void runSlice(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence = session.evidence(picture.color, arguments.textOr("mesh", ""));
+  const render::Evidence evidence =
+      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
-    plane->offset = defaultOffset(field.domain(), plane->axis);
+  picture = slicePicture(arguments, field.domain());
   if (format == SliceFormat::png) {
     session.setPicture(render::drawSlice(renderer, field, picture, evidence));
     savePng(session.picture().image, file);
@@ -107,7 +107,8 @@ void runSlice(Session& session, const Arguments& arguments) {
   report(session, arguments, picture.width, picture.height, renderer);
 }
 
-/// What explains an empty picture, or an open shell.
+}  // namespace
+
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {
   if (!seen)
     console.err << "hpsdf: note: "
@@ -120,6 +121,8 @@ void noteOddSurface(const Console& console, const Field& field, const render::Su
                 << " a field with a larger margin" << std::endl;
 }
 
+namespace {
+
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
@@ -127,7 +130,8 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence = session.evidence(picture.color, arguments.textOr("mesh", ""));
+  const render::Evidence evidence =
+      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
@@ -206,9 +210,10 @@ namespace {
 
 using render::ColorBy;
 constexpr std::pair<std::string_view, ColorBy> kColors[] = {
-    {"normal", ColorBy::normal},     {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
-    {"distance", ColorBy::distance}, {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
-    {"slope", ColorBy::slope},       {"error", ColorBy::error},          {"cell-error", ColorBy::cellError}};
+    {"normal", ColorBy::normal},       {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
+    {"distance", ColorBy::distance},   {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
+    {"slope", ColorBy::slope},         {"error", ColorBy::error},          {"difference", ColorBy::difference},
+    {"cell-error", ColorBy::cellError}};
 
 struct NamedView {
   std::string_view name;
@@ -265,16 +270,28 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
   const ColorBy color = colorNamed(arguments.text("color"));
   for (const char* name : {"range", "scale"})
-    if (arguments.given(name) && !render::isQuantity(color))
+    if (arguments.given(name) && !render::isQuantity(color) &&
+        !(color == ColorBy::distance && name == std::string_view("range")))
       throw Error(
-          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error and "
-                      "cell-error",
+          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error, "
+                      "difference and cell-error",
                       name, arguments.text("color")));
+  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
+    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
   if (arguments.given("mesh") && color != ColorBy::error)
     throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
+  if (arguments.given("other") && color != ColorBy::difference)
+    throw Error(fmt::format("other: is for color difference, not {}", arguments.text("color")));
+  if (!arguments.given("other") && color == ColorBy::difference)
+    throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
     const auto limits = arguments.numbers("range");
     options.limits = {limits[0], limits[1]};
+  }
+  if (arguments.given("levels")) {
+    const auto ends = arguments.numbers("levels");
+    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
+    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
   }
   return options;
 }
@@ -285,14 +302,16 @@ std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCel
        .type = ParameterType::choice,
        .help = ofCells +
                " value-jump and gradient-jump show the greatest jump at a cell's faces, slope how far the gradient's "
-               "length is from 1, error the difference from the exact distance, cell-error what the construction "
+               "length is from 1, error the difference from the exact distance, difference that from another field, "
+               "cell-error what the construction "
                "thinks of a cell's RMS error.",
        .defaultText = standard,
        .choices = colorNames(without)},
       {.name = "range",
        .type = ParameterType::numbers,
-       .help = "Which values the darkest and the lightest colour of a jump, slope or error stand for, so that "
-               "pictures can be compared; when left out, chosen from the values.",
+       .help = "Which values the darkest and the lightest colour of a jump, slope or error stand for, or for which "
+               "distances colours and iso-lines are chosen, so that pictures can be compared; when left out, chosen "
+               "from the values.",
        .valueName = "LOW,HIGH",
        .counts = {2}},
       {.name = "scale",
@@ -300,12 +319,25 @@ std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCel
        .help = "How such colours run between them.",
        .defaultText = "log",
        .choices = {"log", "linear"}},
+      {.name = "levels",
+       .type = ParameterType::numbers,
+       .help = "Degrees or depths that the legend has besides the field's own, so that pictures of several fields can "
+               "be compared.",
+       .valueName = "LOWEST,HIGHEST",
+       .minimum = 0,
+       .maximum = kMaxDegree,
+       .whole = true,
+       .counts = {2}},
       {.name = "mesh",
        .type = ParameterType::text,
        .help = "For color error: what the field was made from. A built-in or analytic shape is known; a mesh file "
                "must be given, unless it was built in the same script.",
        .defaultText = "",
-       .valueName = "MESH"}};
+       .valueName = "MESH"},
+      {.name = "other",
+       .type = ParameterType::path,
+       .help = "For color difference: the field to compare with.",
+       .valueName = "FIELD"}};
 }
 
 }  // namespace
@@ -396,6 +428,13 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
   picture.arrows = arguments.whole("arrows");
+  return picture;
+}
+
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
+  render::SlicePicture picture = slicePicture(arguments);
+  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
+    plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 

@@ -33,13 +33,18 @@ std::string viewName(const render::OrbitCamera& camera);
 /// Of a parameter that takes three numbers and was given.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// Throws `Error` when plane and axis are both given.
+/// Throws `Error` when plane and axis are both given. Its plane is the one asked for, or, in a domain, lies where
+/// nobody said otherwise: at 0, or where the domain does not hold that, in its middle.
 render::SlicePicture slicePicture(const Arguments& arguments);
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
 
 /// Throws `Error` for a camera out of range, or options that exclude or need each other. Its plane is the one asked
 /// for, or, in a domain, lies where nobody said otherwise.
 render::SurfacePicture surfacePicture(const Arguments& arguments);
 render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain);
+
+/// Tells what explains an empty picture, or an open shell.
+void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
 /// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.
 double defaultOffset(const Box& domain, int axis);

@@ -98,6 +98,7 @@ struct Command {
   bool scriptOnly = false;
   bool takesVariables = false;    ///< positional `name=value` words are its own, not options
   bool definesVariables = false;  ///< and define variables for the rest of the script (`assignments`)
+  bool includesScript = false;    ///< the lines of another (`script`) follow in its place
 };
 
 class Registry {

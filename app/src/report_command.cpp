@@ -9,6 +9,7 @@
 #include "hpsdf/field_file.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/render/picture.h"
+#include "output_folder.h"
 #include "pictures.h"
 #include "report_page.h"
 #include "session.h"
@@ -19,43 +20,6 @@ namespace hpsdf::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The report's folder, made when it is not there yet, and removed again when the report fails before `keep`.
-class ReportFolder {
- public:
-  explicit ReportFolder(const fs::path& folder) : path_(folder) {
-    for (fs::path part = fs::absolute(folder).lexically_normal(); !part.empty() && !fs::exists(part);
-         part = part.parent_path())
-      created_.push_back(part);
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (!fs::is_directory(folder))
-      throw Error(fmt::format("{}: cannot make this folder ({}); name another", folder.string(),
-                              error ? error.message() : "a file of that name exists"));
-    try {
-      checkWritable(folder / "index.html");
-    } catch (...) {
-      removeCreated();
-      throw;
-    }
-  }
-  ~ReportFolder() { removeCreated(); }
-  ReportFolder(const ReportFolder&) = delete;
-  ReportFolder& operator=(const ReportFolder&) = delete;
-
-  void keep() { created_.clear(); }
-  const fs::path& path() const { return path_; }
-
- private:
-  /// Innermost first; a folder that is not empty stays.
-  void removeCreated() {
-    std::error_code ignored;
-    for (const fs::path& part : created_) fs::remove(part, ignored);
-  }
-
-  fs::path path_;
-  std::vector<fs::path> created_;
-};
 
 /// "bunny" of bunny.obj, "torus" of builtin:torus,major=0.7: plain characters only, since it goes into commands.
 std::string plainName(const std::string& source) {
@@ -181,7 +145,8 @@ bool isFieldFile(const std::string& source) { return fs::path(source).extension(
 void runReport(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const Backend chosen = backend(arguments);
-  ReportFolder folder(arguments.text("output"));
+  OutputFolder folder(arguments.text("output"));
+  checkWritable(folder.path() / "index.html");
   std::optional<BuiltField> built;
   if (arguments.has("source") && !isFieldFile(arguments.text("source"))) {
     built = buildField(console, arguments.text("source"), arguments);

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #include "failed.h"
 #include "hpsdf/error.h"
@@ -43,7 +45,9 @@ struct Statement {
 /// Splits a script into statements and words.
 class Scanner {
  public:
-  Scanner(std::string_view name, std::string_view text) : name_(name), text_(text) {}
+  /// `includedFrom` ends every message: see `Call`.
+  Scanner(std::string_view name, std::string_view text, std::string_view includedFrom)
+      : name_(name), text_(text), includedFrom_(includedFrom) {}
 
   /// The next statement that has words; an empty one at the end of the text.
   Statement next(const Variables& variables) {
@@ -67,7 +71,7 @@ class Scanner {
   }
 
   [[noreturn]] void fail(int line, int column, const std::string& message) const {
-    throw Error(fmt::format("{}:{}:{}: {}", name_, line, column, message));
+    throw Error(fmt::format("{}:{}:{}: {}{}", name_, line, column, message, includedFrom_));
   }
 
  private:
@@ -158,9 +162,94 @@ class Scanner {
 
   std::string_view name_;
   std::string_view text_;
+  std::string_view includedFrom_;
   std::size_t position_ = 0;
   int line_ = 1;
   int column_ = 1;
+};
+
+/// Reads a script and, in their places, those that it includes.
+class ScriptReader {
+ public:
+  ScriptReader(const Registry& registry, Variables variables) : registry_(registry), variables_(std::move(variables)) {}
+
+  std::vector<Call> read(std::string_view name, std::string_view text) {
+    add(name, text);
+    return std::move(calls_);
+  }
+
+ private:
+  /// A script that is being read, and where it includes the next.
+  struct Open {
+    std::string name;
+    std::string where = {};
+    int line = 0;
+  };
+
+  void add(std::string_view name, std::string_view text) {
+    const std::string includedFrom = includedFromText();
+    open_.push_back({std::string(name)});
+    Scanner scanner(name, text, includedFrom);
+    for (;;) {
+      const Statement statement = scanner.next(variables_);
+      if (statement.words.empty()) break;
+      const std::optional<Included> included = addCall(scanner, statement, includedFrom);
+      if (included) add(included->name, included->text);
+    }
+    open_.pop_back();
+  }
+
+  struct Included {
+    std::string name, text;
+  };
+
+  /// Checks the statement; what it includes, if it does.
+  std::optional<Included> addCall(const Scanner& scanner, const Statement& statement, const std::string& includedFrom) {
+    const Word& verb = statement.words.front();
+    const auto rest = std::span(statement.words).subspan(1);
+    std::optional<Included> included;
+    try {
+      const Command& command = registry_.command(verb.text);
+      Arguments arguments = parseArguments(command, rest, Origin::script);
+      if (command.definesVariables)
+        for (auto& [key, value] : parseVariables(arguments.texts("assignments"))) variables_[key] = value;
+      open_.back().where = fmt::format("{}:{}:{}", open_.back().name, statement.line, verb.column);
+      open_.back().line = statement.line;
+      if (command.includesScript) included = readIncluded(arguments.text("script"));
+      calls_.push_back({&command, std::move(arguments), open_.back().where, includedFrom, open_.front().line});
+    } catch (const ArgumentError& error) {
+      scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what());
+    } catch (const Error& error) {
+      scanner.fail(statement.line, verb.column, error.what());
+    }
+    return included;
+  }
+
+  /// A relative name starts at the folder of the script that includes it.
+  Included readIncluded(const std::string& file) const {
+    const auto path = (std::filesystem::path(open_.back().name).parent_path() / file).lexically_normal();
+    const auto isThat = [&](const Open& other) {
+      std::error_code missing;
+      return std::filesystem::equivalent(path, other.name, missing);
+    };
+    if (std::ranges::any_of(open_, isThat))
+      throw Error(
+          fmt::format("{}: includes itself, directly or by others; take one of the includes out", path.string()));
+    return {path.string(), readTextFile(path.string())};
+  }
+
+  std::string includedFromText() const {
+    if (open_.empty()) return {};
+    std::string text = " (included from ";
+    for (auto from = open_.rbegin(); from != open_.rend(); ++from)
+      text += (from == open_.rbegin() ? "" : ", ") + from->where;
+    return text + ")";
+  }
+
+  const Registry& registry_;
+  Variables variables_;
+  std::vector<Open> open_;  // the script itself first
+  std::vector<Call> calls_;
 };
 
 }  // namespace
@@ -193,26 +282,7 @@ Variables parseVariables(const std::vector<std::string>& words) {
 
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables) {
-  std::vector<Call> calls;
-  Scanner scanner(name, text);
-  for (;;) {
-    const Statement statement = scanner.next(variables);
-    if (statement.words.empty()) return calls;
-    const Word& verb = statement.words.front();
-    const auto rest = std::span(statement.words).subspan(1);
-    try {
-      const Command& command = registry.command(verb.text);
-      Arguments arguments = parseArguments(command, rest, Origin::script);
-      if (command.definesVariables)
-        for (auto& [key, value] : parseVariables(arguments.texts("assignments"))) variables[key] = value;
-      calls.push_back(
-          {&command, std::move(arguments), fmt::format("{}:{}:{}", name, statement.line, verb.column), statement.line});
-    } catch (const ArgumentError& error) {
-      scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what());
-    } catch (const Error& error) {
-      scanner.fail(statement.line, verb.column, error.what());
-    }
-  }
+  return ScriptReader(registry, std::move(variables)).read(name, text);
 }
 
 void runScript(Session& session, std::span<const Call> calls) {
@@ -220,9 +290,9 @@ void runScript(Session& session, std::span<const Call> calls) {
     try {
       perform(*call.command, session, call.arguments);
     } catch (const Failed& error) {
-      throw Failed(call.where + ": " + error.what());
+      throw Failed(call.where + ": " + error.what() + call.includedFrom);
     } catch (const Error& error) {
-      throw Error(call.where + ": " + error.what());
+      throw Error(call.where + ": " + error.what() + call.includedFrom);
     }
   }
 }

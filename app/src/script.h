@@ -17,13 +17,14 @@ using Variables = std::map<std::string, std::string, std::less<>>;
 struct Call {
   const Command* command;
   Arguments arguments;
-  std::string where;  ///< "file:line:column" of the verb
-  int line;
+  std::string where;         ///< "file:line:column" of the verb
+  std::string includedFrom;  ///< " (included from file:line:column, …)", which ends messages; "" in the script itself
+  int line;                  ///< in the script itself: of an included call, that of the `include`
 };
 
 /// Reads and checks a whole script, so that a mistake in the last line shows before the first has run. `name` stands
-/// in messages; `variables` replace $name. The calls refer to the registry's commands.
-/// Throws `Error` "file:line:column: …".
+/// in messages, and is what included files are looked for beside; `variables` replace $name. The calls refer to the
+/// registry's commands. Throws `Error` "file:line:column: …".
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables);
 

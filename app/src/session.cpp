@@ -5,6 +5,7 @@
 #include "building.h"
 #include "explorer/explorer.h"
 #include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
 #include "long_work.h"
 
 namespace hpsdf::app {
@@ -57,10 +58,15 @@ const render::Drawn& Session::picture() const {
   return *picture_;
 }
 
-render::Evidence Session::evidence(render::ColorBy color, const std::string& surface) {
+render::Evidence Session::evidence(render::ColorBy color, const std::string& surface, const std::string& other) {
   render::Evidence evidence;
   if (color == render::ColorBy::valueJump || color == render::ColorBy::gradientJump) evidence.jumps = &jumps();
   if (color == render::ColorBy::error) evidence.exact = &exact(surface);
+  if (color == render::ColorBy::difference) {
+    if (!other_ || otherFile_ != other) other_ = std::make_unique<Field>(load(other));
+    otherFile_ = other;
+    evidence.other = other_.get();
+  }
   return evidence;
 }
 

@@ -63,6 +63,7 @@ class Session {
   int scriptDepth = 0;
 
   void setField(CurrentField field);
+  bool hasField() const { return field_ != nullptr; }
   /// Throws `Error` when there is none, saying how to get one.
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);
@@ -84,8 +85,9 @@ class Session {
   /// Made when first asked for.
   Explorer& explorer();
 
-  /// What pictures with these colours need.
-  render::Evidence evidence(render::ColorBy color, const std::string& surface);
+  /// What pictures with these colours need: for errors the mesh `surface` or what is known, for differences the field
+  /// of the file `other`, read once. Good until it is asked for again.
+  render::Evidence evidence(render::ColorBy color, const std::string& surface, const std::string& other = "");
 
   /// The renderer of the current field: kept, since its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
@@ -99,6 +101,8 @@ class Session {
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
   std::optional<render::Drawn> picture_;
+  std::unique_ptr<Field> other_;  // for differences
+  std::string otherFile_;
   std::shared_ptr<const DistanceFunction> exact_;
   std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
   std::unique_ptr<render::Renderer> renderer_;

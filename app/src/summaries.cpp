@@ -173,6 +173,7 @@ Json fieldJson(const CurrentField& current) {
       {"rms_estimate", metadata.rmsEstimate(field.domain())},
       {"rounding_rms", metadata.roundingRms},
       {"exact_evaluations", metadata.exactEvaluations},
+      {"steps", metadata.steps ? Json(*metadata.steps) : Json()},
       {"domain", boxJson(field.domain())},
       {"grid", field.grid()},
       {"strategy", strategyName(metadata.strategy)},
@@ -234,6 +235,7 @@ std::string fieldText(const CurrentField& current) {
   text += summaryRow("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
   if (field.singlePrecision()) text += summaryRow("change by float", shortNumber(metadata.roundingRms) + " RMS");
   text += summaryRow("exact distances", grouped(metadata.exactEvaluations));
+  if (metadata.steps) text += summaryRow("refinement steps", grouped(*metadata.steps));
   text += summaryRow("settings",
                      fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
                                  strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,

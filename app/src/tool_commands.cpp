@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "help.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/output_file.h"
 #include "hpsdf/shapes.h"
 #include "machine.h"
 #include "pictures.h"
@@ -55,6 +56,10 @@ void runRun(Session& session, const Arguments& arguments) {
 void runSet(Session& session, const Arguments& arguments) {
   if (session.wantsJson(arguments))
     printJson(session.console().out, Json(parseVariables(arguments.texts("assignments"))));
+}
+
+void runInclude(Session& session, const Arguments& arguments) {
+  if (session.wantsJson(arguments)) printJson(session.console().out, {{"included", arguments.text("script")}});
 }
 
 void runMesh(Session& session, const Arguments& arguments) {
@@ -139,13 +144,26 @@ void runDoctor(Session& session, const Arguments& arguments) {
 void runHelp(Session& session, const Arguments& arguments) {
   std::ostream& out = session.console().out;
   const Registry& registry = session.registry();
-  if (arguments.flag("markdown"))
-    out << commandsMarkdown(registry);
-  else if (session.wantsJson(arguments))
-    printJson(out, commandsJson(registry));
-  else
-    out << (arguments.has("command") ? commandHelp(registry.command(arguments.text("command")))
-                                     : overviewHelp(registry));
+  if (session.wantsJson(arguments)) return printJson(out, commandsJson(registry));
+  out << (arguments.has("command") ? commandHelp(registry.command(arguments.text("command"))) : overviewHelp(registry));
+}
+
+void runDocs(Session& session, const Arguments& arguments) {
+  std::ostream& out = session.console().out;
+  const std::string page = commandsMarkdown(session.registry());
+  const bool json = session.wantsJson(arguments);
+  if (!arguments.has("output")) {
+    if (json) return printJson(out, {{"output", Json()}, {"page", page}});
+    out << page;
+    return;
+  }
+  const std::string file = arguments.text("output");
+  OutputFile written(file);
+  written.write(page);
+  written.commit();
+  const std::size_t count = session.registry().commands().size();
+  if (json) return printJson(out, {{"output", file}, {"commands", count}});
+  out << fmt::format("{}: {} commands\n", file, count);
 }
 
 Command runCommand() {
@@ -226,20 +244,41 @@ void addToolCommands(Registry& registry) {
                 .scriptOnly = true,
                 .takesVariables = true,
                 .definesVariables = true});
+  registry.add({.name = "include",
+                .summary = "The lines of another script, as if they stood here.",
+                .help = "They see the variables of the lines above, and what they set holds for the lines below. The "
+                        "file is read and checked with the script, before anything runs. A relative name starts at the "
+                        "folder of the script that includes it.",
+                .examples = {"include settings.hps"},
+                .parameters = {{.name = "script",
+                                .type = ParameterType::path,
+                                .help = "The script's file.",
+                                .valueName = "SCRIPT",
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runInclude,
+                .scriptOnly = true,
+                .includesScript = true});
   registry.add({.name = "help",
                 .summary = "Explain the program or a command.",
-                .help = "Without a command, an overview. --markdown writes docs/commands.md.",
+                .help = "Without a command, an overview.",
                 .examples = {"hpsdf help", "hpsdf help build"},
                 .parameters = {{.name = "command",
                                 .type = ParameterType::text,
                                 .help = "The command to explain.",
                                 .valueName = "COMMAND",
-                                .positional = true},
-                               {.name = "markdown",
-                                .type = ParameterType::flag,
-                                .help = "All commands, as a Markdown page.",
-                                .defaultText = "false"}},
+                                .positional = true}},
                 .action = runHelp});
+  registry.add({.name = "docs",
+                .summary = "Write the reference of all commands, a Markdown page.",
+                .help = "docs/commands.md is that page: commands, parameters, ranges and defaults as this program has "
+                        "them.",
+                .examples = {"hpsdf docs -o docs/commands.md"},
+                .parameters = {{.name = "output",
+                                .type = ParameterType::outputPath,
+                                .help = "File to write; standard output when left out.",
+                                .alias = 'o'}},
+                .action = runDocs});
 }
 
 }  // namespace hpsdf::app

@@ -136,7 +136,7 @@ std::string describeBytes(std::size_t bytes) {
   return text;
 }
 
-DistanceScale scaleOf(const ViewBuffers& buffers) {
+DistanceScale scaleOf(const ViewBuffers& buffers, const ScaleOptions& options) {
   double minimum = 0, maximum = 0;
   bool any = false;
   for (std::size_t i = 0; i < buffers.value.size(); ++i) {
@@ -145,14 +145,23 @@ DistanceScale scaleOf(const ViewBuffers& buffers) {
     maximum = any ? std::max<double>(maximum, buffers.value[i]) : buffers.value[i];
     any = true;
   }
-  return distanceScale(minimum, maximum);
+  if (!options.limits) return distanceScale(minimum, maximum);
+  const auto [low, high] = *options.limits;
+  if (!(low <= high) || !std::isfinite(low) || !std::isfinite(high))
+    throw Error("range: expected LOW,HIGH with LOW below HIGH");
+  DistanceScale scale = distanceScale(low, high);
+  scale.minimum = minimum;
+  scale.maximum = maximum;
+  return scale;
 }
 
-// Legend of degrees or depths; gives the colours that belong to it.
-LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatistics& figures, bool degree) {
+// Legend of degrees or depths, those of the field and `others`; gives the colours that belong to it.
+LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatistics& figures, bool degree,
+                   const std::vector<int>& others) {
   static const std::string degreeTitles[] = {"polynomial degree", "degree"};
   static const std::string depthTitles[] = {"octree depth", "depth"};
-  const auto& shares = degree ? figures.degreeVolume : figures.depthVolume;
+  std::map<int, double> shares = degree ? figures.degreeVolume : figures.depthVolume;
+  for (const int level : others) shares.try_emplace(level, 0.0);
   LevelMap map(levelsOf(shares));
   addLevelLegend(furniture, frame, degree ? degreeTitles : depthTitles, shares, map);
   return map;
@@ -160,8 +169,11 @@ LevelMap addLevels(Furniture& furniture, const Frame& frame, const FieldStatisti
 
 Legend levelLegend(const FieldStatistics& figures, bool degree, const LevelMap& map) {
   Legend legend{.title = degree ? "polynomial degree" : "octree depth"};
-  for (const auto& [level, share] : degree ? figures.degreeVolume : figures.depthVolume)
-    legend.levels.push_back({level, encodeSrgb(map(level)), share});
+  const auto& shares = degree ? figures.degreeVolume : figures.depthVolume;
+  for (const int level : map.levels()) {
+    const auto share = shares.find(level);
+    legend.levels.push_back({level, encodeSrgb(map(level)), share == shares.end() ? 0 : share->second});
+  }
   return legend;
 }
 
@@ -180,7 +192,7 @@ Legend distanceLegend(const DistanceScale& scale) {
 }
 
 Legend scaleLegend(const std::string& title, const ColorScale& scale) {
-  Legend legend{.title = title, .bar = barOf(orderedColor), .limits = std::array{scale.low(), scale.high()}};
+  Legend legend{.title = title, .bar = barOf(orderedColor)};
   for (const double value : scaleMarks(scale)) legend.marks.push_back({scale.place(value), formatNumber(value, 3)});
   return legend;
 }
@@ -191,6 +203,7 @@ std::span<const std::string> titlesOf(ColorBy quantity) {
   static const std::string gradientJump[] = {"worst jump of the gradient", "jump of gradient", "gradient jump"};
   static const std::string slope[] = {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"};
   static const std::string error[] = {"error |f − exact|", "error"};
+  static const std::string difference[] = {"difference |f − other|", "difference"};
   static const std::string cellError[] = {"estimated cell error", "cell error"};
   switch (quantity) {
     case ColorBy::valueJump:
@@ -201,6 +214,8 @@ std::span<const std::string> titlesOf(ColorBy quantity) {
       return slope;
     case ColorBy::error:
       return error;
+    case ColorBy::difference:
+      return difference;
     default:
       return cellError;
   }
@@ -340,8 +355,10 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   Image image(picture.width, picture.height, paperColor());
   Legend legend;
   std::vector<std::string> details;
+  ScaleOptions drawn = picture.scale;
   if (picture.color == ColorBy::distance) {
-    const DistanceScale scale = scaleOf(buffers);
+    const DistanceScale scale = scaleOf(buffers, picture.scale);
+    if (!drawn.limits) drawn.limits = {scale.minimum, scale.maximum};
     addDistanceBar(furniture, frame, scale);
     legend = distanceLegend(scale);
     place(image, colorDistanceSlice(buffers, scale, sampling));
@@ -351,13 +368,15 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   } else if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    drawn.limits = {measured.scale.low(), measured.scale.high()};
     legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     place(image, colorCellSlice(buffers, quantityColors(measured.values, measured.scale), sampling));
     details = {titlesOf(picture.color).back(), describePlane("slice", picture.plane),
                describeGreatest(measured.values)};
   } else {
     const bool degree = picture.color == ColorBy::degree;
-    const LevelMap map = addLevels(furniture, frame, figures, degree);
+    const LevelMap map = addLevels(furniture, frame, figures, degree, picture.scale.levels);
+    drawn.levels = map.levels();
     legend = levelLegend(figures, degree, map);
     place(image, colorCellSlice(buffers, levelColors(buffers, map, picture.color), sampling));
     details = {degree ? "degree" : "depth", describePlane("slice", picture.plane)};
@@ -368,7 +387,8 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
-  return {std::move(image), view, std::move(buffers), samples, !section.empty(), std::move(legend), std::move(details)};
+  return {std::move(image), view, std::move(buffers), samples, !section.empty(), std::move(legend), std::move(details),
+          std::move(drawn)};
 }
 
 namespace {
@@ -429,9 +449,11 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
   const std::string onSurface = picture.surface ? " on the " + surface : "";
   std::vector<std::string> details;
+  ScaleOptions drawn = picture.scale;
   if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
+    drawn.limits = {measured.scale.low(), measured.scale.high()};
     legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     colorScene(quantityColors(measured.values, measured.scale));
     details = {titlesOf(picture.color).back() + onSurface, describeGreatest(measured.values)};
@@ -441,7 +463,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     if (picture.surface) details = {surface};
   } else {
     const bool degree = picture.color == ColorBy::degree;
-    const LevelMap map = addLevels(furniture, frame, figures, degree);
+    const LevelMap map = addLevels(furniture, frame, figures, degree, picture.scale.levels);
+    drawn.levels = map.levels();
     legend = levelLegend(figures, degree, map);
     colorScene(levelColors(buffers, map, picture.color));
     details = {(degree ? "degree" : "depth") + onSurface};
@@ -464,7 +487,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
   const bool seen = scene.seen();
-  return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), std::move(details)};
+  return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), std::move(details),
+          std::move(drawn)};
 }
 
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,

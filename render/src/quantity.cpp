@@ -22,10 +22,13 @@ void measure(const Field& field, ColorBy quantity, const Evidence& evidence, std
     for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(results[i].gradient.norm() - 1);
     return;
   }
-  std::vector<double> exact(points.size());
+  std::vector<double> reference(points.size());
   field.values(points, out);
-  (*evidence.exact)(points, exact);
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - exact[i]);
+  if (quantity == ColorBy::difference)
+    evidence.other->values(points, reference);
+  else
+    (*evidence.exact)(points, reference);
+  for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - reference[i]);
 }
 
 /// A value and how much it counts.
@@ -71,6 +74,8 @@ void requireEvidence(ColorBy color, const Evidence& evidence) {
   if ((color == ColorBy::valueJump || color == ColorBy::gradientJump) && evidence.jumps == nullptr)
     throw Error("colours of jumps need the field's jumps");
   if (color == ColorBy::error && evidence.exact == nullptr) throw Error("colours of the error need the exact distance");
+  if (color == ColorBy::difference && evidence.other == nullptr)
+    throw Error("colours of the difference need another field");
 }
 
 std::vector<double> quantityOfCells(const Field& field, ColorBy quantity, const Evidence& evidence) {

@@ -235,6 +235,17 @@ TEST_F(Check, negativeControlsMustFailAsStated) {
   EXPECT_THAT(check().out, HasSubstr("looks.hps:3:23: slice: unknown option 'colour'")) << "the column in the file";
 }
 
+TEST_F(Check, controlsOfIncludedScriptsAreComments) {
+  script("# a comment\nset axis=z\n" + kBuild + "include parts/look.hps\n# wrong pixels: include parts/wrong.hps\n");
+  writeFile(pictures_ / "scripts/parts/look.hps",
+            kLook + "output=$out/a.png axis=$axis\n\n\n\n# wrong nonsense\n" + kLook + "output=$out/b.png\n");
+  writeFile(pictures_ / "scripts/parts/wrong.hps", "set color=distance\n" + kLook +
+                                                       "color=$color output=$wrong/a.png\n" + kLook +
+                                                       "color=$color output=$wrong/b.png\n");
+  take({"looks/a.png", "looks/b.png"});
+  EXPECT_THAT(results(), ElementsAre("looks/a.png: ok", "looks/b.png: ok", "looks/a.png!: ok", "looks/b.png!: ok"));
+}
+
 TEST_F(Check, acceptTakesWhatIsNamedAndNothingElse) {
   script(kBuild + kLook + "output=$out/a.png\n" + kLook + "output=$out/b.png\n");
   EXPECT_EQ(check().status, 1);

@@ -283,6 +283,18 @@ TEST_F(Cli, helpAndVersion) {
   EXPECT_THAT(run({{"--version"}}).out, testing::MatchesRegex("hpsdf [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
+TEST_F(Cli, theReferenceIsWrittenWholeOrNotAtAll) {
+  const Outcome shown = run({{"docs"}});
+  EXPECT_EQ(shown.status, 0);
+  EXPECT_THAT(shown.out, StartsWith("# Commands\n"));
+  EXPECT_THAT(shown.out, HasSubstr("\n## docs\n"));
+  const Outcome written = run({{"docs", "-o", at("commands.md")}});
+  EXPECT_EQ(written.status, 0) << written.err;
+  EXPECT_EQ(readFile(at("commands.md")), shown.out);
+  EXPECT_EQ(Json::parse(run({{"docs", "--json"}}).out).at("page"), shown.out);
+  expectRefused({{"docs", "-o", at("none/commands.md")}}, "none/commands.md");
+}
+
 TEST_F(Cli, usageMistakesAreRefused) {
   expectRefused({{}}, "expected a command");
   expectRefused({{"bild"}}, "unknown command 'bild'; did you mean 'build'?");
@@ -362,6 +374,7 @@ TEST_F(Cli, infoTellsWhatTheFieldHolds) {
   EXPECT_EQ(json.at("target_error"), 1e-4);
   EXPECT_EQ(json.at("rms_estimate"), torus.metadata().rmsEstimate(torus.domain()));
   EXPECT_EQ(json.at("exact_evaluations"), torus.metadata().exactEvaluations);
+  EXPECT_EQ(json.at("steps"), torus.metadata().steps.value());
   EXPECT_EQ(json.at("mesh").at("faces"), torus.metadata().source.faces);
   EXPECT_EQ(std::stoull(json.at("mesh").at("fingerprint").get<std::string>(), nullptr, 16),
             torus.metadata().source.fingerprint);
@@ -685,6 +698,37 @@ TEST_F(Cli, quantitiesColourSlicesAndSurfaces) {
   EXPECT_THAT(other.err, HasSubstr("not what the field was made from"));
 }
 
+TEST_F(Cli, twoFieldsAreCompared) {
+  for (const auto& [name, radius] : {std::pair("small", "0.5"), std::pair("large", "0.6")})
+    ASSERT_EQ(run({{"build", std::string("analytic:sphere,radius=") + radius, "-o", at(name), "--domain",
+                    "-1,-1,-1,1,1,1", "--target-error", "1e-6"}})
+                  .status,
+              0);
+  const auto differences = [&](const std::string& other) {
+    EXPECT_EQ(run({{"slice", at("small"), "-o", at("d.pfm"), "--color", "difference", "--other", at(other), "--cpu",
+                    "--size", "16x16"}})
+                  .status,
+              0);
+    std::vector<float> values(256);
+    const std::string pfm = readFile(at("d.pfm"));
+    std::memcpy(values.data(), pfm.data() + pfm.size() - sizeof(float) * 256, sizeof(float) * 256);
+    return values;
+  };
+  EXPECT_THAT(differences("small"), testing::Each(0.0F));
+  // but near the centre, which no polynomial follows
+  std::vector<float> sorted = differences("large");
+  std::ranges::sort(sorted);
+  EXPECT_NEAR(sorted[128], 0.1, 1e-3);
+  EXPECT_EQ(run({{"render", at("small"), "-o", at("r.png"), "--color", "difference", "--other", at("large"), "--cpu",
+                  "--size", "100x80"}})
+                .status,
+            0);
+  expectRefused({{"slice", at("small"), "-o", at("x.png"), "--color", "difference"}}, "needs other");
+  expectRefused({{"slice", at("small"), "-o", at("x.png"), "--other", at("large")}}, "is for color difference");
+  expectRefused({{"slice", at("small"), "-o", at("x.png"), "--color", "difference", "--other", at("none")}},
+                "none: no such file");
+}
+
 TEST_F(Cli, viewsAreNamedOrAimed) {
   const auto surface = [&](const std::vector<std::string>& words) {
     std::vector<std::string> all = {"render", field(), "-o", at("v.png"), "--cpu", "--size", "120x90"};
@@ -743,6 +787,127 @@ TEST_F(Cli, errorsNeedTheMeshUnlessItWasBuiltJustNow) {
                 .status,
             0);
   EXPECT_EQ(readFile(at("a.png")), readFile(at("s.png")));
+}
+
+// Films
+
+TEST_F(Cli, aTurntableIsRenderFromAllAround) {
+  const std::vector<std::string> look = {"--size", "120x90", "--cpu", "--color", "degree"};
+  const auto with = [&](std::vector<std::string> words) {
+    words.insert(words.end(), look.begin(), look.end());
+    return run({words});
+  };
+  const Outcome turned = with({"turntable", field(), "-o", at("turn"), "--frames", "4", "--camera=-20,15,1.2"});
+  ASSERT_EQ(turned.status, 0) << turned.err;
+  EXPECT_THAT(turned.out, HasSubstr("turn: 4 frames, 120x90"));
+  EXPECT_THAT(namesIn(at("turn")),
+              ElementsAre("frame-0000.png", "frame-0001.png", "frame-0002.png", "frame-0003.png", "frames.json"));
+  for (int frame = 0; frame < 4; ++frame) {
+    const std::string camera = std::to_string(-20 + 90 * frame) + ",15,1.2";
+    ASSERT_EQ(with({"render", field(), "-o", at("one.png"), "--camera=" + camera}).status, 0);
+    EXPECT_TRUE(readFile(at("turn/frame-000" + std::to_string(frame) + ".png")) == readFile(at("one.png"))) << camera;
+  }
+
+  // a shorter one in its place leaves no frame of the longer
+  const Outcome again = with({"turntable", field(), "-o", at("turn"), "--frames", "2", "--view", "left", "--json"});
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_THAT(namesIn(at("turn")), ElementsAre("frame-0000.png", "frame-0001.png", "frames.json"));
+  const Json json = Json::parse(again.out);
+  EXPECT_EQ(json, Json::parse(readFile(at("turn/frames.json"))));
+  EXPECT_EQ(json.at("frames")[1], (Json{{"file", "frame-0001.png"}, {"azimuth", 90}}));
+
+  fs::create_directory(at("mine"));
+  writeFile(at("mine/frame-0000.png"), "years of work");
+  expectRefused({{"turntable", field(), "-o", at("mine"), "--frames", "2"}}, "holds other things");
+  EXPECT_EQ(readFile(at("mine/frame-0000.png")), "years of work");
+  expectRefused({{"turntable", field(), "-o", at("x.gif"), "--frames", "2"}}, "a name that ends in .mp4");
+  expectRefused({{"turntable", field(), "-o", at("mine/frame-0000.png/x")}}, "cannot make this folder");
+  expectRefused({{"turntable", field(), "-o", at("x"), "--camera", "0,99,1"}}, "elevation");
+  expectRefused({{"turntable", at("none.hpsdf"), "-o", at("new/x")}}, "no such file");
+}
+
+TEST_F(Cli, framesShowTheRefinement) {
+  const std::string tau = "1e-4";
+  const auto frames = [&](const std::string& output, const std::string& look) {
+    return run({{"frames", "builtin:torus", "--target-error", tau, "-o", at(output), "--frames", "5", "--of",
+                 look + " size=160x120 cpu=true", "--json"}});
+  };
+  const Outcome drawn = frames("f", "slice color=degree");
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_EQ(namesIn(at("f")).size(), 6u);
+  const Json rows = Json::parse(drawn.out).at("frames");
+  ASSERT_EQ(rows.size(), 5u);
+  EXPECT_EQ(rows[0].at("steps"), 0);
+  EXPECT_EQ(rows[1].at("steps"), 1);
+  const Field finished = load(field());
+  EXPECT_EQ(rows[4].at("steps"), finished.metadata().steps.value());
+  EXPECT_EQ(rows[4].at("leaves"), statistics(finished).leaves);
+
+  const auto fieldAfter = [&](std::size_t frame) {
+    EXPECT_EQ(run({{"build", "builtin:torus", "--target-error", tau, "-o", at("s.hpsdf"), "--max-steps",
+                    rows[frame].at("steps").dump()}})
+                  .status,
+              0);
+    return load(at("s.hpsdf"));
+  };
+  const auto levels = statistics(finished).degreeLeaves;
+  const std::string range = "2," + std::to_string(levels.rbegin()->first);
+  for (std::size_t frame = 0; frame < 5; ++frame) {
+    EXPECT_EQ(statistics(fieldAfter(frame)).leaves, rows[frame].at("leaves"));
+    ASSERT_EQ(
+        run({{"slice", at("s.hpsdf"), "-o", at("s.png"), "--size", "160x120", "--cpu", "--levels", range}}).status, 0);
+    EXPECT_TRUE(readFile(at("f/frame-000" + std::to_string(frame) + ".png")) == readFile(at("s.png"))) << frame;
+  }
+
+  // the last frame's own scale, and it holds for the first
+  ASSERT_EQ(frames("d", "slice color=distance axis=x").status, 0);
+  ASSERT_EQ(
+      run({{"slice", field(), "-o", at("s.png"), "--size", "160x120", "--cpu", "--color", "distance", "--axis", "x"}})
+          .status,
+      0);
+  EXPECT_TRUE(readFile(at("d/frame-0004.png")) == readFile(at("s.png")));
+  ASSERT_EQ(frames("e", "render color=error").status, 0);
+  ASSERT_EQ(run({{"render", field(), "-o", at("s.png"), "--size", "160x120", "--cpu", "--color", "error"}}).status, 0);
+  EXPECT_TRUE(readFile(at("e/frame-0004.png")) == readFile(at("s.png")));
+
+  // one for each step where there are fewer
+  const Outcome few = run({{"frames", "builtin:torus", "--max-steps", "2", "-o", at("few"), "--of", "slice cpu=true"}});
+  EXPECT_THAT(few.out, HasSubstr("few: 3 frames"));
+
+  expectRefused({{"frames", "builtin:torus", "-o", at("x"), "--of", "slice colour=depth"}},
+                "of:1:7: slice: unknown option 'colour'");
+  expectRefused({{"frames", "builtin:torus", "-o", at("x"), "--of", "slice output=a.png"}}, "unknown option 'output'");
+  expectRefused({{"frames", "builtin:torus", "-o", at("x"), "--of", "info"}}, "of:1:1: unknown command 'info'");
+  expectRefused({{"frames", "builtin:torus", "-o", at("x"), "--of", "slice; slice"}}, "expected one command");
+  expectRefused({{"frames", "builtin:torus", "-o", at("x"), "--of", "slice axis=x plane=0,0,0,0,0,1"}}, "plane");
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--levels", "3,2"}}, "levels");
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--color", "slope", "--levels", "2,3"}}, "levels");
+}
+
+TEST_F(Cli, filmsNeedFfmpegAndLeaveNothingElse) {
+  fs::create_directory(at("tmp"));
+  fs::create_directory(at("bin"));
+  const auto film = [&](const std::string& path) {
+    return Call{.words = {"turntable", field(), "-o", at("film.mp4"), "--frames", "3", "--size", "61x40", "--cpu"},
+                .environment = {{"PATH", path}, {"TMPDIR", at("tmp")}}};
+  };
+  const auto ffmpeg = [&](const std::string& lines) {
+    writeFile(at("bin/ffmpeg"), "#!/bin/sh\n" + lines);
+    fs::permissions(at("bin/ffmpeg"), fs::perms::owner_all);
+  };
+  expectRefused(film(at("none")), "takes the program ffmpeg, which PATH does not have; install it, or give a folder");
+  ffmpeg("echo first >&2; echo 'no such codec' >&2; exit 3\n");
+  expectRefused(film(at("bin")), "ffmpeg failed with status 3 (no such codec)");
+  EXPECT_THAT(namesIn(at("tmp")), IsEmpty());
+
+  ffmpeg("echo frame-*.png \"$@\" > film.mp4\n");
+  const Outcome made = run(film(at("none") + ":" + at("bin")));
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_THAT(readFile(at("film.mp4")), StartsWith("frame-0000.png frame-0001.png frame-0002.png "));
+  EXPECT_THAT(readFile(at("film.mp4")), HasSubstr("-framerate 12 "));
+  EXPECT_THAT(namesIn(at("tmp")), IsEmpty());
+  expectRefused({.words = {"turntable", field(), "-o", at("none/film.mp4")}, .environment = {{"PATH", at("bin")}}},
+                "none/film.mp4");
 }
 
 TEST_F(Cli, viewsThatShowLittleAreNoted) {
@@ -807,6 +972,22 @@ TEST_F(Cli, scriptsRunScripts) {
   EXPECT_THAT(namesIn(folder_.path()), ElementsAre("inner.hps", "one.png", "outer.hps", "two.png"));
   writeFile(at("loop.hps"), "run loop.hps\n");
   expectRefused({.words = {"run", "loop.hps"}, .folder = folder_.path()}, "does one run itself?");
+}
+
+TEST_F(Cli, scriptsIncludeScripts) {
+  fs::create_directory(at("parts"));
+  writeFile(at("parts/settings.hps"), "set size=64x64 name=one\n");
+  writeFile(at("a.hps"),
+            "include parts/settings.hps\nload \"$field\"\nslice size=$size cpu=true output=\"$to/$name.png\"\n");
+  const std::vector<std::string> words = {"run", at("a.hps"), "field=" + field(), "to=" + folder_.path().string()};
+  const Outcome outcome = run({.words = words, .folder = "/"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(render::loadPng(at("one.png")).width, 64);
+  writeFile(at("parts/settings.hps"), "set size=64x64 name=two\ninclude ../a.hps");
+  expectRefused({.words = words, .folder = "/"}, "settings.hps:2:1: ");
+  expectRefused({.words = words, .folder = "/"}, "includes itself");
+  writeFile(at("b.hps"), "include none.hps");
+  expectRefused({{"run", at("b.hps")}}, "b.hps:1:1: " + at("none.hps") + ": no such file");
 }
 
 TEST_F(Cli, expectationsHoldOrEndTheScript) {
@@ -992,7 +1173,7 @@ TEST_F(Cli, badFieldFilesAreRefused) {
     expectRefused({{"slice", at(name), "-o", at("s.png"), "--cpu"}}, name, before);
     expectRefused({{"query", at(name), "-o", at("q.csv")}, "0 0 0\n"}, name, before);
   }
-  expectRefused({{"info", at("newer.hpsdf")}}, "version 2", before);
+  expectRefused({{"info", at("newer.hpsdf")}}, "version 3", before);
   expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
 }
 
@@ -1026,7 +1207,10 @@ TEST_F(Cli, aReaderThatWentAwayIsAnError) {
 TEST_F(Cli, interruptStopsTheConstruction) {
   for (const auto& words :
        {std::vector<std::string>{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"},
-        std::vector<std::string>{"report", "builtin:gear", "-o", at("report"), "--target-error", "1e-12"}}) {
+        std::vector<std::string>{"report", "builtin:gear", "-o", at("report"), "--target-error", "1e-12"},
+        std::vector<std::string>{"frames", "builtin:gear", "-o", at("frames"), "--target-error", "1e-12"},
+        std::vector<std::string>{"turntable", field(), "-o", at("turn"), "--frames", "9999", "--size", "160x120",
+                                 "--cpu"}}) {
     Process process({words});
     process.waitForErrorLine();
     const auto start = Clock::now();

@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "hpsdf/error.h"
 #include "session.h"
+#include "support/temporary_directory.h"
 
 namespace hpsdf::app {
 namespace {
@@ -38,21 +41,33 @@ class ScriptTest : public testing::Test {
          .action = [](Session&, const Arguments&) {},
          .takesVariables = true,
          .definesVariables = true});
+    registry_.add({.name = "include",
+                   .parameters = {{.name = "script", .positional = true, .need = Need::always}},
+                   .action = [](Session&, const Arguments&) {},
+                   .includesScript = true});
   }
 
   std::vector<std::string> run(const std::string& text, const Variables& variables = {}) {
+    return runNamed("test.hps", text, variables);
+  }
+
+  std::vector<std::string> runNamed(const std::string& name, const std::string& text, const Variables& variables = {}) {
     said_.clear();
     std::istringstream in;
     std::ostringstream out;
     std::ostringstream err;
     Session session(registry_, {in, out, err});
-    runScript(session, parseScript(registry_, "test.hps", text, variables));
+    runScript(session, parseScript(registry_, name, text, variables));
     return said_;
   }
 
   std::string complaint(const std::string& text, const Variables& variables = {}) {
+    return complaintNamed("test.hps", text, variables);
+  }
+
+  std::string complaintNamed(const std::string& name, const std::string& text, const Variables& variables = {}) {
     try {
-      run(text, variables);
+      runNamed(name, text, variables);
     } catch (const Error& error) {
       return error.what();
     }
@@ -124,6 +139,70 @@ TEST_F(ScriptTest, isCheckedWholeBeforeAnythingRuns) {
 TEST_F(ScriptTest, stopsAtTheFirstCommandThatFails) {
   EXPECT_EQ(complaint("say a\n fail\nsay b"), "test.hps:2:2: it failed");
   EXPECT_THAT(said_, ElementsAre("[a]"));
+}
+
+/// Scripts in a folder that is not the current one.
+class IncludeTest : public ScriptTest {
+ protected:
+  std::string at(const std::string& name) const { return (folder_ / name).string(); }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    std::ofstream(folder_ / name) << text;
+  }
+
+  support::TemporaryDirectory folder_;
+};
+
+TEST_F(IncludeTest, putsTheLinesOfAnotherScriptInItsPlace) {
+  write("b.hps", "say b $n\nset n=2 m=3");  // no newline at its end
+  EXPECT_THAT(runNamed(at("a.hps"), "say a\nset n=1\ninclude b.hps; say c $n $m\ninclude b.hps"),
+              ElementsAre("[a]", "[b][1]", "[c][2][3]", "[b][2]"));
+  write("empty.hps", "# nothing\n");
+  EXPECT_THAT(runNamed(at("a.hps"), "include empty.hps"), ElementsAre());
+}
+
+TEST_F(IncludeTest, looksBesideTheScriptThatIncludes) {
+  write("parts/b.hps", "include c.hps");
+  write("parts/c.hps", "say c");
+  EXPECT_THAT(runNamed(at("a.hps"), "include parts/b.hps"), ElementsAre("[c]"));
+  EXPECT_THAT(run("include " + at("parts/b.hps")), ElementsAre("[c]"));
+}
+
+TEST_F(IncludeTest, mistakesNameTheIncludedFileAndWhoIncludedIt) {
+  write("b.hps", "say b\n  sya b");
+  write("c.hps", "\ninclude b.hps");
+  write("fails.hps", "say b\nfail");
+  EXPECT_EQ(complaintNamed(at("a.hps"), "say a\n include b.hps"),
+            at("b.hps") + ":2:3: unknown command 'sya'; did you mean 'say'? (included from " + at("a.hps") + ":2:2)");
+  EXPECT_THAT(said_, ElementsAre()) << "all is checked before anything runs";
+  EXPECT_THAT(complaintNamed(at("a.hps"), "include c.hps"),
+              HasSubstr("(included from " + at("c.hps") + ":2:1, " + at("a.hps") + ":1:1)"));
+  EXPECT_EQ(complaintNamed(at("a.hps"), "say a\ninclude fails.hps"),
+            at("fails.hps") + ":2:1: it failed (included from " + at("a.hps") + ":2:1)");
+  EXPECT_THAT(said_, ElementsAre("[a]", "[b]"));
+  EXPECT_EQ(complaintNamed(at("a.hps"), "say a\n\n  include none.hps"),
+            at("a.hps") + ":3:3: " + at("none.hps") + ": no such file; check the name");
+  EXPECT_THAT(said_, ElementsAre());
+  EXPECT_EQ(complaintNamed(at("a.hps"), "include fails.hps\nsya"),
+            at("a.hps") + ":2:1: unknown command 'sya'; did you mean 'say'?");
+}
+
+TEST_F(IncludeTest, scriptsThatIncludeThemselvesAreRefused) {
+  write("self.hps", "say a\n include self.hps");
+  write("one.hps", "include two.hps");
+  write("two.hps", "include ../" + folder_.path().filename().string() + "/one.hps");
+  EXPECT_THAT(complaintNamed(at("a.hps"), "include self.hps"),
+              HasSubstr("self.hps:2:2: " + at("self.hps") + ": includes itself"));
+  EXPECT_THAT(complaintNamed(at("one.hps"), "include two.hps"), HasSubstr("two.hps:1:1: "));
+}
+
+TEST_F(IncludeTest, includedCallsBelongToTheLineOfTheInclude) {
+  write("b.hps", "say 1\nsay 2\n");
+  const auto calls = parseScript(registry_, at("a.hps"), "say a\n\ninclude b.hps\nsay c", {});
+  std::vector<int> lines;
+  for (const Call& call : calls) lines.push_back(call.line);
+  EXPECT_THAT(lines, ElementsAre(1, 3, 3, 3, 4));
 }
 
 TEST(Variables, haveAFixedForm) {

@@ -8,8 +8,10 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
@@ -74,10 +76,9 @@ TEST(Build, CountsOfAKnownBox) {
   };
   BuildOptions paper = paperOptions();
   paper.targetError = 1e-6;
-  for (const Known& known :
-       {Known{{.targetError = 1e-6}, 24548, 284088, 1629360},
-        Known{{.targetError = 1e-6, .cubature = CubatureKind::product}, 23813, 280978, 2946560},
-        Known{paper, 16456, 207568, 6772552}}) {
+  for (const Known& known : {Known{{.targetError = 1e-6}, 24548, 284088, 1629360},
+                             Known{{.targetError = 1e-6, .cubature = CubatureKind::product}, 23813, 280978, 2946560},
+                             Known{paper, 16456, 207568, 6772552}}) {
     const Field field = build(shapes::analytic("analytic:box"), cube(), known.options);
     const FieldStatistics figures = statistics(field);
     EXPECT_NEAR(double(figures.leaves), known.leaves, 0.002 * known.leaves);
@@ -147,6 +148,94 @@ TEST(Build, SameBytesForAnyNumberOfThreads) {
     if (first.empty()) first = bytes;
     EXPECT_TRUE(bytes == first) << threads << " threads";
   }
+}
+
+struct Counts {
+  std::size_t leaves = 0;
+  int degrees = 0;  ///< their sum
+  bool operator==(const Counts&) const = default;
+};
+Counts countsOf(const Field& field) {
+  Counts counts;
+  field.forEachCell([&](const Cell& cell) {
+    ++counts.leaves;
+    counts.degrees += cell.degree;
+  });
+  return counts;
+}
+
+/// The box of each leaf, and its degree and coefficients.
+std::map<std::vector<double>, std::vector<double>> leavesOf(const Field& field) {
+  std::map<std::vector<double>, std::vector<double>> leaves;
+  const auto& coefficients = std::get<std::vector<double>>(field.data().coefficients);
+  field.forEachCell([&](const Cell& cell) {
+    const Vector3 lo = cell.box.min(), hi = cell.box.max();
+    const auto first = coefficients.begin() + node::offset(field.data().nodes[cell.id]);
+    leaves[{lo.x(), lo.y(), lo.z(), hi.x(), hi.y(), hi.z()}] = {first, first + coefficientCount(cell.degree)};
+  });
+  return leaves;
+}
+
+/// A construction that is ended early has taken the first steps of one that is not, whatever round they fall into.
+TEST(Build, StepsAreCountedAndLimited) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "field.hpsdf";
+  BuildOptions options{.targetError = 1e-5, .grid = {2, 3, 2}, .coefficients = CoefficientType::float64};
+  const auto after = [&](std::uint64_t steps) {
+    options.maxSteps = steps;
+    return build(torus, cube(), options);
+  };
+  const Field whole = build(torus, cube(), options);
+  const std::uint64_t total = whole.metadata().steps.value();
+  ASSERT_GT(total, 100u);
+
+  EXPECT_EQ(countsOf(after(0)), (Counts{12, 24})) << "the base cells, of degree 2";
+  Field before = after(0);
+  for (std::uint64_t steps = 1; steps <= 70; ++steps) {  // more than two rounds
+    const Field field = after(steps);
+    ASSERT_EQ(field.metadata().steps, steps);
+    const Counts counts = countsOf(field), older = countsOf(before);
+    const auto leaves = leavesOf(field), olderLeaves = leavesOf(before);
+    std::size_t gone = 0;
+    for (const auto& [box, coefficients] : olderLeaves) {
+      const auto same = leaves.find(box);
+      gone += same == leaves.end() || same->second != coefficients;
+    }
+    EXPECT_EQ(gone, 1u) << "after step " << steps << " one leaf is another";
+    if (counts.leaves == older.leaves)
+      EXPECT_EQ(counts.degrees, older.degrees + 1);
+    else
+      EXPECT_EQ(counts.leaves, older.leaves + 7);
+    before = field;
+  }
+  EXPECT_GT(after(total - 1).metadata().totalError, 1e-5);
+
+  const std::string bytes = fileBytes(whole, file);
+  EXPECT_TRUE(fileBytes(after(total), file) == bytes);
+  EXPECT_TRUE(fileBytes(after(total + 1), file) == bytes);
+  const std::string half = fileBytes(after(total / 2), file);
+  EXPECT_FALSE(half == bytes);
+  options.threads = 1;
+  EXPECT_TRUE(fileBytes(after(total / 2), file) == half);
+}
+
+TEST(Build, StagesAreTheFieldsOfLimitedConstructions) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "field.hpsdf";
+  BuildOptions options{.targetError = 1e-5, .grid = {2, 2, 2}};
+  const std::uint64_t total = build(torus, cube(), options).metadata().steps.value();
+  const std::vector<std::uint64_t> steps = {0, 1, 31, 32, 33, 33, 100, total, total + 1};
+  std::vector<std::string> stages;
+  buildStages(torus, cube(), options, steps, [&](const Field& field) { stages.push_back(fileBytes(field, file)); });
+  ASSERT_EQ(stages.size(), steps.size());
+  for (std::size_t n = 0; n < steps.size(); ++n) {
+    options.maxSteps = steps[n];
+    EXPECT_TRUE(stages[n] == fileBytes(build(torus, cube(), options), file)) << steps[n] << " steps";
+  }
+  options.maxSteps = 5;
+  buildStages(torus, cube(), options, steps, [&](const Field& field) { EXPECT_LE(field.metadata().steps, 5u); });
+  const std::vector<std::uint64_t> descending = {2, 1};
+  EXPECT_THROW(buildStages(torus, cube(), options, descending, [](const Field&) {}), Error);
 }
 
 /// The same τ gives the same cells in any unit; powers of two change no rounding, so that the match is exact.

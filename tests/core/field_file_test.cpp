@@ -113,9 +113,38 @@ TEST(FieldFile, OtherFilesAreNamedForWhatTheyAre) {
   EXPECT_NE(refusal(file).find("not a .hpsdf file"), std::string::npos);
   save(small(), file);
   std::string bytes = readAll(file);
-  bytes[8] = 2;
+  bytes[8] = 3;
   writeAll(file, bytes);
-  EXPECT_NE(refusal(file).find("version 2"), std::string::npos);
+  EXPECT_NE(refusal(file).find("version 3"), std::string::npos);
+}
+
+/// `bytes` with a checksum that is right again.
+std::string withChecksum(std::string bytes) {
+  const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
+  std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
+  return bytes;
+}
+
+/// As older programs wrote them: version 1, and no steps between the settings and the nodes.
+TEST(FieldFile, FilesOfVersionOneAreRead) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "old.hpsdf";
+  const Field field = small();
+  ASSERT_GT(field.metadata().steps.value(), 0u);
+  save(field, file);
+  EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
+  std::string bytes = readAll(file);
+  const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
+  const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
+  bytes[8] = 1;
+  writeAll(file, withChecksum(bytes.erase(nodes - 8, 8)));
+  const Field old = load(file);
+  EXPECT_EQ(old.metadata().steps, std::nullopt);
+  EXPECT_EQ(old.metadata().roundingRms, field.metadata().roundingRms);
+  EXPECT_EQ(old.data().nodes, field.data().nodes);
+  EXPECT_EQ(old.data().coefficients, field.data().coefficients);
+  save(old, file);
+  EXPECT_EQ(load(file).metadata().steps, std::nullopt) << "what is unknown stays so";
 }
 
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
@@ -127,9 +156,7 @@ TEST(FieldFile, ForgedFilesAreRefused) {
   const auto forge = [&](std::size_t position, auto value) {
     std::string bytes = whole;
     std::memcpy(&bytes[position], &value, sizeof(value));
-    const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
-    std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
-    writeAll(file, bytes);
+    writeAll(file, withChecksum(bytes));
     return refusal(file);
   };
   EXPECT_EQ(forge(0, whole[0]), "");  // the forger's checksum is right

@@ -218,6 +218,35 @@ TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {
   EXPECT_FALSE(holds(image, encodeSrgb(orderedColor(0.25)), panel));
 }
 
+/// What a picture was drawn with, asked for, gives the same picture; and another field's, its colours.
+TEST(Picture, TheScaleOfOnePictureServesAnother) {
+  const Field field = planeField({2, 3, 5}), other = planeField({3, 3, 4});
+  FakeRenderer renderer(field), otherRenderer(other);
+  const DistanceFunction exact{[](const Vector3& x) { return 3 * x.x(); }};
+  const Evidence evidence{.exact = &exact};
+  for (const ColorBy color : {ColorBy::degree, ColorBy::depth, ColorBy::distance, ColorBy::error, ColorBy::slope}) {
+    SlicePicture picture = slice(color);
+    picture.scale.logarithmic = false;
+    const Drawn first = drawSlice(renderer, field, picture, evidence);
+    picture.scale = first.scale;
+    EXPECT_EQ(drawSlice(renderer, field, picture, evidence).image.pixels, first.image.pixels);
+    const Drawn second = drawSlice(otherRenderer, other, picture, evidence);
+    EXPECT_EQ(second.scale.limits, first.scale.limits);
+    EXPECT_EQ(first.scale.limits.has_value(), color == ColorBy::distance || isQuantity(color));
+    if (color == ColorBy::degree) {
+      EXPECT_EQ(first.scale.levels, (std::vector<int>{2, 3, 5}));
+      EXPECT_EQ(second.scale.levels, (std::vector<int>{2, 3, 4, 5})) << "and its own";
+    }
+  }
+  SlicePicture picture = slice(ColorBy::distance);
+  picture.scale.limits = {{2, 1}};
+  EXPECT_THROW(drawSlice(renderer, field, picture), Error);
+  SurfacePicture surface;
+  surface.color = ColorBy::degree;
+  surface.scale.levels = {4};
+  EXPECT_EQ(drawSurface(renderer, field, surface).scale.levels, (std::vector<int>{2, 3, 4, 5}));
+}
+
 TEST(Picture, LegendNamesEachLevelAndItsShare) {
   const std::map<int, double> shares = {{2, 0.14}, {3, 0.6396}, {5, 0.22}, {12, 0.0004}};
   Furniture furniture;

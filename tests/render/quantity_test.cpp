@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
 #include "support/random_field.h"
 
@@ -53,6 +54,29 @@ TEST(Quantity, OfASliceIsThatOfItsPoints) {
     }
   EXPECT_GT(hits, 500);
   EXPECT_GT(misses, 50);
+}
+
+TEST(Quantity, TheDifferenceOfTwoFieldsIsThatOfTheirValues) {
+  const Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
+  FieldData data = field.data();
+  auto& coefficients = std::get<std::vector<double>>(data.coefficients);
+  for (const std::uint64_t bits : data.nodes)
+    if (node::isLeaf(bits)) coefficients[node::offset(bits)] -= 0.25;
+  const Field offset(std::move(data));
+  const SliceView view = planeSlice(field.domain(), {0.1, 0, 0.05}, {1, 2, 3}, 60, 40);
+  const ViewBuffers buffers = makeCpuRenderer(field)->slice(view, 60, 40);
+  const auto same = quantityAt(field, view, buffers, ColorBy::difference, {.other = &field});
+  const auto other = quantityAt(field, view, buffers, ColorBy::difference, {.other = &offset});
+  int hits = 0;
+  for (std::size_t i = 0; i < same.size(); ++i) {
+    EXPECT_EQ(std::isnan(other[i]), !buffers.hit(i));
+    if (!buffers.hit(i)) continue;
+    ++hits;
+    EXPECT_EQ(same[i], 0.0F);
+    EXPECT_NEAR(other[i], 0.25, 1e-12);
+  }
+  EXPECT_GT(hits, 500);
+  EXPECT_THROW(quantityAt(field, view, buffers, ColorBy::difference, {}), Error);
 }
 
 TEST(Quantity, OfASurfaceIsThatOfItsHits) {

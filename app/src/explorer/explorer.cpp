@@ -48,6 +48,10 @@ Layout layoutOf(const ViewState& view) {
   return layout;
 }
 
+Explorer::Explorer(Session& session) : session_(session) {
+  if (session.hasField()) fieldChanged();
+}
+
 void Explorer::change(ViewState next) {
   if (next == view_) return;
   if (!gestureKept_) {
@@ -72,20 +76,30 @@ bool Explorer::redo() {
   return true;
 }
 
-std::string Explorer::buildLine() const {
+void Explorer::rebuild(std::optional<int> maxSteps) {
   const auto mesh = settings_.find("mesh");
-  const std::string& surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
+  const std::string surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
   if (surface.empty()) throw Error("the field does not say what it was made from: give 'settings mesh=FILE'");
   std::string line = "build " + scriptWord(surface);
   for (const auto& [name, value] : settings_)
     if (name != "mesh") line += " " + name + "=" + scriptWord(value);
-  return line;
+  if (maxSteps) line += fmt::format(" max-steps={}", *maxSteps);
+  keepsAllSteps_ = maxSteps.has_value();
+  try {
+    runScript(session_, parseScript(session_.registry(), "rebuild", line, {}));
+  } catch (...) {
+    keepsAllSteps_ = false;
+    throw;
+  }
+  keepsAllSteps_ = false;
 }
 
 void Explorer::fieldChanged() {
   picture_.reset();
   figures_.reset();
   worst_.clear();
+  const auto steps = session_.current().field.metadata().steps;
+  if (!keepsAllSteps_ || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
   ++fields_;
 }
 
@@ -169,10 +183,11 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   const render::OrbitCamera& c = from.camera;
   if (*dragged_ != 0) {  // the target moves with the mouse
     const auto camera = render::cameraOf(c, field.domain(), int(layout.canvas.width()), int(height));
-    const double distance = c.distance * field.domain().diagonal().norm();
-    const Vector3 target =
-        c.target.value_or(field.domain().center()) +
-        distance * (-camera.right * (2 * dx / layout.canvas.width()) + camera.up * (2 * dy / height));
+    // half the picture at the target, world units
+    const double scale =
+        c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
+    const Vector3 target = c.target.value_or(field.domain().center()) +
+                           scale * (-camera.right * (2 * dx / layout.canvas.width()) + camera.up * (2 * dy / height));
     return "camera target=" + vectorWord(target);
   }
   return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesAPixel * dx, 0.1),
@@ -198,7 +213,7 @@ void Explorer::drawPicture(int shrink) {
     picture.bare = true;
     return picture;
   };
-  const render::Evidence evidence = session_.evidence(view_.color(), "");
+  const render::Evidence evidence = session_.evidence(view_.colors().by, "", view_.colors().other);
   render::Renderer& renderer = session_.renderer(view_.backend);
   picture_ = view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, field)), evidence)
                          : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);

@@ -25,7 +25,7 @@ Layout layoutOf(const ViewState& view);
 
 class Explorer {
  public:
-  explicit Explorer(Session& session) : session_(session) {}
+  explicit Explorer(Session& session);
 
   const ViewState& view() const { return view_; }
   /// What was shown before can be had back by `undo`; changes of one gesture by one.
@@ -39,8 +39,10 @@ class Explorer {
   /// Settings for the next construction, by names and texts of `build`'s parameters; `mesh` among them.
   const std::map<std::string, std::string>& settings() const { return settings_; }
   void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
-  /// The line of script that builds with them. Throws `Error` where no mesh is known.
-  std::string buildLine() const;
+  /// Builds with them, up to so many steps of the refinement, if that is given. Throws `Error` where no mesh is known.
+  void rebuild(std::optional<int> maxSteps);
+  /// Steps of the whole refinement, of which the field may be an earlier state; nothing where they are not known.
+  std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
   /// What a person does: a frame of the panels, then the commands that they ask for. Throws what those throw.
   void input(const Input& event);
@@ -98,6 +100,9 @@ class Explorer {
   bool gestureKept_ = false;  ///< the state before the gesture is in undone_ already
   std::map<std::string, std::string> settings_;
   std::string lastVerb_;  ///< of the gesture
+
+  std::optional<std::uint64_t> allSteps_;
+  bool keepsAllSteps_ = false;  ///< while the field becomes an earlier or later state of itself
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;

@@ -87,6 +87,9 @@ void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& com
     camera(c.azimuthDegrees, *v, c.distance);
   if (const auto v = ui.slider("view/distance", "distance", c.distance, 0.05, 3, "%.3g"))
     camera(c.azimuthDegrees, c.elevationDegrees, *v);
+  choice(ui, "view/projection", "projection", {"perspective", "orthographic"},
+         c.projection == render::Projection::perspective ? "perspective" : "orthographic",
+         "camera projection=", commands);
   choice(ui, "view/up", "up", {"y", "z"}, c.up == render::UpAxis::y ? "y" : "z", "camera up=", commands);
   ui.enable(c.target.has_value());
   if (ui.button("view/center", "back to the center")) commands.push_back("camera target=center");
@@ -94,6 +97,8 @@ void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& com
   const double span = 0.15 * field.domain().diagonal().norm();
   if (const auto v = ui.slider("view/offset", "offset", view.surfaceOffset, -span, span))
     commands.push_back("surface offset=" + number(*v));
+  if (const auto on = ui.checkbox("view/cracks", "mark cracks", view.cracks))
+    commands.push_back(fmt::format("surface cracks={}", *on));
   choice(ui, "view/clip", "cut across", {"none", "x", "y", "z"},
          view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none", "surface clip=", commands);
   if (!view.clip) return;
@@ -118,23 +123,26 @@ void drawPlane(Ui& ui, const ViewState& view, const Field& field, Commands& comm
 }
 
 void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn>& picture, Commands& commands) {
+  const Coloring& colors = view.colors();
   const render::ColorBy without = view.slice ? render::ColorBy::normal : render::ColorBy::distance;
-  choice(ui, "view/color", "color", colorNames(without), std::string(colorName(view.color())), "color ", commands);
-  if (!render::isQuantity(view.color())) return;
-  choice(ui, "view/scale", "scale", {"log", "linear"}, view.scale.logarithmic ? "log" : "linear",
-         fmt::format("color {} scale=", colorName(view.color())), commands);
-  const auto range = [&](double low, double high) {
-    commands.push_back(fmt::format("color {} range={},{}", colorName(view.color()), low, high));
+  choice(ui, "view/color", "color", colorNames(without), std::string(colorName(colors.by)), "color ", commands);
+  const auto change = [&](const std::string& what) {
+    commands.push_back(fmt::format("color {} {}", colorName(colors.by), what));
   };
-  const auto shown = picture ? picture->legend.limits : std::nullopt;
-  if (const auto pinned = ui.checkbox("view/pinned", "pinned range", view.scale.limits.has_value())) {
+  if (colors.by == render::ColorBy::difference)
+    if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + scriptWord(*file));
+  if (!render::isQuantity(colors.by)) return;
+  choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
+         fmt::format("color {} scale=", colorName(colors.by)), commands);
+  const auto range = [&](double low, double high) { change(fmt::format("range={},{}", low, high)); };
+  if (const auto pinned = ui.checkbox("view/pinned", "pinned range", colors.scale.limits.has_value())) {
     if (!*pinned)
-      commands.push_back(fmt::format("color {} range=auto", colorName(view.color())));
-    else if (shown)
-      range((*shown)[0], (*shown)[1]);
+      change("range=auto");
+    else if (picture && picture->scale.limits)
+      range((*picture->scale.limits)[0], (*picture->scale.limits)[1]);
   }
-  if (!view.scale.limits) return;
-  const auto [low, high] = *view.scale.limits;
+  if (!colors.scale.limits) return;
+  const auto [low, high] = *colors.scale.limits;
   const auto typed = [&](const std::string& text) {
     const auto value = parseNumber(text);
     if (!value) throw Error(fmt::format("range: expected a number, found '{}'", text));
@@ -182,6 +190,11 @@ void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
     ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
     if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
     return;
+  }
+  if (const auto all = explorer.allSteps()) {
+    const auto steps = double(made.steps.value_or(*all));
+    if (const auto v = ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
+      commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
   }
   ui.enable(!setting("mesh", explorer.session().current().madeFrom()).empty());
   if (ui.button("build/rebuild", "rebuild")) commands.push_back("rebuild");
@@ -272,7 +285,7 @@ void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& share
 void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
   const auto& picture = explorer.picture();
   const auto legendOf = [&](render::ColorBy color) {
-    return picture && explorer.view().color() == color ? &picture->legend : nullptr;
+    return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
   };
   drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
   drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));

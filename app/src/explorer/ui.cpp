@@ -100,6 +100,7 @@ struct Ui::State {
   bool enabled = true;
   std::string clipboard;
   std::string idText;
+  std::pair<std::string, double> held;  ///< a slider that asks once it is let go, and where it stands until then
 };
 
 Ui::Ui() : state_(std::make_unique<State>()) {
@@ -273,9 +274,16 @@ std::optional<int> Ui::combo(const std::string& path, const char* label, std::sp
 }
 
 std::optional<double> Ui::slider(const std::string& path, const char* label, double value, double low, double high,
-                                 const char* format) {
+                                 const char* format, When when) {
   const double before = value;
-  const bool changed = ImGui::SliderScalar(id(path, label), ImGuiDataType_Double, &value, &low, &high, format);
+  if (when == When::released && state_->held.first == path) value = state_->held.second;
+  bool changed = ImGui::SliderScalar(id(path, label), ImGuiDataType_Double, &value, &low, &high, format);
+  if (when == When::released) {
+    if (ImGui::IsItemActive()) state_->held = {path, value};
+    changed = ImGui::IsItemDeactivatedAfterEdit();
+    if (changed) value = state_->held.second;
+    if (!ImGui::IsItemActive() && state_->held.first == path) state_->held = {};
+  }
   note(path);
   return changed && value != before ? std::optional(value) : std::nullopt;
 }

@@ -47,6 +47,9 @@ struct Widget {
   bool enabled = true;  ///< takes input
 };
 
+/// When a slider asks: at each movement, or once it is let go.
+enum class When : std::uint8_t { moved, released };
+
 class Ui {
  public:
   Ui();
@@ -82,7 +85,7 @@ class Ui {
   std::optional<bool> checkbox(const std::string& path, const char* label, bool value);
   std::optional<int> combo(const std::string& path, const char* label, std::span<const std::string> items, int current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
-                               const char* format = "%.4g");
+                               const char* format = "%.4g", When when = When::moved);
   /// A text that counts when Enter is pressed.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
   bool row(const std::string& path, std::span<const std::string> cells, double cellWidth);

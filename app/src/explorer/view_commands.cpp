@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "building.h"
 #include "commands.h"
@@ -45,6 +46,9 @@ void runCamera(Session& session, const Arguments& arguments) {
   if (arguments.given("view") && arguments.text("view") != "any") turnTo(camera, arguments.text("view"));
   if (arguments.given("target")) camera.target = pointOr(arguments, "target", "center");
   if (arguments.given("up")) camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  if (arguments.given("projection"))
+    camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                       : render::Projection::perspective;
   session.explorer().change(std::move(view));
 }
 
@@ -59,6 +63,7 @@ void checkCamera(const Arguments& arguments) {
 void runSurface(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
+  if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
   if (arguments.given("clip")) {
     const std::string axis = arguments.text("clip");
     if (axis == "none")
@@ -101,22 +106,26 @@ void checkPlane(const Arguments& arguments) {
 void runColor(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   const bool slice = arguments.given("of") ? arguments.text("of") == "slice" : view.slice;
-  const render::ColorBy color = colorNamed(arguments.text("by"));
-  if (color == (slice ? render::ColorBy::normal : render::ColorBy::distance))
-    throw Error(
-        fmt::format("by: {} is not for a {}; give another colour", colorName(color), slice ? "slice" : "surface"));
-  (slice ? view.sliceColor : view.surfaceColor) = color;
+  Coloring& colors = slice ? view.sliceColors : view.surfaceColors;
+  const render::ColorBy by = colorNamed(arguments.text("by"));
+  if (by == (slice ? render::ColorBy::normal : render::ColorBy::distance))
+    throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
+  if (by != colors.by) colors.scale.limits.reset();  // of another quantity
+  colors.by = by;
+  if (arguments.given("other")) colors.other = arguments.text("other");
+  if (by == render::ColorBy::difference && colors.other.empty())
+    throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
-    view.scale.limits.reset();
+    colors.scale.limits.reset();
     if (arguments.text("range") != "auto") {
       const auto n = arguments.numbers("range");
-      view.scale.limits = {n[0], n[1]};
+      colors.scale.limits = {n[0], n[1]};
     }
   }
-  if (arguments.given("scale")) view.scale.logarithmic = arguments.text("scale") == "log";
-  if (view.scale.limits && !((*view.scale.limits)[0] < (*view.scale.limits)[1]))
+  if (arguments.given("scale")) colors.scale.logarithmic = arguments.text("scale") == "log";
+  if (colors.scale.limits && !((*colors.scale.limits)[0] < (*colors.scale.limits)[1]))
     throw Error("range: expected LOW,HIGH with LOW below HIGH");
-  if (view.scale.limits && view.scale.logarithmic && !((*view.scale.limits)[0] > 0))
+  if (colors.scale.limits && render::isQuantity(by) && colors.scale.logarithmic && !((*colors.scale.limits)[0] > 0))
     throw Error("range: a logarithmic scale needs limits above 0; give others, or scale=linear");
   session.explorer().change(std::move(view));
 }
@@ -201,9 +210,8 @@ void runSettings(Session& session, const Arguments& arguments) {
       session.explorer().setSetting(parameter.name, arguments.text(parameter.name));
 }
 
-void runRebuild(Session& session, const Arguments&) {
-  const std::string line = session.explorer().buildLine();
-  runScript(session, parseScript(session.registry(), "rebuild", line, {}));
+void runRebuild(Session& session, const Arguments& arguments) {
+  session.explorer().rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps")) : std::nullopt);
 }
 
 void runShot(Session& session, const Arguments& arguments) {
@@ -267,22 +275,24 @@ Command cameraCommand() {
   return {.name = "camera",
           .summary = "Move the explorer's camera.",
           .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
-          .parameters = {{.name = "orbit",
-                          .type = ParameterType::numbers,
-                          .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
-                                  "diagonals of the domain; 30,20,1.1 at first.",
-                          .valueName = "AZIMUTH,ELEVATION,DISTANCE",
-                          .counts = {3},
-                          .positional = true},
-                         {.name = "view",
-                          .type = ParameterType::choice,
-                          .help = "A named direction instead; any leaves it.",
-                          .choices = directions},
-                         targetParameter("The point in the picture's middle; center is the domain's."),
-                         {.name = "up",
-                          .type = ParameterType::choice,
-                          .help = "The axis that points up.",
-                          .choices = {"y", "z"}}},
+          .parameters =
+              {{.name = "orbit",
+                .type = ParameterType::numbers,
+                .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
+                        "diagonals of the domain; 30,20,1.1 at first.",
+                .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+                .counts = {3},
+                .positional = true},
+               {.name = "view",
+                .type = ParameterType::choice,
+                .help = "A named direction instead; any leaves it.",
+                .choices = directions},
+               targetParameter("The point in the picture's middle; center is the domain's."),
+               {.name = "up", .type = ParameterType::choice, .help = "The axis that points up.", .choices = {"y", "z"}},
+               {.name = "projection",
+                .type = ParameterType::choice,
+                .help = "How rays run: from the eye, or parallel.",
+                .choices = {"perspective", "orthographic"}}},
           .action = runCamera,
           .check = checkCamera,
           .scriptOnly = true};
@@ -296,6 +306,9 @@ Command surfaceCommand() {
                           .type = ParameterType::number,
                           .help = "The distance whose surface is drawn; 0 at first.",
                           .unit = "world units"},
+                         {.name = "cracks",
+                          .type = ParameterType::flag,
+                          .help = "Mark where the surface is torn at a face between two cells."},
                          {.name = "clip",
                           .type = ParameterType::choice,
                           .help = "Cut across this axis; the half towards the camera is left out.",
@@ -365,7 +378,11 @@ Command colorCommand() {
                          {.name = "scale",
                           .type = ParameterType::choice,
                           .help = "How such colours run between them; log at first.",
-                          .choices = {"log", "linear"}}},
+                          .choices = {"log", "linear"}},
+                         {.name = "other",
+                          .type = ParameterType::path,
+                          .help = "For difference: the field to compare with.",
+                          .valueName = "FIELD"}},
           .action = runColor,
           .scriptOnly = true};
 }
@@ -468,7 +485,12 @@ void addViewCommands(Registry& registry) {
   registry.add(settingsCommand());
   registry.add({.name = "rebuild",
                 .summary = "Build the field anew, as 'settings' says.",
-                .examples = {"rebuild"},
+                .examples = {"rebuild", "rebuild max-steps=100"},
+                .parameters = {{.name = "max-steps",
+                                .type = ParameterType::wholeNumber,
+                                .help = "End after so many steps of the refinement: an earlier state of the field.",
+                                .minimum = 0,
+                                .maximum = std::numeric_limits<int>::max()}},
                 .action = runRebuild,
                 .scriptOnly = true});
   registry.add({.name = "shot",

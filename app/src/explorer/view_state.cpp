@@ -21,22 +21,25 @@ std::string planeLine(const ViewState& view) {
 }
 
 std::string cameraLine(const render::OrbitCamera& camera) {
-  return fmt::format("camera {},{},{} target={} up={}\n", camera.azimuthDegrees, camera.elevationDegrees,
+  return fmt::format("camera {},{},{} target={} up={} projection={}\n", camera.azimuthDegrees, camera.elevationDegrees,
                      camera.distance, camera.target ? textOf(*camera.target) : "center",
-                     camera.up == render::UpAxis::y ? "y" : "z");
+                     camera.up == render::UpAxis::y ? "y" : "z",
+                     camera.projection == render::Projection::perspective ? "perspective" : "orthographic");
 }
 
 std::string surfaceLine(const ViewState& view) {
-  std::string line = fmt::format("surface offset={} clip={}", view.surfaceOffset,
+  std::string line = fmt::format("surface offset={} cracks={} clip={}", view.surfaceOffset, view.cracks,
                                  view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
   if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
   return line + "\n";
 }
 
-std::string scaleText(const render::ScaleOptions& scale) {
-  return fmt::format("range={} scale={}",
+std::string colorLine(const Coloring& colors, const char* of) {
+  const render::ScaleOptions& scale = colors.scale;
+  return fmt::format("color {} of={} range={} scale={}{}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
-                     scale.logarithmic ? "log" : "linear");
+                     scale.logarithmic ? "log" : "linear",
+                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other));
 }
 
 std::string backendText(const Backend& backend) {
@@ -63,8 +66,8 @@ render::SlicePicture slicePicture(const ViewState& view, const Field& field) {
     picture.plane = render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
   picture.zoom = view.zoom;
   picture.target = view.sliceTarget;
-  picture.color = view.sliceColor;
-  picture.scale = view.scale;
+  picture.color = view.sliceColors.by;
+  picture.scale = view.sliceColors.scale;
   return picture;
 }
 
@@ -73,17 +76,17 @@ render::SurfacePicture surfacePicture(const ViewState& view) {
   picture.camera = view.camera;
   picture.offset = view.surfaceOffset;
   picture.clip = view.clip;
-  picture.color = view.surfaceColor;
-  picture.scale = view.scale;
+  picture.cracks = view.cracks;
+  picture.color = view.surfaceColors.by;
+  picture.scale = view.surfaceColors.scale;
   return picture;
 }
 
 std::string scriptOf(const ViewState& view) {
   return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
                      view.samples, backendText(view.backend)) +
-         cameraLine(view.camera) + surfaceLine(view) + planeLine(view) +
-         fmt::format("color {} of=surface\ncolor {} of=slice {}\n", colorName(view.surfaceColor),
-                     colorName(view.sliceColor), scaleText(view.scale)) +
+         cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + colorLine(view.surfaceColors, "surface") +
+         colorLine(view.sliceColors, "slice") +
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstPage + 1) +
          panelLine(view);

@@ -16,6 +16,13 @@ enum class Panel : std::uint8_t { bar, view, build, legend, histograms, statisti
 constexpr std::array kPanelNames = {"bar", "view", "build", "legend", "histograms", "statistics", "worst", "readout"};
 constexpr std::size_t kPanels = kPanelNames.size();
 
+/// What colours mean.
+struct Coloring {
+  render::ColorBy by;
+  render::ScaleOptions scale = {};
+  std::string other = {};  ///< of difference: the other field's file
+};
+
 struct ViewState {
   bool slice = false;  ///< the flat picture of a plane, rather than the surface in space
 
@@ -28,10 +35,10 @@ struct ViewState {
   render::OrbitCamera camera;
   double surfaceOffset = 0;
   std::optional<render::ClipPlane> clip;
+  bool cracks = false;
 
-  render::ColorBy sliceColor = render::ColorBy::degree;
-  render::ColorBy surfaceColor = render::ColorBy::normal;
-  render::ScaleOptions scale;
+  Coloring surfaceColors{.by = render::ColorBy::normal};
+  Coloring sliceColors{.by = render::ColorBy::degree};
   JumpKind worstBy = JumpKind::value;  ///< of the list of interfaces
   int worstPage = 0;
 
@@ -43,7 +50,7 @@ struct ViewState {
   Backend backend;
 
   bool isOpen(Panel panel) const { return open[static_cast<std::size_t>(panel)]; }
-  render::ColorBy color() const { return slice ? sliceColor : surfaceColor; }
+  const Coloring& colors() const { return slice ? sliceColors : surfaceColors; }
 };
 
 /// What render draws of it; sizes and samples are not set.

@@ -2,6 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
 
 #include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
@@ -42,6 +45,9 @@ struct BuildOptions {
   TrialSamples trialSamples = TrialSamples::children;
   /// Width in world units: cells wholly farther from the surface are not refined and do not count towards ε. 0: none.
   double band = 0;
+  /// The construction ends after so many steps, each of which raises one leaf's degree or splits one, if the target has
+  /// not been reached before. 0: the base cells alone; nothing: no limit.
+  std::optional<std::uint64_t> maxSteps = {};
   CoefficientType coefficients = CoefficientType::automatic;
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };
@@ -61,5 +67,12 @@ Box domainAround(const TriangleMesh& mesh, DomainShape shape = DomainShape::cube
 /// non-finite value; `Cancelled` when asked to stop.
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options = {},
             const Progress& progress = {});
+
+/// The fields on the way, from one construction that goes no farther than it must: for each of `steps`, which may not
+/// descend, `visit` gets the very field that `build` ends with when that is its `maxSteps`, and each is made only when
+/// the one before has been visited. Throws as `build` does, `Error` for steps that descend, and what `visit` throws.
+void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                 std::span<const std::uint64_t> steps, const std::function<void(Field)>& visit,
+                 const Progress& progress = {});
 
 }  // namespace hpsdf

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -36,7 +37,9 @@ struct FieldMetadata {
   Strategy strategy = Strategy::hp;
   double band = 0;                     ///< width of the narrow band, 0 for none
   std::uint64_t exactEvaluations = 0;  ///< of Φ during the construction
-  double roundingRms = 0;              ///< RMS change of the field by keeping its coefficients as float; 0 for double
+  /// Leaves that the construction raised or split; nothing where that is not known, as of files of version 1.
+  std::optional<std::uint64_t> steps = {};
+  double roundingRms = 0;  ///< RMS change of the field by keeping its coefficients as float; 0 for double
 
   /// √(ε/|Ω|) in the field's own units: the estimated RMS error that the construction ended with.
   double rmsEstimate(const Box& domain) const;

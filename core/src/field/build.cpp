@@ -9,6 +9,7 @@
 #include <functional>
 #include <numeric>
 #include <queue>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -62,18 +63,32 @@ class Construction {
     tree_.grid = options.grid;
   }
 
-  FieldData run(const Source& source) {
+  /// `afterStep` is called once the base cells are there, with 0, and after each step with their number.
+  void grow(const std::function<void(std::uint64_t)>& afterStep = {}) {
     fitBaseCells();
-    while (!(totalError_ <= target_) && !queue_.empty()) {
-      refineRound();
+    if (afterStep) afterStep(steps_);
+    while (!(totalError_ <= target_) && mayStep() && !queue_.empty()) {
+      refineRound(afterStep);
       // rounding in the running total must end the construction neither early nor never
       if (totalError_ <= target_ || totalError_ < 1e-6 * lastSum_) sumTotalError();
     }
-    sumTotalError();
+  }
+
+  /// The field as it is now. The first takes a copy of the tree, the other the tree itself.
+  FieldData frozen(const Source& source) const {
+    return freeze(BuildTree(tree_), options_.coefficients, metadata(source));
+  }
+  FieldData finish(const Source& source) {
+    FieldMetadata known = metadata(source);
+    return freeze(std::move(tree_), options_.coefficients, std::move(known));
+  }
+
+ private:
+  FieldMetadata metadata(const Source& source) const {
     FieldMetadata metadata;
     metadata.source = source;
     metadata.targetError = options_.targetError;
-    metadata.totalError = totalError_ / std::pow(length_ / 2, 5);
+    metadata.totalError = sumOfErrors() / std::pow(length_ / 2, 5);
     metadata.referenceLength = length_;
     metadata.nearness = options_.nearness;
     metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
@@ -82,10 +97,10 @@ class Construction {
     metadata.strategy = options_.strategy;
     metadata.band = options_.band;
     metadata.exactEvaluations = fitter_.evaluations();
-    return freeze(std::move(tree_), options_.coefficients, std::move(metadata));
+    metadata.steps = steps_;
+    return metadata;
   }
 
- private:
   struct Entry {
     double error;
     std::uint32_t node;
@@ -132,9 +147,16 @@ class Construction {
     if (leaf.fit.error > 0 && allowed(leaf)) queue_.push({leaf.fit.error, node});
   }
 
-  void refineRound() {
+  bool mayStep() const { return !options_.maxSteps || steps_ < *options_.maxSteps; }
+
+  double fractionDone() {
+    const double ofError = estimate_.update(double(fitter_.evaluations()), totalError_, target_);
+    return options_.maxSteps ? std::max(ofError, double(steps_) / double(*options_.maxSteps)) : ofError;
+  }
+
+  void refineRound(const std::function<void(std::uint64_t)>& afterStep) {
     checkFitsMemory(tree_.nodes.size(), coefficients_);
-    report("refining", estimate_.update(double(fitter_.evaluations()), totalError_, target_));
+    report("refining", fractionDone());
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
       worst.push_back(queue_.top().node);
@@ -142,12 +164,13 @@ class Construction {
     }
     std::vector<Trial> trials = tryAll(worst);
     for (std::size_t w = 0; w < worst.size(); ++w) {
-      if (totalError_ <= target_) {  // done, unless an exact sum says otherwise
+      if (totalError_ <= target_ || !mayStep()) {  // done, unless an exact sum says otherwise
         enqueue(worst[w]);
         continue;
       }
       refine(worst[w], std::move(trials[w]));
       if (++steps_ % kResum == 0) sumTotalError();
+      if (afterStep) afterStep(steps_);
     }
   }
 
@@ -201,12 +224,14 @@ class Construction {
     return mu > nu;
   }
 
-  void sumTotalError() {
-    totalError_ = 0;
+  double sumOfErrors() const {
+    double sum = 0;
     for (const BuildNode& node : tree_.nodes)
-      if (node.firstChild == 0) totalError_ += node.fit.error;
-    lastSum_ = totalError_;
+      if (node.firstChild == 0) sum += node.fit.error;
+    return sum;
   }
+
+  void sumTotalError() { totalError_ = lastSum_ = sumOfErrors(); }
 
   void report(std::string_view task, double fraction) const {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
@@ -223,7 +248,7 @@ class Construction {
   double totalError_ = 0;         ///< kept up step by step
   double lastSum_ = 0;            ///< what it was when it was last summed anew
   std::size_t coefficients_ = 0;  ///< of all leaves
-  std::size_t steps_ = 0;
+  std::uint64_t steps_ = 0;
   ProgressEstimate estimate_;
 };
 
@@ -232,8 +257,33 @@ class Construction {
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
             const Progress& progress) {
   checkBuild(domain, options);
-  return Field(withThreads(options.threads,
-                           [&] { return Construction(distance, domain, options, progress).run(distance.source()); }));
+  return Field(withThreads(options.threads, [&] {
+    Construction construction(distance, domain, options, progress);
+    construction.grow();
+    return construction.finish(distance.source());
+  }));
+}
+
+void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                 std::span<const std::uint64_t> steps, const std::function<void(Field)>& visit,
+                 const Progress& progress) {
+  if (!std::ranges::is_sorted(steps)) throw Error("stages of a construction: expected steps that do not descend");
+  if (steps.empty()) return;
+  BuildOptions limited = options;
+  limited.maxSteps = std::min(options.maxSteps.value_or(steps.back()), steps.back());
+  checkBuild(domain, limited);
+  withThreads(options.threads, [&] {
+    Construction construction(distance, domain, limited, progress);
+    std::size_t stage = 0;
+    const auto visitNext = [&] {
+      visit(Field(construction.frozen(distance.source())));
+      ++stage;
+    };
+    construction.grow([&](std::uint64_t taken) {
+      while (stage < steps.size() && steps[stage] == taken) visitNext();
+    });
+    while (stage < steps.size()) visitNext();  // more steps than there are
+  });
 }
 
 }  // namespace hpsdf

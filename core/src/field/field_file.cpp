@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -27,7 +28,8 @@ static_assert(sizeof(float) == 4 && std::numeric_limits<float>::is_iec559);
 
 // Like PNG's: a carriage return, a line feed and an end-of-file mark show a transfer that took it for text.
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;  // 1 had no steps
+constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 constexpr std::uint32_t kLongestName = 4096;
 constexpr std::size_t kChecksumBytes = 8;
 
@@ -155,9 +157,19 @@ struct Sizes {
   std::uint32_t coefficientBytes = 8;
 };
 
+void stepsItem(Writer& writer, const std::optional<std::uint64_t>& steps) {
+  writer.item(steps.value_or(kUnknownSteps));
+}
+
+void stepsItem(Reader& reader, std::optional<std::uint64_t>& steps) {
+  std::uint64_t stored = 0;
+  reader.item(stored);
+  if (stored != kUnknownSteps) steps = stored;
+}
+
 /// Every scalar of the file after magic and version, in order. `Data` is const when writing.
 template <typename Stream, typename Data, typename SizesRef>
-void header(Stream& stream, Data& data, SizesRef& sizes) {
+void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) {
   stream.item(sizes.coefficientBytes);
   stream.item(sizes.nodes);
   stream.item(sizes.coefficients);
@@ -187,6 +199,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes) {
   stream.item(m.band);
   stream.item(m.exactEvaluations);
   stream.item(m.roundingRms);
+  if (version >= 2) stepsItem(stream, m.steps);
 }
 
 }  // namespace
@@ -199,7 +212,7 @@ void save(const Field& field, const std::filesystem::path& file) {
   std::visit(
       [&](const auto& coefficients) {
         const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0])};
-        header(writer, data, sizes);
+        header(writer, data, sizes, kVersion);
         writer.put(std::as_bytes(std::span(data.nodes)));
         writer.put(std::as_bytes(std::span(coefficients)));
       },
@@ -218,12 +231,12 @@ Field load(const std::filesystem::path& file) {
   if (magic != kMagic) reader.refuse("is not a .hpsdf file; build one with `hpsdf build`");
   std::uint32_t version = 0;
   reader.item(version);
-  if (version != kVersion)
-    reader.refuse("has file format version " + std::to_string(version) + ", this program reads " +
+  if (version == 0 || version > kVersion)
+    reader.refuse("has file format version " + std::to_string(version) + ", this program reads 1 to " +
                   std::to_string(kVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
-  header(reader, data, sizes);
+  header(reader, data, sizes, version);
   if (sizes.coefficientBytes != 4 && sizes.coefficientBytes != 8)
     reader.damaged("its coefficients have an unknown type");
   if (data.metadata.strategy > Strategy::h2) reader.damaged("its strategy is unknown");

@@ -28,6 +28,7 @@ enum class ColorBy : std::uint8_t {
   gradientJump,  ///< the same of the gradient
   slope,         ///< how far |∇f| is from 1 at the point
   error,         ///< |f − Φ| at the point; needs `Evidence::exact`
+  difference,    ///< |f − g| at the point; needs `Evidence::other`
   cellError,     ///< estimated RMS error of the cell: √(ε_e / its volume), without nearness
 };
 constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
@@ -36,13 +37,19 @@ constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
 struct Evidence {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;
+  const Field* other = nullptr;  ///< g; outside its domain its continuation counts
 };
 
-/// Of a quantity: which values the darkest and the lightest colour stand for. Without limits they are chosen from the
-/// values, a few outliers left out: of all cells where the quantity is a cell's, else of the points shown.
+/// What colours stand for, so that pictures of several views or fields can be compared.
 struct ScaleOptions {
-  std::optional<std::array<double, 2>> limits = {};  ///< ascending; above 0 on a logarithmic scale
+  /// Of a quantity: the values of the darkest and the lightest colour, ascending; above 0 on a logarithmic scale.
+  /// Without them they are chosen from the values, a few outliers left out: of all cells where the quantity is a
+  /// cell's, else of the points shown. Of distances: the lowest and the highest for which colours and iso-lines are
+  /// chosen.
+  std::optional<std::array<double, 2>> limits = {};
   bool logarithmic = true;
+  /// Of degrees and depths: the legend has these besides the field's own, 0 to 255, ascending.
+  std::vector<int> levels = {};
 };
 
 struct AxisPlane {
@@ -125,7 +132,6 @@ struct Legend {
   std::vector<Level> levels = {};  ///< ascending; of colours by degree or depth
   std::vector<Color> bar = {};     ///< from its low end to its high end; of all others
   std::vector<Mark> marks = {};
-  std::optional<std::array<double, 2>> limits = {};  ///< of a quantity: what the bar's ends stand for
 };
 
 /// A finished picture and the view in its upper left corner.
@@ -137,6 +143,7 @@ struct Drawn {
   bool seen = false;  ///< whether any pixel shows the field
   Legend legend = {};
   std::vector<std::string> details = {};  ///< what is shown, the most important first
+  ScaleOptions scale = {};  ///< as drawn, with what was chosen: the same for another picture gives it the same colours
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
