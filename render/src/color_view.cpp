@@ -77,9 +77,10 @@ bool isFlat(const ViewBuffers& buffers, std::size_t i) {
 // samples allow and never two wide.
 class CellOutlines {
  public:
-  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling)
-      : buffers_(buffers), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
-    if (!buffers.distance.empty()) {  // of what a camera sees, only the planes have outlines
+  /// Of a slice; `inScene`: of the planes among what a camera sees.
+  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling, bool inScene)
+      : buffers_(buffers), inScene_(inScene), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
+    if (inScene) {
       flatCells_ = buffers.cell;
       for (std::size_t i = 0; i < flatCells_.size(); ++i)
         if (!isFlat(buffers, i)) flatCells_[i] = kNoCell;
@@ -135,12 +136,13 @@ class CellOutlines {
 
   // Where a plane ends behind something else, that is no edge of its own.
   bool hidden(std::size_t i, std::size_t j) const {
-    if (buffers_.distance.empty() || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
+    if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
     const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
     return buffers_.hit(other) && buffers_.distance[other] < buffers_.distance[flat];
   }
 
   const ViewBuffers& buffers_;
+  bool inScene_;
   std::vector<std::uint32_t> flatCells_;
   std::span<const std::uint32_t> cell_;
   double width_;  // in samples
@@ -399,7 +401,7 @@ SampleColor quantityColors(const std::vector<float>& quantity, const ColorScale&
 }
 
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
-  const CellOutlines outlines(buffers, sampling);
+  const CellOutlines outlines(buffers, sampling, false);
   const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
   const SurfaceLine lines(sampling);
@@ -448,7 +450,7 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Sampl
   const Contours contours(buffers, offset);
   const SurfaceLine surfaceLine(sampling);
   std::optional<CellOutlines> outlines;
-  if (!buffers.shown.empty()) outlines.emplace(buffers, sampling);
+  if (!buffers.shown.empty()) outlines.emplace(buffers, sampling, true);
   const LinearColor outline = decodeSrgb(kOutline), solid = decodeSrgb(kSection), air = decodeSrgb(kAir);
   const auto flatColor = [&](std::size_t i) {
     return color ? color(i) : buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
