@@ -7,6 +7,7 @@
 
 #include "pictures.h"
 #include "script.h"
+#include "summaries.h"
 
 namespace hpsdf::app {
 namespace {
@@ -76,12 +77,36 @@ bool Explorer::redo() {
   return true;
 }
 
+std::map<std::string, std::string> Explorer::settingsOfField() const {
+  const CurrentField& current = session_.current();
+  const Field& field = current.field;
+  const FieldMetadata& made = field.metadata();
+  const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
+  std::map<std::string, std::string> settings = {
+      {"target-error", fmt::format("{}", made.targetError)},
+      {"grid", fmt::format("{},{},{}", field.grid()[0], field.grid()[1], field.grid()[2])},
+      {"nearness", fmt::format("{}", made.nearness)},
+      {"max-degree", fmt::format("{}", made.maxDegree)},
+      {"max-depth", fmt::format("{}", made.maxDepth)},
+      {"strategy", strategyName(made.strategy)},
+      {"quadrature", fmt::format("{}", made.quadrature)},
+      {"band", fmt::format("{}", made.band)}};
+  const auto mesh = settings_.find("mesh");
+  if (mesh != settings_.end() && mesh->second != current.madeFrom()) return settings;
+  settings["domain"] = corner(field.domain().min()) + "," + corner(field.domain().max());
+  if (made.source.normalization.scale != 1) settings["normalize"] = "true";
+  return settings;
+}
+
 void Explorer::rebuild(std::optional<int> maxSteps) {
+  std::map<std::string, std::string> settings = settingsOfField();
+  if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+  for (const auto& [name, value] : settings_) settings[name] = value;
   const auto mesh = settings_.find("mesh");
   const std::string surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
   if (surface.empty()) throw Error("the field does not say what it was made from: give 'settings mesh=FILE'");
   std::string line = "build " + scriptWord(surface);
-  for (const auto& [name, value] : settings_)
+  for (const auto& [name, value] : settings)
     if (name != "mesh") line += " " + name + "=" + scriptWord(value);
   if (maxSteps) line += fmt::format(" max-steps={}", *maxSteps);
   keepsAllSteps_ = maxSteps.has_value();

@@ -87,6 +87,8 @@ class Explorer {
 
  private:
   std::string pictureKey() const;
+  /// `build`'s parameters that made the current field, as far as it tells.
+  std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settle();

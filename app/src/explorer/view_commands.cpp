@@ -274,6 +274,9 @@ Command cameraCommand() {
   directions.insert(directions.begin(), "any");
   return {.name = "camera",
           .summary = "Move the explorer's camera.",
+          .help =
+              "It looks at the surface in space. What is not given stays as it is; 'copy-view' tells how it stands. "
+              "With the mouse: drag to turn, drag with the right button to move the target, wheel to go nearer.",
           .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
           .parameters =
               {{.name = "orbit",
@@ -301,6 +304,7 @@ Command cameraCommand() {
 Command surfaceCommand() {
   return {.name = "surface",
           .summary = "Choose which surface the explorer shows, and where it is cut open.",
+          .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
           .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
           .parameters = {{.name = "offset",
                           .type = ParameterType::number,
@@ -324,6 +328,9 @@ Command surfaceCommand() {
 Command planeCommand() {
   return {.name = "plane",
           .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
+          .help =
+              "As 'slice' has it, of the picture that 'show slice' chooses. What is not given stays as it is. With the "
+              "mouse: drag to move, wheel to zoom.",
           .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
           .parameters = {{.name = "axis",
                           .type = ParameterType::choice,
@@ -358,6 +365,9 @@ Command planeCommand() {
 Command colorCommand() {
   return {.name = "color",
           .summary = "Choose what the explorer's colours mean.",
+          .help =
+              "As in 'slice' and 'render'; the surface and the slice have colours of their own. Another quantity than "
+              "before gets an automatic range.",
           .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
           .parameters = {{.name = "by",
                           .type = ParameterType::choice,
@@ -390,6 +400,7 @@ Command colorCommand() {
 Command panelCommand() {
   Command command{.name = "panel",
                   .summary = "Open or close parts of the explorer's frame.",
+                  .help = "What is not given stays as it is. The picture takes the room that closed parts leave.",
                   .examples = {"panel all=false", "panel build=false worst=true"},
                   .action = runPanel,
                   .scriptOnly = true};
@@ -415,7 +426,8 @@ Command panelCommand() {
 
 Command settingsCommand() {
   Command command{.name = "settings",
-                  .summary = "Set how 'rebuild' builds; what is not set is as 'build' has it.",
+                  .summary = "Set how 'rebuild' builds; what is not set is as it was.",
+                  .help = "The options are those of 'build'. Nothing is built yet.",
                   .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
                   .parameters = {{.name = "mesh",
                                   .type = ParameterType::text,
@@ -439,6 +451,7 @@ void addViewCommands(Registry& registry) {
   registry.add(panelCommand());
   registry.add({.name = "worst",
                 .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
+                .help = "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'.",
                 .examples = {"worst by=gradient page=2"},
                 .parameters = {{.name = "by",
                                 .type = ParameterType::choice,
@@ -466,11 +479,14 @@ void addViewCommands(Registry& registry) {
                 .scriptOnly = true});
   registry.add({.name = "undo",
                 .summary = "Take back the last change of what the explorer shows.",
+                .help = "Changes by show, camera, surface, plane, color, panel, worst and fly; what the mouse does in "
+                        "one go is one change. The field itself is not changed back.",
                 .examples = {"undo"},
                 .action = runUndo,
                 .scriptOnly = true});
   registry.add({.name = "redo",
                 .summary = "Do again what 'undo' took back.",
+                .help = "Until something else is changed.",
                 .examples = {"redo"},
                 .action = runRedo,
                 .scriptOnly = true});
@@ -485,6 +501,7 @@ void addViewCommands(Registry& registry) {
   registry.add(settingsCommand());
   registry.add({.name = "rebuild",
                 .summary = "Build the field anew, as 'settings' says.",
+                .help = "What 'settings' does not say is as it was for the current field.",
                 .examples = {"rebuild", "rebuild max-steps=100"},
                 .parameters = {{.name = "max-steps",
                                 .type = ParameterType::wholeNumber,
@@ -495,6 +512,8 @@ void addViewCommands(Registry& registry) {
                 .scriptOnly = true});
   registry.add({.name = "shot",
                 .summary = "Write the explorer's frame: the picture and the panels around it.",
+                .help = "Pending work is finished first. 'pick' and 'expect pick(…)' then speak of its pixels. 'panel "
+                        "all=false' leaves the picture alone.",
                 .examples = {"shot output=frame.png"},
                 .parameters = {{.name = "output",
                                 .type = ParameterType::outputPath,
