@@ -185,6 +185,7 @@ class ScriptCheck {
     Variables variables = request_.variables;
     variables["out"] = actual_.string();
     variables["wrong"] = wrong_.string();
+    variables["here"] = fs::path(file_).parent_path().string();
     const std::vector<Call> calls = parseScript(registry, file_, text, variables);
     for (const auto& [line, stated] : controls)
       if (std::ranges::find(calls, line, &Call::line) == calls.end())
@@ -358,7 +359,7 @@ bool CheckOutcome::scriptFailed() const {
 CheckOutcome check(const Registry& registry, const Console& console, const CheckRequest& request) {
   const std::vector<std::string> scripts = scriptNames(request.folder);
   refuseUnknown(scripts, request.only);
-  for (const char* own : {"out", "wrong"})
+  for (const char* own : {"out", "wrong", "here"})
     if (request.variables.contains(own)) throw Error(fmt::format("{}: this variable is set by check itself", own));
   prepareOutput(request.output);
   if (!request.junit.empty()) checkWritable(request.junit);

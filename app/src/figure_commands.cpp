@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "expectation.h"
+#include "explorer/readout.h"
 #include "failed.h"
 #include "hpsdf/nearest_name.h"
 #include "session.h"
@@ -13,18 +14,24 @@
 namespace hpsdf::app {
 namespace {
 
-/// What the last picture shows at a pixel; null where that is nothing of the field.
-Json pickJson(const Session& session, int x, int y) {
+/// What the last picture shows at a pixel; null where that is nothing of the field. With what takes longer to find:
+/// the exact distance, where it is known, and the jumps at the cell's nearest face.
+Json pickJson(Session& session, int x, int y, bool withAll) {
   const auto pick = render::pickAt(session.picture(), x, y);
   if (!pick) return {};
   const Vector3 gradient = session.current().field.valueAndGradient(pick->position).gradient;
-  return {{"position", vectorJson(pick->position)},
-          {"value", pick->value},
-          {"cell", pick->cell},
-          {"degree", pick->degree},
-          {"depth", pick->depth},
-          {"gradient", vectorJson(gradient)},
-          {"slope", gradient.norm()}};
+  Json json = {{"position", vectorJson(pick->position)},
+               {"value", pick->value},
+               {"cell", pick->cell},
+               {"degree", pick->degree},
+               {"depth", pick->depth},
+               {"gradient", vectorJson(gradient)},
+               {"slope", gradient.norm()}};
+  if (!withAll) return json;
+  const Readout readout = readoutAt(session, *pick);
+  json["jump"] = {{"value", readout.valueJump.max}, {"gradient", readout.gradientJump.max}};
+  if (readout.exact) json["exact"] = *readout.exact, json["error"] = readout.value - *readout.exact;
+  return json;
 }
 
 Json pointJson(Session& session, const Vector3& x, bool withExact) {
@@ -60,7 +67,9 @@ Json figuresOf(Session& session, const Expectation& expectation) {
     const bool withExact = expectation.path[0] == "exact" || expectation.path[0] == "error";
     return pointJson(session, {n[0], n[1], n[2]}, withExact);
   }
-  Json pick = pickJson(session, static_cast<int>(n[0]), static_cast<int>(n[1]));
+  const std::string& figure = expectation.path[0];
+  const bool withAll = figure == "jump" || figure == "exact" || figure == "error";
+  Json pick = pickJson(session, static_cast<int>(n[0]), static_cast<int>(n[1]), withAll);
   if (pick.is_null()) throw Failed(fmt::format("pixel {},{} shows no part of the field", n[0], n[1]));
   return pick;
 }
@@ -87,7 +96,7 @@ double followed(Json json, const Expectation& expectation) {
 
 void runPick(Session& session, const Arguments& arguments) {
   const auto pixel = arguments.numbers("pixel");
-  const Json pick = pickJson(session, static_cast<int>(pixel[0]), static_cast<int>(pixel[1]));
+  const Json pick = pickJson(session, static_cast<int>(pixel[0]), static_cast<int>(pixel[1]), false);
   std::ostream& out = session.console().out;
   if (session.wantsJson(arguments)) return printJson(out, pick);
   if (pick.is_null()) {
@@ -148,7 +157,8 @@ void addFigureCommands(Registry& registry) {
            "jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;\n"
            "\n"
            "pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, "
-           "gradient.0, slope;\n"
+           "gradient.0, slope; exact and error where the exact distance is known; jump.value and jump.gradient at the "
+           "nearest face of its cell;\n"
            "\n"
            "at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is "
            "known.",

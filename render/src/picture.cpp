@@ -507,7 +507,10 @@ std::optional<Pick> pickAt(const Drawn& drawn, int x, int y) {
     throw Error("pixel " + std::to_string(x) + "," + std::to_string(y) + " lies outside of the picture of " +
                 std::to_string(image.width) + "x" + std::to_string(image.height));
   const ViewBuffers& buffers = drawn.buffers;
-  const int column = x * drawn.samples + drawn.samples / 2, row = y * drawn.samples + drawn.samples / 2;
+  const auto [left, top] = drawn.corner;
+  if (x < left || y < top) return std::nullopt;
+  const int column = (x - left) * drawn.samples + drawn.samples / 2;
+  const int row = (y - top) * drawn.samples + drawn.samples / 2;
   if (column >= buffers.width || row >= buffers.height) return std::nullopt;
   const std::size_t i = std::size_t(row) * buffers.width + column;
   if (!buffers.hit(i)) return std::nullopt;

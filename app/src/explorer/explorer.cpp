@@ -238,7 +238,7 @@ void Explorer::drawPicture(int shrink) {
     picture.bare = true;
     return picture;
   };
-  const render::Evidence evidence = session_.evidence(view_.colors().by, "", view_.colors().other);
+  const render::Evidence evidence = session_.evidence(view_.colors().by, view_.colors().mesh, view_.colors().other);
   render::Renderer& renderer = session_.renderer(view_.backend);
   picture_ = view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, field)), evidence)
                          : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);

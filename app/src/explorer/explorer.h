@@ -77,6 +77,7 @@ class Explorer {
 
   std::string message;  ///< shown below until the next command: what went wrong, or what was done
   Session& session() { return session_; }
+  /// As it was drawn last: the view alone.
   const std::optional<render::Drawn>& picture() const { return picture_; }
   /// Of the current field; kept.
   const FieldStatistics& figures();

@@ -131,6 +131,8 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   };
   if (colors.by == render::ColorBy::difference)
     if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + scriptWord(*file));
+  if (colors.by == render::ColorBy::error)
+    if (const auto mesh = ui.field("view/mesh", "made from", colors.mesh)) change("mesh=" + scriptWord(*mesh));
   if (!render::isQuantity(colors.by)) return;
   choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
          fmt::format("color {} scale=", colorName(colors.by)), commands);

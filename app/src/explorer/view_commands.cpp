@@ -113,6 +113,7 @@ void runColor(Session& session, const Arguments& arguments) {
   if (by != colors.by) colors.scale.limits.reset();  // of another quantity
   colors.by = by;
   if (arguments.given("other")) colors.other = arguments.text("other");
+  if (arguments.given("mesh")) colors.mesh = arguments.text("mesh");
   if (by == render::ColorBy::difference && colors.other.empty())
     throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
@@ -219,8 +220,14 @@ void runShot(Session& session, const Arguments& arguments) {
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   checkWritable(file);
   session.current();
-  const render::Image frame = session.explorer().frame();
+  Explorer& explorer = session.explorer();
+  const render::Image frame = explorer.frame();
   savePng(frame, file);
+  render::Drawn picture = *explorer.picture();
+  const UiRect canvas = layoutOf(explorer.view()).canvas;
+  picture.image = frame;
+  picture.corner = {int(canvas.x0), int(canvas.y0)};
+  session.setPicture(std::move(picture));
   if (session.wantsJson(arguments))
     return printJson(
         session.console().out,
@@ -392,7 +399,11 @@ Command colorCommand() {
                          {.name = "other",
                           .type = ParameterType::path,
                           .help = "For difference: the field to compare with.",
-                          .valueName = "FIELD"}},
+                          .valueName = "FIELD"},
+                         {.name = "mesh",
+                          .type = ParameterType::text,
+                          .help = "For error: what the field was made from, where the field does not know it.",
+                          .valueName = "MESH"}},
           .action = runColor,
           .scriptOnly = true};
 }

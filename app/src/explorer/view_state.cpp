@@ -36,10 +36,11 @@ std::string surfaceLine(const ViewState& view) {
 
 std::string colorLine(const Coloring& colors, const char* of) {
   const render::ScaleOptions& scale = colors.scale;
-  return fmt::format("color {} of={} range={} scale={}{}\n", colorName(colors.by), of,
+  return fmt::format("color {} of={} range={} scale={}{}{}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
                      scale.logarithmic ? "log" : "linear",
-                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other));
+                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other),
+                     colors.mesh.empty() ? "" : " mesh=" + scriptWord(colors.mesh));
 }
 
 std::string backendText(const Backend& backend) {

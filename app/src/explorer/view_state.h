@@ -21,6 +21,7 @@ struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
   std::string other = {};  ///< of difference: the other field's file
+  std::string mesh = {};   ///< of error: what the field was made from; empty where that is known
 };
 
 struct ViewState {

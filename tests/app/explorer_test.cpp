@@ -1,0 +1,338 @@
+// The explorer without a window: what its commands, its widgets and its mouse do to what it shows.
+
+#include "explorer/explorer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+#include "commands.h"
+#include "explorer/raster.h"
+#include "hpsdf/error.h"
+#include "script.h"
+#include "support/require_gl.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A session of its own, without a terminal.
+struct Bench {
+  Registry registry = makeRegistry();
+  std::istringstream in;
+  std::ostringstream out, err;
+  Session session{registry, Console{in, out, err}};
+
+  void run(const std::string& script) { runScript(session, parseScript(registry, "test", script, {})); }
+  Explorer& explorer() { return session.explorer(); }
+  const ViewState& view() { return explorer().view(); }
+  std::string failure(const std::string& script) {
+    try {
+      run(script);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "nothing failed";
+  }
+};
+
+constexpr const char* kTorus = "build analytic:torus target-error=1e-4; show cpu=true size=900x600\n";
+
+bool same(const render::Image& a, const render::Image& b) {
+  return a.width == b.width && a.height == b.height && a.pixels == b.pixels;
+}
+
+TEST(Explorer, aCopiedViewIsRestoredExactly) {
+  Bench bench;
+  bench.run(std::string(kTorus) +
+            "camera 41.3,-17.25,0.7 target=0.1,0.2,-0.05 up=z projection=orthographic\n"
+            "surface offset=0.03125 cracks=true clip=y clip-offset=0.1\n"
+            "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
+            "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
+            "worst by=gradient page=2 ; panel build=false bar=false left-scroll=3\n"
+            "show slice samples=2 size=640x400");
+  const ViewState wanted = bench.view();
+  bench.out.str("");
+  bench.run("copy-view");
+  const std::string script = bench.out.str();
+
+  Bench other;
+  other.run(kTorus);
+  EXPECT_FALSE(other.view() == wanted);
+  const render::Image before = other.explorer().frame();
+  other.run(script);
+  EXPECT_TRUE(other.view() == wanted) << script << scriptOf(other.view());
+  EXPECT_TRUE(same(other.explorer().frame(), bench.explorer().frame()));
+  EXPECT_FALSE(same(other.explorer().frame(), before));
+
+  // whatever was shown before
+  other.run(
+      "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
+  other.run(script);
+  EXPECT_TRUE(other.view() == wanted);
+}
+
+TEST(Explorer, whatIsShownIsUndoneAndDoneAgainStepByStep) {
+  Bench bench;
+  bench.run(kTorus);
+  const ViewState first = bench.view();
+  bench.run("show slice");
+  const ViewState second = bench.view();
+  bench.run("color depth");
+  bench.run("color depth");  // changes nothing, and is no step
+  bench.run("undo");
+  EXPECT_TRUE(bench.view() == second);
+  bench.run("undo");
+  EXPECT_TRUE(bench.view() == first);
+  bench.run("redo");
+  EXPECT_TRUE(bench.view() == second);
+  bench.run("show surface");
+  EXPECT_THAT(bench.failure("redo"), HasSubstr("nothing to redo"));
+  bench.run("undo; undo; undo");  // the size, to begin with
+  EXPECT_THAT(bench.failure("undo"), HasSubstr("test:1:1: there is nothing to undo"));
+}
+
+TEST(Explorer, whatTheMouseDoesInOneGoIsOneStep) {
+  Bench bench;
+  bench.run(kTorus);
+  const ViewState before = bench.view();
+  std::vector<std::string> recorded;
+  bench.explorer().onCommand = [&](const std::string& line, bool replaces) {
+    if (replaces) recorded.pop_back();
+    recorded.push_back(line);
+  };
+  bench.run("ui drag canvas 50,-25");
+  EXPECT_NEAR(bench.view().camera.azimuthDegrees, 30 - 0.4 * 50, 1e-9);
+  EXPECT_NEAR(bench.view().camera.elevationDegrees, 20 - 0.4 * 25, 1e-9);
+  EXPECT_THAT(recorded, ::testing::ElementsAre("camera 10,10,1.1"));
+  bench.run("undo");
+  EXPECT_TRUE(bench.view() == before);
+
+  bench.run("ui wheel canvas 2");
+  EXPECT_NEAR(bench.view().camera.distance, 1.1 / (1.15 * 1.15), 1e-4);
+  bench.run("ui drag canvas 40,0 button=right");
+  ASSERT_TRUE(bench.view().camera.target);
+
+  bench.run("show slice; ui wheel canvas 3; ui drag canvas 30,10");
+  EXPECT_NEAR(bench.view().zoom, std::pow(1.15, 3), 1e-3);
+  ASSERT_TRUE(bench.view().sliceTarget);
+  const render::SlicePicture picture = slicePicture(bench.view(), bench.session.current().field);
+  EXPECT_EQ(std::get<render::AxisPlane>(picture.plane).offset, 0) << "dragging moves within the plane";
+}
+
+TEST(Explorer, aPointStaysUnderTheMouseThatDragsIt) {
+  for (const char* view : {"show slice", "show surface; camera 90,0,1", "camera projection=orthographic"}) {
+    Bench bench;
+    bench.run(std::string(kTorus) + view);
+    const bool slice = bench.view().slice;
+    bench.run("ui hover canvas");
+    bench.explorer().frame();
+    const auto [x, y] = bench.explorer().ui().pointer();
+    const UiRect canvas = layoutOf(bench.view()).canvas;
+    const auto before = render::pickAt(*bench.explorer().picture(), int(x - canvas.x0), int(y - canvas.y0) - 80);
+    bench.run(std::string("ui drag canvas 32,48") + (slice ? "" : " button=right"));
+    bench.explorer().frame();
+    const auto after =
+        render::pickAt(*bench.explorer().picture(), int(x - canvas.x0) + 32, int(y - canvas.y0) - 80 + 48);
+    ASSERT_TRUE(before && after) << view;
+    // of a surface in perspective, points away from the target's plane move by a little more or less
+    EXPECT_LT((before->position - after->position).norm(), slice ? 0.004 : 0.1) << view;
+  }
+}
+
+TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
+  Bench bench;
+  bench.run(kTorus);
+  bench.run("ui click bar/slice");
+  EXPECT_TRUE(bench.view().slice);
+  bench.run("ui click view/color; ui click view/color/value-jump");
+  EXPECT_EQ(bench.view().sliceColors.by, render::ColorBy::valueJump);
+  bench.run("ui click view/pinned");
+  ASSERT_TRUE(bench.view().sliceColors.scale.limits) << "pinned to what was chosen";
+  bench.run("ui type view/low 1e-5");
+  EXPECT_EQ((*bench.view().sliceColors.scale.limits)[0], 1e-5);
+  bench.run("ui type view/plane-offset 0.125");
+  EXPECT_EQ(bench.view().planeOffset, 0.125);
+  bench.run("ui drag view/zoom 30,0");
+  EXPECT_GT(bench.view().zoom, 2);
+  bench.run("ui click view/whole");
+  EXPECT_EQ(bench.view().zoom, 1);
+  bench.run("ui click statistics/close");
+  EXPECT_FALSE(bench.view().isOpen(Panel::statistics));
+  bench.run("ui click bar/statistics");
+  EXPECT_TRUE(bench.view().isOpen(Panel::statistics));
+  bench.run("panel histograms=false; ui click worst/next; ui click worst/2");
+  EXPECT_EQ(bench.view().worstPage, 1);
+  EXPECT_EQ(*bench.view().sliceTarget, bench.session.jumps().interfaces[bench.explorer().worst(10)[9]].worst);
+  bench.run("ui key z control=true");
+  EXPECT_FALSE(bench.view().sliceTarget);
+  bench.run("ui type build/target-error 1e-3; ui click build/rebuild");
+  EXPECT_EQ(bench.session.current().field.metadata().targetError, 1e-3);
+  EXPECT_THAT(bench.failure("ui type build/target-error abc; ui click build/rebuild"),
+              HasSubstr("target-error: expected a number"));
+}
+
+TEST(Explorer, widgetsThatAreNotThereOrTakeNoInputAreErrors) {
+  Bench bench;
+  EXPECT_THAT(bench.failure("ui click bar/slice"), HasSubstr("no field"));
+  bench.run(kTorus);
+  EXPECT_THAT(bench.failure("ui click view/colour"), HasSubstr("no widget 'view/colour'; did you mean 'view/color'?"));
+  EXPECT_THAT(bench.failure("ui click view/color/depth"), HasSubstr("no widget 'view/color/depth'")) << "not open";
+  EXPECT_THAT(bench.failure("ui click view/center"), HasSubstr("takes no input now"));
+  EXPECT_THAT(bench.failure("show size=400x200 ; ui click worst/8"), HasSubstr("widget"));
+  EXPECT_THAT(bench.failure("ui clik view/color"), HasSubstr("did you mean 'click'?"));
+  EXPECT_THAT(bench.failure("ui drag canvas 12"), HasSubstr("expected DX,DY"));
+  EXPECT_THAT(bench.failure("ui drag canvas"), HasSubstr("a value is missing"));
+  EXPECT_THAT(bench.failure("ui click canvas 3"), HasSubstr("takes no value"));
+  EXPECT_THAT(bench.failure("ui key entr"), HasSubstr("did you mean 'enter'?"));
+}
+
+TEST(Explorer, theReadoutIsWhatQueriesSay) {
+  Bench bench;
+  bench.run(std::string(kTorus) + "show slice; ui hover canvas");
+  bench.explorer().frame();
+  const auto readout = bench.explorer().readout();
+  ASSERT_TRUE(readout);
+  const Field& field = bench.session.current().field;
+  const Vector3 x = readout->pick.position;
+  EXPECT_EQ(readout->value, field.value(x));
+  EXPECT_EQ(readout->gradient, field.valueAndGradient(x).gradient);
+  EXPECT_EQ(readout->pick.cell, field.cellAt(x).id);
+  EXPECT_NEAR(readout->pick.value, readout->value, 1e-5);
+  ASSERT_TRUE(readout->exact);
+  EXPECT_NEAR(*readout->exact, 0.7 - 0.3, 0.01) << "in the middle of the torus";
+  // the nearest face by all its interfaces' corners: none of the cell's faces is nearer
+  const Cell cell = field.cellAt(x);
+  double nearest = 1e30;
+  for (int axis = 0; axis < 3; ++axis)
+    nearest = std::min({nearest, x[axis] - cell.box.min()[axis], cell.box.max()[axis] - x[axis]});
+  EXPECT_NEAR(readout->toFace, nearest, 1e-9);
+
+  bench.run("ui hover bar/slice");
+  EXPECT_FALSE(bench.explorer().readout()) << "over a panel";
+}
+
+TEST(Explorer, picksOfAShotAreWhatTheFieldSays) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  bench.run(std::string(kTorus) + "shot output=" + (folder / "a.png").string());
+  const render::Image image = render::loadPng(folder / "a.png");
+  EXPECT_TRUE(same(image, bench.explorer().frame()));
+  EXPECT_FALSE(render::pickAt(bench.session.picture(), 10, 300)) << "a panel";
+  int hits = 0;
+  for (int x = 280; x < 620; x += 7)
+    for (int y = 40; y < 540; y += 11) {
+      const auto pick = render::pickAt(bench.session.picture(), x, y);
+      if (!pick) continue;
+      ++hits;
+      const Cell cell = bench.session.current().field.cellAt(pick->position);
+      EXPECT_NEAR(bench.session.current().field.value(pick->position), pick->value, 1e-5);
+      EXPECT_EQ(pick->degree, cell.degree);
+    }
+  EXPECT_GT(hits, 200);
+  bench.run("expect pick(450,200).jump.value < 1");
+}
+
+TEST(Explorer, flyingLooksAtTheInterface) {
+  Bench bench;
+  for (const char* kind : {"slice", "surface"}) {
+    bench.run(std::string(kTorus) + "show " + kind + "; fly 3");
+    bench.explorer().frame();
+    const auto& picture = *bench.explorer().picture();
+    const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
+    const auto pick = render::pickAt(picture, picture.image.width / 2, picture.image.height / 2);
+    ASSERT_TRUE(pick) << kind;
+    EXPECT_LT((pick->position - face.worst).norm(), 0.05) << kind;
+  }
+  EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("rank: the field has"));
+}
+
+TEST(Explorer, aRebuildUnchangedIsTheSameField) {
+  Bench bench;
+  bench.run("build builtin:gear target-error=1e-3 margin=0.2 grid=3,4,5 nearness=2 max-depth=4");
+  const FieldData before = bench.session.current().field.data();
+  bench.run("rebuild");
+  EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
+  EXPECT_EQ(bench.session.current().field.data().coefficients, before.coefficients);
+  bench.run("rebuild max-steps=3");
+  EXPECT_EQ(bench.session.current().field.metadata().steps, 3u);
+  EXPECT_EQ(bench.explorer().allSteps(), before.metadata.steps) << "the slider keeps its length";
+  bench.run("rebuild");
+  EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
+  bench.run("settings mesh=builtin:torus ; rebuild");
+  EXPECT_EQ(bench.session.current().field.metadata().source.name, "builtin:torus");
+}
+
+TEST(Explorer, everyLayoutHasRoomForThePicture) {
+  for (const int width : {64, 200, 400, 700, 1280})
+    for (const int height : {64, 150, 240, 720}) {
+      ViewState view;
+      view.width = width;
+      view.height = height;
+      const Layout layout = layoutOf(view);
+      EXPECT_GE(layout.canvas.width(), 64);
+      EXPECT_GE(layout.canvas.height(), 64);
+      Bench bench;
+      bench.run("build analytic:sphere target-error=1e-2; show cpu=true size=" + std::to_string(width) + "x" +
+                std::to_string(height));
+      EXPECT_EQ(bench.explorer().frame().width, width);
+    }
+}
+
+TEST(Explorer, framesAreTheSameOnAGraphicsDevice) {
+  HPSDF_REQUIRE_GL();
+  Bench bench;
+  bench.run("build analytic:torus target-error=1e-4; show slice cpu=true size=900x600");
+  const render::Image cpu = bench.explorer().frame();
+  bench.run("show cpu=false gl=software");
+  const render::Image gl = bench.explorer().frame();
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < cpu.pixels.size(); ++i) differing += cpu.pixels[i] != gl.pixels[i];
+  EXPECT_LT(differing, cpu.pixels.size() / 500);
+}
+
+/// Adds a command of its own: a polygon as a fan of triangles.
+void addFan(ImDrawList& list, const std::vector<ImVec2>& corners, ImU32 color, const ImVec4& clip) {
+  ImDrawCmd command;
+  command.ClipRect = clip;
+  command.VtxOffset = static_cast<unsigned>(list.VtxBuffer.Size);
+  command.IdxOffset = static_cast<unsigned>(list.IdxBuffer.Size);
+  for (const ImVec2& corner : corners) list.VtxBuffer.push_back({corner, {0.5F, 0.5F}, color});
+  for (std::size_t i = 2; i < corners.size(); ++i)
+    for (const std::size_t vertex : {std::size_t{0}, i - 1, i})
+      list.IdxBuffer.push_back(static_cast<ImDrawIdx>(vertex));
+  command.ElemCount = static_cast<unsigned>(3 * (corners.size() - 2));
+  list.CmdBuffer.push_back(command);
+}
+
+TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
+  ImDrawList list(nullptr);
+  // half transparent: a pixel drawn twice would be too dark
+  addFan(list, {{4, 4}, {60, 4}, {60, 60}, {4, 60}}, IM_COL32(0, 0, 0, 128), {0, 0, 64, 64});
+  addFan(list, {{1, 1}, {20, 1}, {20, 20}}, IM_COL32(255, 0, 0, 255), {0, 0, 10, 64});
+  ImDrawList* lists[] = {&list};
+  ImDrawData data;
+  data.CmdLists = lists;
+  data.CmdListsCount = 1;
+  const Coverage white{1, 1, {255}};
+  render::Image image(64, 64, {200, 200, 200});
+  paint(image, data, white);
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const bool inSquare = x >= 4 && x < 60 && y >= 4 && y < 60;
+      const bool inTriangle = x >= 1 && x < 10 && y >= 1 && y < x;  // below its slope, before the clip
+      if (y == x && x < 10) continue;                               // through the centres: either is right
+      const render::Color expected = inTriangle ? render::Color{255, 0, 0}
+                                     : inSquare ? render::Color{100, 100, 100}
+                                                : render::Color{200, 200, 200};
+      ASSERT_EQ(image.at(x, y), expected) << x << ", " << y;
+    }
+}
+
+}  // namespace
+}  // namespace hpsdf::app
