@@ -249,7 +249,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
   // planes and cameras are those of the current field, so that both show the same part of space
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), evidence)
-                     : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);
+                     : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), evidence);
 }
 
 void Explorer::drawPicture(int shrink) {
