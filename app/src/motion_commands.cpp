@@ -87,6 +87,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
       session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
+  picture = surfacePicture(arguments, field.domain());
   const double first = picture.camera.azimuthDegrees;
   Json rows = Json::array();
   bool seen = false;
@@ -105,7 +106,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
     film.encode(arguments.number("fps"), progress);
     return image;
   });
-  noteOddSurface(session.console(), field, picture.offset, seen);
+  noteOddSurface(session.console(), field, picture, seen);
   publish(session, arguments, film, last, rows);
 }
 
@@ -150,8 +151,9 @@ render::Drawn drawLook(Session& session, const Call& look, const std::optional<r
         session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
     return draw(session.renderer(backend(arguments)), session.current().field, picture, evidence);
   };
-  if (!isSlice(look)) return drawn(surfacePicture(arguments), render::drawSurface);
-  return drawn(slicePicture(arguments, session.current().field.domain()), render::drawSlice);
+  const Box& domain = session.current().field.domain();
+  if (!isSlice(look)) return drawn(surfacePicture(arguments, domain), render::drawSurface);
+  return drawn(slicePicture(arguments, domain), render::drawSlice);
 }
 
 /// The steps after which a frame is drawn: none, then 1 growing by an even factor to all, each more than the one

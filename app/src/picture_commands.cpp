@@ -109,13 +109,16 @@ void runSlice(Session& session, const Arguments& arguments) {
 
 }  // namespace
 
-void noteOddSurface(const Console& console, const Field& field, double offset, bool seen) {
+void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {
   if (!seen)
-    console.err << "hpsdf: note: no surface in view: move the camera, or give an offset nearer to 0" << std::endl;
-  if (render::meetsWalls(field, offset))
-    console.err << "hpsdf: note: the surface meets the walls of the domain and is cut off there: "
-                << (offset == 0 ? "build" : "give an offset nearer to 0, or build") << " a field with a larger margin"
+    console.err << "hpsdf: note: "
+                << (picture.surface ? "no surface in view: move the camera, or give an offset nearer to 0"
+                                    : "nothing of the field in view: move the camera, or choose a plane or cells")
                 << std::endl;
+  if (picture.surface && render::meetsWalls(field, picture.offset))
+    console.err << "hpsdf: note: the surface meets the walls of the domain and is cut off there: "
+                << (picture.offset == 0 ? "build" : "give an offset nearer to 0, or build")
+                << " a field with a larger margin" << std::endl;
 }
 
 namespace {
@@ -123,7 +126,7 @@ namespace {
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
-  const render::SurfacePicture picture = surfacePicture(arguments);
+  render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
@@ -131,9 +134,10 @@ void runRender(Session& session, const Arguments& arguments) {
       session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
+  picture = surfacePicture(arguments, field.domain());
   session.setPicture(render::drawSurface(renderer, field, picture, evidence));
   savePng(session.picture().image, file);
-  noteOddSurface(session.console(), field, picture.offset, session.picture().seen);
+  noteOddSurface(session.console(), field, picture, session.picture().seen);
   report(session, arguments, picture.width, picture.height, renderer);
 }
 
@@ -153,6 +157,14 @@ std::vector<Parameter> pictureParameters() {
                                         .defaultText = "1",
                                         .minimum = 1,
                                         .maximum = 8}};
+  parameters.push_back({.name = "arrows",
+                        .type = ParameterType::wholeNumber,
+                        .help = "Arrows along the gradient, so many pixels apart; 0 for none. Where its length is 1, "
+                                "an arrow is 0.8 of that long, but for what the projection takes from it.",
+                        .defaultText = "0",
+                        .unit = "pixels",
+                        .minimum = 0,
+                        .maximum = 1000});
   for (Parameter& parameter : backendParameters()) parameters.push_back(std::move(parameter));
   return parameters;
 }
@@ -330,6 +342,71 @@ std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCel
 
 }  // namespace
 
+std::vector<int> levelList(const std::string& text, const char* name, int most) {
+  if (text.empty()) return {};
+  const auto refuse = [&] {
+    throw Error(
+        fmt::format("{}: expected whole numbers and ranges from 0 to {} with commas between them, as in 2,4-6; "
+                    "found '{}'",
+                    name, most, text));
+  };
+  const auto level = [&](std::string_view word) {
+    const auto number = parseNumber(word);
+    if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
+    return static_cast<int>(*number);
+  };
+  std::vector<int> levels;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    const std::string_view part = std::string_view(text).substr(start, end - start);
+    const std::size_t dash = part.find('-');
+    const int first = level(part.substr(0, dash));
+    const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
+    if (first > last) refuse();
+    for (int i = first; i <= last; ++i) levels.push_back(i);
+    start = end + 1;
+  }
+  std::ranges::sort(levels);
+  levels.erase(std::ranges::unique(levels).begin(), levels.end());
+  return levels;
+}
+
+render::CellStyle cellStyle(std::string_view name) {
+  return name == "lines"   ? render::CellStyle::lines
+         : name == "boxes" ? render::CellStyle::boxes
+                           : render::CellStyle::none;
+}
+
+namespace {
+
+render::ShownCells shownCells(const Arguments& arguments) {
+  const std::string style = arguments.text("cells");
+  for (const char* name : {"degrees", "depths"})
+    if (style == "none" && arguments.given(name))
+      throw Error(fmt::format("{}: needs cells, lines or boxes: it says which of them are drawn", name));
+  return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
+          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
+}
+
+render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
+
+/// The plane in a surface's picture: six numbers, or an axis with an offset.
+std::optional<render::Plane> scenePlane(const Arguments& arguments) {
+  if (!arguments.given("plane")) {
+    if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
+    return std::nullopt;
+  }
+  if (const auto numbers = arguments.numbers("plane"); !numbers.empty()) {
+    if (arguments.given("plane-offset"))
+      throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
+    return freePlane(numbers);
+  }
+  return render::AxisPlane{arguments.text("plane")[0] - 'x',
+                           arguments.given("plane-offset") ? arguments.number("plane-offset") : 0};
+}
+
+}  // namespace
+
 Vector3 pointOf(const Arguments& arguments, const char* name) {
   const auto p = arguments.numbers(name);
   return {p[0], p[1], p[2]};
@@ -340,8 +417,7 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
   if (arguments.given("plane")) {
     if (arguments.given("axis") || arguments.given("offset"))
       throw Error("plane: excludes axis and offset; give one or the other");
-    const auto n = arguments.numbers("plane");
-    picture.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
+    picture.plane = freePlane(arguments.numbers("plane"));
   } else {
     picture.plane =
         render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
@@ -353,6 +429,7 @@ render::SlicePicture slicePicture(const Arguments& arguments) {
   picture.width = arguments.size("size")[0];
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
+  picture.arrows = arguments.whole("arrows");
   return picture;
 }
 
@@ -385,11 +462,22 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   else if (arguments.given("clip-offset"))
     throw Error("clip-offset: needs clip, the axis that it lies on");
   picture.cracks = arguments.flag("cracks");
+  picture.surface = arguments.flag("surface");
+  picture.plane = scenePlane(arguments);
+  picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.width = arguments.size("size")[0];
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
+  picture.arrows = arguments.whole("arrows");
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
+  render::SurfacePicture picture = surfacePicture(arguments);
+  auto* plane = picture.plane ? std::get_if<render::AxisPlane>(&*picture.plane) : nullptr;
+  if (plane != nullptr && !arguments.given("plane-offset")) plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 
@@ -463,6 +551,9 @@ void addPictureCommands(Registry& registry) {
                     "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
                     "hpsdf render bunny.hpsdf -o inside.png --clip z --color degree",
                     "hpsdf render bunny.hpsdf -o front.png --view front --projection orthographic --cracks",
+                    "hpsdf render bunny.hpsdf -o scene.png --plane z --cells boxes --degrees 4-30 --color degree",
+                    "hpsdf render bunny.hpsdf -o cells.png --surface=false --cells lines --depths 0-3",
+                    "hpsdf render bunny.hpsdf -o gradients.png --arrows 32",
                     "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
        .parameters =
            {fieldParameter(),
@@ -516,7 +607,38 @@ void addPictureCommands(Registry& registry) {
              .type = ParameterType::flag,
              .help = "Mark in magenta where the surface is torn: the field jumps over the distance drawn from one cell "
                      "to the next. The caption has the widest jump.",
-             .defaultText = "false"}},
+             .defaultText = "false"},
+            {.name = "surface",
+             .type = ParameterType::flag,
+             .help = "Whether the surface is drawn: without it, planes and cells can be looked at alone.",
+             .defaultText = "true"},
+            {.name = "plane",
+             .type = ParameterType::numbers,
+             .help = "Also draw the domain's section with a plane, in the picture's colours, its cells outlined, the "
+                     "surface as a line: across this axis, or through a point with a normal.",
+             .valueName = "x|y|z|PX,PY,PZ,NX,NY,NZ",
+             .unit = "world units",
+             .choices = {"x", "y", "z"},
+             .counts = {6}},
+            {.name = "plane-offset",
+             .type = ParameterType::number,
+             .help = "Where such a plane crosses its axis; when left out, at 0, or in the domain's middle where 0 lies "
+                     "outside.",
+             .unit = "world units"},
+            {.name = "cells",
+             .type = ParameterType::choice,
+             .help = "Also draw the octree's cells: as lines along their edges, those of cells that are small in the "
+                     "picture faded, or as boxes of 0.8 of their extent in the picture's colours.",
+             .defaultText = "none",
+             .choices = {"none", "lines", "boxes"}},
+            {.name = "degrees",
+             .type = ParameterType::text,
+             .help = "Only cells of these polynomial degrees: numbers and ranges, as in 2,4-6.",
+             .valueName = "LIST"},
+            {.name = "depths",
+             .type = ParameterType::text,
+             .help = "Only cells of these depths in the octree.",
+             .valueName = "LIST"}},
        .action = runRender},
       joined(colorParameters(ColorBy::distance,
                              "normal lights the surface; degree and depth show the cells that hold it.", "normal"),

@@ -30,6 +30,12 @@ void turnTo(render::OrbitCamera& camera, std::string_view view);
 /// The name of its direction; "" where it has none.
 std::string viewName(const render::OrbitCamera& camera);
 
+/// none, lines or boxes.
+render::CellStyle cellStyle(std::string_view name);
+
+/// "2,4-6" → 2, 4, 5, 6; empty for "". Throws `Error` naming the parameter.
+std::vector<int> levelList(const std::string& text, const char* name, int most);
+
 /// Of a parameter that takes three numbers and was given.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
@@ -38,11 +44,13 @@ Vector3 pointOf(const Arguments& arguments, const char* name);
 render::SlicePicture slicePicture(const Arguments& arguments);
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
 
-/// Throws `Error` for a camera out of range.
+/// Throws `Error` for a camera out of range, or options that exclude or need each other. Its plane is the one asked
+/// for, or, in a domain, lies where nobody said otherwise.
 render::SurfacePicture surfacePicture(const Arguments& arguments);
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain);
 
 /// Tells what explains an empty picture, or an open shell.
-void noteOddSurface(const Console& console, const Field& field, double offset, bool seen);
+void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
 /// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.
 double defaultOffset(const Box& domain, int axis);

@@ -8,7 +8,9 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <unordered_map>
+#include <utility>
 
 namespace hpsdf::render {
 namespace {
@@ -21,6 +23,8 @@ constexpr Color kSurfaceLine = {255, 255, 255};
 constexpr Color kSurfaceCasing = {16, 14, 34};
 constexpr Color kClay = {210, 153, 119};
 constexpr Color kSection = {238, 222, 205};  // of clay that is cut
+constexpr Color kAir = {222, 228, 235};      // of a plane outside of the solid
+constexpr Color kPlainBox = {222, 216, 204};
 
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
@@ -64,12 +68,24 @@ float coverage(double distance, double width) {
   return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
 }
 
+// Planes, which are flat and have their cells outlined.
+bool isFlat(const ViewBuffers& buffers, std::size_t i) {
+  return buffers.shows(i, Shown::section) || buffers.shows(i, Shown::plane);
+}
+
 // Outlines of cells: on the first samples of a cell from the left and from the top, so that they are as crisp as the
 // samples allow and never two wide.
 class CellOutlines {
  public:
-  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling)
-      : buffers_(buffers), width_(sampling.lineWidth * sampling.samples) {
+  /// Of a slice; `inScene`: of the planes among what a camera sees.
+  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling, bool inScene)
+      : buffers_(buffers), inScene_(inScene), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
+    if (inScene) {
+      flatCells_ = buffers.cell;
+      for (std::size_t i = 0; i < flatCells_.size(); ++i)
+        if (!isFlat(buffers, i)) flatCells_[i] = kNoCell;
+      cell_ = flatCells_;
+    }
     reach_ = static_cast<int>(std::ceil(width_));
     measureCells();
   }
@@ -88,7 +104,7 @@ class CellOutlines {
   void measureCells() {
     std::unordered_map<std::uint32_t, Extent> extents;
     for (int y = 0; y < buffers_.height; ++y) {
-      const std::uint32_t* row = &buffers_.cell[std::size_t(y) * buffers_.width];
+      const std::uint32_t* row = &cell_[std::size_t(y) * buffers_.width];
       for (int x0 = 0, x1; x0 < buffers_.width; x0 = x1) {
         for (x1 = x0 + 1; x1 < buffers_.width && row[x1] == row[x0];) ++x1;
         if (row[x0] == kNoCell) continue;
@@ -106,40 +122,53 @@ class CellOutlines {
 
   // `position` on the axis counts the samples before this one; `step` leads to the one just before it.
   float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
-    const std::uint32_t* cell = &buffers_.cell[std::size_t(y) * buffers_.width + x];
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    const std::uint32_t* cell = &cell_[i];
     const int reach = std::min(reach_, position);
     // Cells are convex: equal ends mean that nothing lies between.
     if (reach == 0 || cell[reach * step] == *cell) return 0;
     int k = 1;
     while (cell[k * step] == *cell) ++k;
+    if (hidden(i, i + k * step)) return 0;
     const float strength = std::max(strengths_.at(*cell), strengths_.at(cell[k * step]));
     return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
   }
 
+  // Where a plane ends behind something else, that is no edge of its own.
+  bool hidden(std::size_t i, std::size_t j) const {
+    if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
+    const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
+    return buffers_.hit(other) && buffers_.distance[other] < buffers_.distance[flat];
+  }
+
   const ViewBuffers& buffers_;
+  bool inScene_;
+  std::vector<std::uint32_t> flatCells_;
+  std::span<const std::uint32_t> cell_;
   double width_;  // in samples
   int reach_;
   std::unordered_map<std::uint32_t, float> strengths_;
 };
 
-// The values of a slice as a landscape: where its contour lines run.
+// The values of a slice, or of a plane before a camera, as a landscape: where its contour lines run.
 class Contours {
  public:
-  explicit Contours(const ViewBuffers& buffers, double sampleSize) : buffers_(buffers), sampleSize_(sampleSize) {}
+  /// Zero lines are those of the value less `zero`.
+  explicit Contours(const ViewBuffers& buffers, double zero = 0) : buffers_(buffers), zero_(zero) {}
 
-  /// Change of the value a sample, at least that of the flattest slope.
-  double slope(int x, int y) const {
+  /// Change of the value a sample, at least that of the flattest slope where samples are this far apart.
+  double slope(int x, int y, double sampleSize) const {
     const std::size_t i = index(x, y);
     const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);
     const double dy = derivative(i, buffers_.width, y > 0, y + 1 < buffers_.height);
-    return std::max(std::hypot(dx, dy), kFlattestSlope * sampleSize_);
+    return std::max(std::hypot(dx, dy), kFlattestSlope * sampleSize);
   }
 
   /// Distance of sample (x, y) from the zero line, in samples. Where the field jumps over 0 from one cell to the next,
   /// the line runs between the two samples.
   double toZero(int x, int y, double slopeHere) const {
     const std::size_t i = index(x, y);
-    double distance = std::abs(buffers_.value[i]) / slopeHere;
+    double distance = std::abs(buffers_.value[i] - zero_) / slopeHere;
     if (x > 0) distance = std::min(distance, toCrossing(i, i - 1));
     if (x + 1 < buffers_.width) distance = std::min(distance, toCrossing(i, i + 1));
     if (y > 0) distance = std::min(distance, toCrossing(i, i - buffers_.width));
@@ -154,8 +183,8 @@ class Contours {
   double derivative(std::size_t i, std::size_t step, bool hasBefore, bool hasAfter) const {
     const auto& cell = buffers_.cell;
     const auto& value = buffers_.value;
-    hasBefore = hasBefore && buffers_.hit(i - step);
-    hasAfter = hasAfter && buffers_.hit(i + step);
+    hasBefore = hasBefore && joined(i, i - step);
+    hasAfter = hasAfter && joined(i, i + step);
     const bool before = hasBefore && cell[i - step] == cell[i];
     const bool after = hasAfter && cell[i + step] == cell[i];
     if (before && after) return (double(value[i + step]) - value[i - step]) / 2;
@@ -167,13 +196,34 @@ class Contours {
   }
 
   double toCrossing(std::size_t i, std::size_t neighbour) const {
-    const double here = buffers_.value[i], there = buffers_.value[neighbour];
-    if (!buffers_.hit(neighbour) || (here < 0) == (there < 0)) return std::numeric_limits<double>::infinity();
+    const double here = buffers_.value[i] - zero_, there = buffers_.value[neighbour] - zero_;
+    if (!joined(i, neighbour) || (here < 0) == (there < 0)) return std::numeric_limits<double>::infinity();
     return std::abs(here) / (std::abs(here) + std::abs(there));
   }
 
+  // Whether a neighbour belongs to the same plane.
+  bool joined(std::size_t i, std::size_t neighbour) const {
+    return buffers_.hit(neighbour) && (buffers_.shown.empty() || buffers_.shown[i] == buffers_.shown[neighbour]);
+  }
+
   const ViewBuffers& buffers_;
-  double sampleSize_;
+  double zero_;
+};
+
+// The line along which a plane meets the surface: white between dark borders.
+class SurfaceLine {
+ public:
+  explicit SurfaceLine(const Sampling& sampling) : thin_(sampling.lineWidth * sampling.samples) {}
+
+  /// Over a colour at this distance from the line's middle, in samples.
+  LinearColor operator()(const LinearColor& ground, double distance) const {
+    const LinearColor cased = mix(ground, casing_, 0.8F * coverage(distance, kCasingWidth * thin_));
+    return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));
+  }
+
+ private:
+  double thin_;
+  LinearColor line_ = decodeSrgb(kSurfaceLine), casing_ = decodeSrgb(kSurfaceCasing);
 };
 
 // Where the samples of a view hit the surface, in the camera's frame: x right, y up, z towards the eye, which is the
@@ -313,7 +363,10 @@ class SurfaceShader {
     const Eigen::Vector3f toEye = -frame_.ray(x, y);
     const Eigen::Vector3f n = frame_.normal(x, y, toEye);
     const float open = openness_(x, y, frame_.position(x, y), n);
-    if (!color_) return clay_.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
+    if (!color_) {
+      const LinearColor& material = buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
+      return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
+    }
     // Softer than clay, and without colour of its own: the legend's colour must stay recognisable.
     const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
     return color_(i) * light * (0.35F + 0.65F * open) +
@@ -326,7 +379,7 @@ class SurfaceShader {
   Openness openness_;
   const SampleColor& color_;
   Lights lights_;
-  LinearColor clay_ = decodeSrgb(kClay);
+  LinearColor clay_ = decodeSrgb(kClay), plainBox_ = decodeSrgb(kPlainBox);
 };
 
 }  // namespace
@@ -348,11 +401,10 @@ SampleColor quantityColors(const std::vector<float>& quantity, const ColorScale&
 }
 
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
-  const CellOutlines outlines(buffers, sampling);
-  const Contours contours(buffers, sampling.sampleSize);
+  const CellOutlines outlines(buffers, sampling, false);
+  const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
-  const LinearColor line = decodeSrgb(kSurfaceLine), casing = decodeSrgb(kSurfaceCasing);
-  const double thin = sampling.lineWidth * sampling.samples;
+  const SurfaceLine lines(sampling);
   return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t i = std::size_t(y) * buffers.width + x;
@@ -360,9 +412,7 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
       sample = buffers.hit(i) ? color(i) : paper;
       sample = mix(sample, outline, float(kOutlineStrength) * outlines(x, y));
       if (!buffers.hit(i)) continue;
-      const double toSurface = contours.toZero(x, y, contours.slope(x, y));
-      sample = mix(sample, casing, 0.8F * coverage(toSurface, kCasingWidth * thin));
-      sample = mix(sample, line, coverage(toSurface, kSurfaceWidth * thin));
+      sample = lines(sample, contours.toZero(x, y, contours.slope(x, y, sampling.sampleSize)));
     }
   });
 }
@@ -372,7 +422,7 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   std::vector<LinearColor> table(2 * kSteps + 1);
   for (int i = -kSteps; i <= kSteps; ++i) table[i + kSteps] = divergingColor(double(i) / kSteps);
 
-  const Contours contours(buffers, sampling.sampleSize);
+  const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(kPaper), isoLine = decodeSrgb(kIsoLine), zeroLine = decodeSrgb(kZeroLine);
   const double thin = sampling.lineWidth * sampling.samples;
   return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
@@ -383,7 +433,7 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
       if (!buffers.hit(i)) continue;
       const double value = buffers.value[i];
       sample = table[static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps)) + kSteps];
-      const double slope = contours.slope(x, y);
+      const double slope = contours.slope(x, y, sampling.sampleSize);
       const double nearest = std::round(value / scale.step);
       if (nearest != 0) {
         const double distance = std::abs(value - nearest * scale.step) / slope;
@@ -394,22 +444,29 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
-                   const Sampling& sampling) {
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
+                   double offset, const std::vector<float>& lines) {
   const SurfaceShader shader(buffers, camera, color);
+  const Contours contours(buffers, offset);
+  const SurfaceLine surfaceLine(sampling);
   std::optional<CellOutlines> outlines;
-  if (!buffers.section.empty()) outlines.emplace(buffers, sampling);
-  const LinearColor outline = decodeSrgb(kOutline), plain = decodeSrgb(kSection);
+  if (!buffers.shown.empty()) outlines.emplace(buffers, sampling, true);
+  const LinearColor outline = decodeSrgb(kOutline), solid = decodeSrgb(kSection), air = decodeSrgb(kAir);
+  const auto flatColor = [&](std::size_t i) {
+    return color ? color(i) : buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
+  };
   return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
     const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t i = std::size_t(y) * buffers.width + x;
-      if (!buffers.hit(i))
-        row[x] = ground;
-      else if (!buffers.section.empty() && buffers.section[i])
-        row[x] = mix(color ? color(i) : plain, outline, float(kOutlineStrength) * (*outlines)(x, y));
-      else
-        row[x] = shader(x, y);
+      LinearColor& sample = row[x];
+      sample = !buffers.hit(i) ? ground : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
+      if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
+      if (buffers.shows(i, Shown::plane)) {
+        const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));
+        sample = surfaceLine(sample, contours.toZero(x, y, slope));
+      }
+      if (!lines.empty()) sample = mix(sample, outline, float(kOutlineStrength) * lines[i]);
     }
   });
 }

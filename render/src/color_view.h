@@ -32,10 +32,11 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 /// The diverging map under iso-lines, the zero line heavy.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded.
-/// A clipping plane's section is flat, its cells outlined.
-Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
-                   const Sampling& sampling);
+/// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded; boxes
+/// likewise. Planes are flat, their cells outlined; where no clipping plane, with the surface f = offset as a line.
+/// `lines`: of cells, how strongly each sample is covered; or empty.
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
+                   double offset = 0, const std::vector<float>& lines = {});
 
 /// What is drawn where a slice leaves the domain, and under legend and caption.
 Color paperColor();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "hpsdf/error.h"
+#include "view_buffers.h"
 
 namespace hpsdf::render {
 namespace {
@@ -77,8 +78,8 @@ RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, in
   checkFinite(camera.right, "right vector");
   checkFinite(camera.up, "up vector");
   if (forward.isZero(0)) throw Error("a camera's forward vector is zero: give a direction to look along");
+  checkClip(clip);
   if (!clip) return;
-  if (!std::isfinite(clip->offset)) throw Error("a clipping plane's offset is not finite: give a finite number");
   // a little within what is kept: a cut along faces then starts in cells on that side, in single precision too
   const bool above = eyeAbove(camera, *clip);
   const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "arrows.h"
+#include "cells.h"
 #include "color_view.h"
 #include "cracks.h"
 #include "describe.h"
@@ -15,6 +17,7 @@
 #include "legend.h"
 #include "quantity.h"
 #include "section.h"
+#include "view_buffers.h"
 
 namespace hpsdf::render {
 namespace {
@@ -87,11 +90,30 @@ void addAxesOf(Furniture& furniture, const Frame& frame, const SliceView& view, 
   if (right && up && !section.empty()) addAxes(furniture, frame, section, *right, *up);
 }
 
-std::string describePlane(const SlicePicture& picture) {
-  if (const auto* axis = std::get_if<AxisPlane>(&picture.plane))
-    return std::string("slice ") + "xyz"[axis->axis] + " = " + formatNumber(axis->offset);
-  const auto& plane = std::get<FreePlane>(picture.plane);
-  return "slice through " + formatVector(plane.point) + " with normal " + formatVector(plane.normal);
+std::string describePlane(const std::string& name, const Plane& plane) {
+  if (const auto* axis = std::get_if<AxisPlane>(&plane))
+    return name + " " + "xyz"[axis->axis] + " = " + formatNumber(axis->offset);
+  const auto& free = std::get<FreePlane>(plane);
+  return name + " through " + formatVector(free.point) + " with normal " + formatVector(free.normal);
+}
+
+/// "2, 4–6" of ascending levels.
+std::string describeRuns(const std::vector<int>& levels) {
+  std::string text;
+  for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {
+    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1;) ++last;
+    text += (i == 0 ? "" : ", ") + std::to_string(levels[i]);
+    if (last > i) text += "–" + std::to_string(levels[last]);
+  }
+  return text;
+}
+
+std::string describeCells(const ShownCells& cells) {
+  std::string text = cells.style == CellStyle::lines ? "edges of cells" : "cells";
+  if (!cells.degrees.empty()) text += " of degree " + describeRuns(cells.degrees);
+  if (!cells.depths.empty())
+    text += std::string(cells.degrees.empty() ? " of" : ",") + " depth " + describeRuns(cells.depths);
+  return text;
 }
 
 std::vector<int> levelsOf(const std::map<int, double>& shares) {
@@ -199,6 +221,19 @@ std::span<const std::string> titlesOf(ColorBy quantity) {
   }
 }
 
+void checkArrows(int spacing) {
+  if (spacing != 0 && (spacing < 4 || spacing > 1000))
+    throw Error("arrows = " + std::to_string(spacing) + " is out of range: give 4 to 1000 pixels between them, or 0");
+}
+
+// Over the finished view, under legend and caption.
+template <typename View>
+void addArrows(Image& image, const Frame& frame, const Field& field, const View& view, const ViewBuffers& buffers,
+               int samples, int spacing) {
+  if (spacing > 0)
+    paintArrows(image, frame.view, gradientArrows(field, view, buffers, samples, spacing), lineWidthOf(frame));
+}
+
 void checkColor(ColorBy color, ColorBy inapplicable, const Evidence& evidence) {
   if (color == inapplicable)
     throw Error(color == ColorBy::normal ? "a slice has no normals to light: choose another colour"
@@ -225,16 +260,6 @@ std::string describeGreatest(const std::vector<float>& values) {
   for (const float value : values)
     if (value > greatest) greatest = value;
   return greatest < 0 ? "nothing shown" : "up to " + formatNumber(greatest, 3);
-}
-
-Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y) {
-  return pixelPoint(view, x, y, buffers.width, buffers.height);
-}
-
-Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
-  return pixelEye(view.camera, x, y, buffers.width, buffers.height) +
-         pixelRay(view.camera, x, y, buffers.width, buffers.height) *
-             buffers.distance[std::size_t(y) * buffers.width + x];
 }
 
 template <typename View>
@@ -279,11 +304,11 @@ ViewSize viewSize(int pictureWidth, int pictureHeight) {
 
 namespace {
 
-SliceView wholeSection(const Box& domain, const SlicePicture& picture, int width, int height) {
-  if (const auto* axis = std::get_if<AxisPlane>(&picture.plane))
+SliceView wholeSection(const Box& domain, const Plane& plane, int width, int height) {
+  if (const auto* axis = std::get_if<AxisPlane>(&plane))
     return axisSlice(domain, axis->axis, axis->offset, width, height);
-  const auto& plane = std::get<FreePlane>(picture.plane);
-  return planeSlice(domain, plane.point, plane.normal, width, height);
+  const auto& free = std::get<FreePlane>(plane);
+  return planeSlice(domain, free.point, free.normal, width, height);
 }
 
 }  // namespace
@@ -293,7 +318,7 @@ SliceView sliceView(const Field& field, const SlicePicture& picture, int width, 
     throw Error("zoom = " + formatNumber(picture.zoom) + " is out of range: give a number above 0");
   if (picture.target && !picture.target->allFinite())
     throw Error("the slice's target is not finite: give three coordinates");
-  SliceView view = wholeSection(field.domain(), picture, width, height);
+  SliceView view = wholeSection(field.domain(), picture.plane, width, height);
   if (picture.target)
     for (const Vector3& side : {view.right, view.up})  // only within the plane: its offset stays exact
       view.origin += side * (side.dot(*picture.target - view.origin) / side.squaredNorm());
@@ -316,6 +341,7 @@ Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, 
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence) {
   Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::normal, evidence);
+  checkArrows(picture.arrows);
   const SliceView view = sliceView(field, picture);
   const int samples = picture.samples;
   ViewBuffers buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples);
@@ -336,7 +362,8 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     addDistanceBar(furniture, frame, scale);
     legend = distanceLegend(scale);
     place(image, colorDistanceSlice(buffers, scale, sampling));
-    details = {"distance", describePlane(picture), formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
+    details = {"distance", describePlane("slice", picture.plane),
+               formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
                "lines every " + formatNumber(scale.step)};
   } else if (isQuantity(picture.color)) {
     const Measured measured = measure(field, buffers, pointsOf(view, buffers), picture.color, picture.scale, evidence);
@@ -344,15 +371,17 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     drawn.limits = {measured.scale.low(), measured.scale.high()};
     legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
     place(image, colorCellSlice(buffers, quantityColors(measured.values, measured.scale), sampling));
-    details = {titlesOf(picture.color).back(), describePlane(picture), describeGreatest(measured.values)};
+    details = {titlesOf(picture.color).back(), describePlane("slice", picture.plane),
+               describeGreatest(measured.values)};
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree, picture.scale.levels);
     drawn.levels = map.levels();
     legend = levelLegend(figures, degree, map);
     place(image, colorCellSlice(buffers, levelColors(buffers, map, picture.color), sampling));
-    details = {degree ? "degree" : "depth", describePlane(picture)};
+    details = {degree ? "degree" : "depth", describePlane("slice", picture.plane)};
   }
+  addArrows(image, frame, field, view, buffers, samples, picture.arrows);
   addAxesOf(furniture, frame, view, section);
   details.push_back(formatCount(figures.leaves) + " cells");
   details.push_back(describeTarget(field));
@@ -362,6 +391,35 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
           std::move(drawn)};
 }
 
+namespace {
+
+// What is in a picture of a surface; `lines` are its cells' edges.
+struct Scene {
+  ViewBuffers buffers;
+  std::vector<float> lines = {};
+
+  bool seen() const {
+    return std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; }) ||
+           std::ranges::any_of(lines, [](float strength) { return strength > 0; });
+  }
+};
+
+Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& picture, const SurfaceView& view, int width,
+              int height, double lineWidth) {
+  Scene scene{picture.surface ? renderer.surface(view, width, height) : emptyBuffers(width, height, true)};
+  if (picture.surface) addSection(field, view, scene.buffers);
+  if (picture.plane) addPlane(field, view, wholeSection(field.domain(), *picture.plane, 1, 1), scene.buffers);
+  if (picture.cells.style == CellStyle::none) return scene;
+  const std::vector<Cell> cells = chosenCells(field, picture.cells);
+  if (picture.cells.style == CellStyle::boxes)
+    addBoxes(field, view, cells, scene.buffers);
+  else
+    scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
+  return scene;
+}
+
+}  // namespace
+
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
   return drawSurface(renderer, field, picture, evidence).image;
 }
@@ -369,19 +427,27 @@ Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
+  checkArrows(picture.arrows);
+  checkOffset(picture.offset);
+  checkClip(picture.clip);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const SurfaceView view{cameraOf(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
-  ViewBuffers buffers = renderer.surface(view, width * samples, height * samples);
-  addSection(field, view, buffers);
   const Sampling sampling{samples, lineWidthOf(frame), 1};
+  Scene scene =
+      sceneOf(renderer, field, picture, view, width * samples, height * samples, sampling.lineWidth * samples);
+  ViewBuffers& buffers = scene.buffers;
   const FieldStatistics figures = statistics(field);
 
   Furniture furniture;
   Image image(picture.width, picture.height, paperColor());
   for (int y = 0; y < height; ++y)
     std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
+  const auto colorScene = [&](const SampleColor& color) {
+    place(image, colorSurface(buffers, view.camera, color, sampling, picture.offset, scene.lines));
+  };
   Legend legend;
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
+  const std::string onSurface = picture.surface ? " on the " + surface : "";
   std::vector<std::string> details;
   ScaleOptions drawn = picture.scale;
   if (isQuantity(picture.color)) {
@@ -389,24 +455,27 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     addScaleBar(furniture, frame, titlesOf(picture.color), measured.scale);
     drawn.limits = {measured.scale.low(), measured.scale.high()};
     legend = scaleLegend(titlesOf(picture.color).front(), measured.scale);
-    place(image, colorSurface(buffers, view.camera, quantityColors(measured.values, measured.scale), sampling));
-    details = {titlesOf(picture.color).back() + " on the " + surface, describeGreatest(measured.values)};
+    colorScene(quantityColors(measured.values, measured.scale));
+    details = {titlesOf(picture.color).back() + onSurface, describeGreatest(measured.values)};
   } else if (picture.color == ColorBy::normal) {
     addFieldFacts(furniture, frame, field, figures);
-    place(image, colorSurface(buffers, view.camera, {}, sampling));
-    details = {surface};
+    colorScene({});
+    if (picture.surface) details = {surface};
   } else {
     const bool degree = picture.color == ColorBy::degree;
     const LevelMap map = addLevels(furniture, frame, figures, degree, picture.scale.levels);
     drawn.levels = map.levels();
     legend = levelLegend(figures, degree, map);
-    place(image, colorSurface(buffers, view.camera, levelColors(buffers, map, picture.color), sampling));
-    details = {(degree ? "degree on the " : "depth on the ") + surface};
+    colorScene(levelColors(buffers, map, picture.color));
+    details = {(degree ? "degree" : "depth") + onSurface};
   }
   if (picture.cracks) {
     markCracks(image, buffers, sampling);
     details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   }
+  addArrows(image, frame, field, view, buffers, samples, picture.arrows);
+  if (picture.plane) details.push_back(describePlane("plane", *picture.plane));
+  if (picture.cells.style != CellStyle::none) details.push_back(describeCells(picture.cells));
   const bool parallel = picture.camera.projection == Projection::orthographic;
   details.push_back((parallel ? "orthographic camera " : "camera ") + formatNumber(picture.camera.azimuthDegrees) +
                     "°, " + formatNumber(picture.camera.elevationDegrees) + "°" +
@@ -417,7 +486,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   details.push_back(describeTarget(field));
   addCaption(furniture, frame, describeSource(field), details);
   paint(image, furniture);
-  const bool seen = std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; });
+  const bool seen = scene.seen();
   return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), std::move(details),
           std::move(drawn)};
 }

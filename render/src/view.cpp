@@ -174,4 +174,29 @@ Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height) {
              : onPicture(camera, camera.forward, x, y, width, height).normalized();
 }
 
+PicturePoint project(const Camera& camera, const Vector3& point, int width, int height) {
+  const bool parallel = camera.projection == Projection::orthographic;
+  const Vector3 from = point - camera.eye;
+  const double depth = from.dot(camera.forward);
+  const double scale = parallel ? 1 : depth;
+  const double u = from.dot(camera.right) / (camera.right.squaredNorm() * scale);
+  const double v = from.dot(camera.up) / (camera.up.squaredNorm() * scale);
+  return {0.5 * (1 + u) * width, 0.5 * (1 - v) * height, depth, parallel ? depth : from.norm()};
+}
+
+double pixelSize(const Camera& camera, double depth, int height) {
+  const double size = 2 * camera.up.norm() / height;
+  return camera.projection == Projection::orthographic ? size : size * depth;
+}
+
+Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y) {
+  return pixelPoint(view, x, y, buffers.width, buffers.height);
+}
+
+Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
+  return pixelEye(view.camera, x, y, buffers.width, buffers.height) +
+         pixelRay(view.camera, x, y, buffers.width, buffers.height) *
+             buffers.distance[std::size_t(y) * buffers.width + x];
+}
+
 }  // namespace hpsdf::render

@@ -2,6 +2,7 @@
 // What both renderers do with buffers and the numbers of a view.
 
 #include <cmath>
+#include <optional>
 
 #include "hpsdf/error.h"
 #include "hpsdf/render/view.h"
@@ -23,6 +24,11 @@ inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
     buffers.crack.assign(pixels, 0);
   }
   return buffers;
+}
+
+inline void checkClip(const std::optional<ClipPlane>& clip) {
+  if (clip && !std::isfinite(clip->offset))
+    throw Error("a clipping plane's offset is not finite: give a finite number");
 }
 
 inline void checkOffset(double offset) {

@@ -748,6 +748,27 @@ TEST_F(Cli, viewsAreNamedOrAimed) {
   EXPECT_NE(surface({"--clip", "z", "--clip-offset", "0.1"}), surface({"--clip", "z"}));
   EXPECT_EQ(surface({"--clip", "z", "--clip-offset", "50"}), surface({"--clip", "z", "--clip-offset", "40"}));
   expectRefused({{"render", field(), "-o", at("x.png"), "--clip-offset", "0.1"}}, "clip", {"v.png"});
+  EXPECT_NE(surface({"--plane", "x"}), surface({}));
+  EXPECT_EQ(surface({"--plane", "x"}), surface({"--plane", "x", "--plane-offset", "0"}));
+  EXPECT_NE(surface({"--plane", "x"}), surface({"--plane", "x", "--plane-offset", "0.1"}));
+  EXPECT_NE(surface({"--plane", "0,0,0,1,2,3"}), surface({"--plane", "x"}));
+  EXPECT_NE(surface({"--surface=false", "--plane", "x"}), surface({"--plane", "x"}));
+  EXPECT_NE(surface({"--cells", "lines"}), surface({}));
+  EXPECT_NE(surface({"--cells", "boxes"}), surface({"--cells", "lines"}));
+  EXPECT_NE(surface({"--cells", "boxes", "--degrees", "4"}), surface({"--cells", "boxes"}));
+  EXPECT_NE(surface({"--cells", "boxes", "--depths", "20"}), surface({"--cells", "boxes"}));
+  EXPECT_EQ(surface({"--cells", "boxes", "--degrees", "2,4-6"}), surface({"--cells", "boxes", "--degrees", "6,2,4-5"}));
+  EXPECT_NE(surface({"--arrows", "20"}), surface({}));
+  for (const char* list : {"x", "4,", "4-2", "31", "-1", "1.5"})
+    expectRefused({{"render", field(), "-o", at("x.png"), "--cells", "boxes", std::string("--degrees=") + list}},
+                  "degrees: expected whole numbers and ranges from 0 to 30", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--cells", "boxes", "--depths", "21"}}, "0 to 20", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--degrees", "4"}}, "degrees: needs cells", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--plane-offset", "0.1"}}, "needs plane", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--plane", "0,0,0,1,0,0", "--plane-offset", "0.1"}},
+                "plane-offset", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--plane", "w"}}, "x, y, z or 6 numbers", {"v.png"});
+  expectRefused({{"render", field(), "-o", at("x.png"), "--plane", "z", "--plane-offset", "9"}}, "outside", {"v.png"});
   expectRefused({{"render", field(), "-o", at("x.png"), "--view", "left", "--camera", "0,0,1"}}, "camera", {"v.png"});
   expectRefused({{"render", field(), "-o", at("x.png"), "--view", "lefd"}}, "left", {"v.png"});
 }

@@ -51,7 +51,8 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
   Bench bench;
   bench.run(std::string(kTorus) +
             "camera 41.3,-17.25,0.7 target=0.1,0.2,-0.05 up=z projection=orthographic\n"
-            "surface offset=0.03125 cracks=true clip=y clip-offset=0.1\n"
+            "surface offset=0.03125 cracks=true clip=y clip-offset=0.1 shown=false\n"
+            "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
             "worst by=gradient page=2 ; panel build=false bar=false left-scroll=3\n"

@@ -322,7 +322,7 @@ void expectSectionWhereTheSolidIsCut(Projection projection) {
       const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
       const Vector3 point = eye + (0.1 - eye.z()) / ray.z() * ray;
       const bool cut = field.domain().contains(point) && field.value({point.x(), point.y(), 0.1}) < 0;
-      ASSERT_EQ(buffers.section[i] != 0, cut);
+      ASSERT_EQ(buffers.shows(i, Shown::section), cut);
       if (!cut) {
         ++outside;
         EXPECT_EQ(buffers.cell[i], before.cell[i]);
@@ -340,7 +340,7 @@ void expectSectionWhereTheSolidIsCut(Projection projection) {
   EXPECT_GT(outside, 300);
   ViewBuffers whole = before;
   addSection(field, {camera, 0}, whole);
-  EXPECT_TRUE(whole.section.empty());
+  EXPECT_TRUE(whole.shown.empty());
 }
 
 TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
@@ -706,7 +706,8 @@ TEST(Cracks, AreNotOnTheSectionOfAClippingPlane) {
   const std::size_t before = crackCount(buffers);
   addSection(field, view, buffers);
   EXPECT_LT(crackCount(buffers), before) << "no crack behind the section: the test shows nothing";
-  for (std::size_t i = 0; i < buffers.crack.size(); ++i) EXPECT_FALSE(buffers.crack[i] && buffers.section[i]);
+  for (std::size_t i = 0; i < buffers.crack.size(); ++i)
+    EXPECT_FALSE(buffers.crack[i] && buffers.shows(i, Shown::section));
 }
 
 // --- OpenGL against the oracle -------------------------------------------------------------------------------------

@@ -202,6 +202,30 @@ TEST(Camera, OrthographicKeepsTheFramingAndStartsBeforeTheDomain) {
         }
 }
 
+TEST(Camera, ProjectsPointsToThePixelsThatSeeThem) {
+  for (const Projection projection : {Projection::perspective, Projection::orthographic})
+    for (const double distance : {0.6, 1.1, 4.0}) {
+      const Camera view = cameraOf({.azimuthDegrees = 70,
+                                    .elevationDegrees = -35,
+                                    .distance = distance,
+                                    .target = Vector3(0.2, 0.1, -0.3),
+                                    .projection = projection},
+                                   kBox, 300, 200);
+      for (const auto& [x, y] : {std::pair(0, 0), {299, 199}, {140, 17}})
+        for (const double along : {0.01, 1.0, 7.0}) {
+          const Vector3 p = pixelEye(view, x, y, 300, 200) + along * pixelRay(view, x, y, 300, 200);
+          const PicturePoint seen = project(view, p, 300, 200);
+          EXPECT_NEAR(seen.x, x + 0.5, 1e-8);
+          EXPECT_NEAR(seen.y, y + 0.5, 1e-8);
+          EXPECT_NEAR(seen.distance, along, 1e-12);
+          EXPECT_NEAR(seen.depth, (p - view.eye).dot(view.forward), 1e-12);
+          const Vector3 pixelUp = p + pixelSize(view, seen.depth, 200) * view.up.normalized();
+          EXPECT_NEAR(project(view, pixelUp, 300, 200).y, y - 0.5, 1e-8);
+        }
+      EXPECT_LT(project(view, view.eye - view.forward, 300, 200).depth, 0);
+    }
+}
+
 TEST(Camera, RefusesNumbersOutOfRange) {
   const auto with = [](auto change) {
     OrbitCamera camera;

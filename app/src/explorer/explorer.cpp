@@ -24,7 +24,8 @@ std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.
 /// What a line sets, without the values, where it sets the same whatever was set before: two lines of one kind do what
 /// the second does alone. Empty for all others.
 std::string kindOf(const std::string& line) {
-  constexpr std::array kSetters = {"show", "camera", "surface", "plane", "color", "panel", "worst", "settings"};
+  constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
+                                   "arrows", "color",  "panel",   "worst", "settings"};
   std::istringstream words(line);
   std::string kind, word;
   words >> kind;
@@ -309,7 +310,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
   // planes and cameras are those of the current field, so that both show the same part of space
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), evidence)
-                     : render::drawSurface(renderer, field, fit(surfacePicture(view_)), evidence);
+                     : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), evidence);
 }
 
 void Explorer::drawPicture(int shrink) {

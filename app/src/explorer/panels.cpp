@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "explorer/explorer.h"
 #include "hpsdf/field.h"
@@ -31,6 +32,9 @@ void textAt(float x, float y, const std::string& text, ImU32 color) {
 }
 
 float widthOf(const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; }
+
+/// Without its folders, for which there is no room.
+std::string fileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 /// A panel with its heading, where it is open.
 template <typename Content>
@@ -108,18 +112,41 @@ void drawCamera(Ui& ui, const ViewState& view, const Field& field, Commands& com
     commands.push_back("surface clip-offset=" + number(*v));
 }
 
-void drawPlane(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
-  choice(ui, "view/axis", "across", {"x", "y", "z"}, std::string(1, "xyz"[view.axis]), "plane axis=", commands);
+void drawPlaneOffset(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
+  choice(ui, "view/axis", "plane across", {"x", "y", "z"}, std::string(1, "xyz"[view.axis]), "plane axis=", commands);
   const Box& domain = field.domain();
   if (const auto v =
-          ui.slider("view/plane-offset", "offset", view.planeOffset.value_or(defaultOffset(domain, view.axis)),
+          ui.slider("view/plane-offset", "plane at", view.planeOffset.value_or(defaultOffset(domain, view.axis)),
                     domain.min()[view.axis], domain.max()[view.axis]))
     commands.push_back("plane offset=" + number(*v));
+}
+
+void drawPlane(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
+  drawPlaneOffset(ui, view, field, commands);
   if (const auto v = ui.slider("view/zoom", "zoom", view.zoom, 1, 32, "%.3g"))
     commands.push_back("plane zoom=" + number(*v));
   ui.enable(view.sliceTarget || view.zoom != 1);
   if (ui.button("view/whole", "whole section")) commands.push_back("plane zoom=1 target=center");
   ui.enable(true);
+}
+
+/// What else stands in the surface's picture.
+void drawCells(Ui& ui, const ViewState& view, const Field& field, Commands& commands) {
+  if (const auto on = ui.checkbox("view/surface", "surface", view.surface))
+    commands.push_back(fmt::format("surface shown={}", *on));
+  ImGui::SameLine();
+  if (const auto on = ui.checkbox("view/plane", "plane", view.planeInSpace))
+    commands.push_back(fmt::format("plane in-space={}", *on));
+  if (view.planeInSpace) drawPlaneOffset(ui, view, field, commands);
+  const char* style = view.cells.style == render::CellStyle::none    ? "none"
+                      : view.cells.style == render::CellStyle::lines ? "lines"
+                                                                     : "boxes";
+  choice(ui, "view/cells", "cells", {"none", "lines", "boxes"}, style, "cells ", commands);
+  if (view.cells.style == render::CellStyle::none) return;
+  if (const auto list = ui.field("view/degrees", "of degrees", levelText(view.cells.degrees)))
+    commands.push_back("cells degrees=" + scriptWord(*list));
+  if (const auto list = ui.field("view/depths", "of depths", levelText(view.cells.depths)))
+    commands.push_back("cells depths=" + scriptWord(*list));
 }
 
 void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn>& picture, Commands& commands) {
@@ -161,8 +188,8 @@ void drawNames(const Explorer& explorer, const Layout& layout) {
                        IM_COL32(250, 250, 248, 255), 2);
     list.AddText({x, y}, IM_COL32(32, 34, 44, 255), text.c_str());
   };
-  name(layout.canvas, explorer.session().current().name);
-  name(layout.beside, explorer.view().beside);
+  name(layout.canvas, fileName(explorer.session().current().name));
+  name(layout.beside, fileName(explorer.view().beside));
   list.AddLine({float(layout.beside.x0), float(layout.beside.y0)}, {float(layout.beside.x0), float(layout.beside.y1)},
                IM_COL32(98, 102, 116, 255));
 }
@@ -170,10 +197,14 @@ void drawNames(const Explorer& explorer, const Layout& layout) {
 void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
   const ViewState& view = explorer.view();
   const Field& field = explorer.session().current().field;
-  if (view.slice)
+  if (view.slice) {
     drawPlane(ui, view, field, commands);
-  else
+  } else {
     drawCamera(ui, view, field, commands);
+    drawCells(ui, view, field, commands);
+  }
+  if (const auto v = ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
+    commands.push_back(fmt::format("arrows {:.0f}", *v));
   drawColors(ui, view, explorer.picture(), commands);
   if (const auto file = ui.field("view/beside", "beside", view.beside))
     commands.push_back("beside " + (file->empty() ? "none" : scriptWord(*file)));
@@ -374,7 +405,7 @@ void drawReadout(Ui& ui, Explorer& explorer) {
   if (!explorer.picture()) return;
   std::string line;
   for (const std::string& detail : explorer.picture()->details) line += (line.empty() ? "" : "   ") + detail;
-  ui.text(explorer.session().current().name + "   " + line);
+  ui.text(fileName(explorer.session().current().name) + "   " + line);
   ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
 }
 

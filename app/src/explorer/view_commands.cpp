@@ -63,6 +63,7 @@ void checkCamera(const Arguments& arguments) {
 void runSurface(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
+  if (arguments.given("shown")) view.surface = arguments.flag("shown");
   if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
   if (arguments.given("clip")) {
     const std::string axis = arguments.text("clip");
@@ -93,6 +94,7 @@ void runPlane(Session& session, const Arguments& arguments) {
     view.planeOffset = automatic ? std::nullopt : std::optional(arguments.numbers("offset")[0]);
     view.plane.reset();
   }
+  if (arguments.given("in-space")) view.planeInSpace = arguments.flag("in-space");
   if (arguments.given("zoom")) view.zoom = arguments.number("zoom");
   if (arguments.given("target")) view.sliceTarget = pointOr(arguments, "target", "center");
   session.explorer().change(std::move(view));
@@ -138,6 +140,23 @@ void runPanel(Session& session, const Arguments& arguments) {
     if (arguments.given(kPanelNames[panel])) view.open[panel] = arguments.flag(kPanelNames[panel]);
   if (arguments.given("left-scroll")) view.scroll[0] = arguments.number("left-scroll");
   if (arguments.given("right-scroll")) view.scroll[1] = arguments.number("right-scroll");
+  session.explorer().change(std::move(view));
+}
+
+void runCells(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  if (arguments.given("style")) view.cells.style = cellStyle(arguments.text("style"));
+  const auto levels = [&](const char* name, int most) {
+    return arguments.text(name) == "all" ? std::vector<int>() : levelList(arguments.text(name), name, most);
+  };
+  if (arguments.given("degrees")) view.cells.degrees = levels("degrees", kMaxDegree);
+  if (arguments.given("depths")) view.cells.depths = levels("depths", kMaxDepth);
+  session.explorer().change(std::move(view));
+}
+
+void runArrows(Session& session, const Arguments& arguments) {
+  ViewState view = session.explorer().view();
+  view.arrows = arguments.whole("apart");
   session.explorer().change(std::move(view));
 }
 
@@ -320,7 +339,10 @@ Command surfaceCommand() {
           .summary = "Choose which surface the explorer shows, and where it is cut open.",
           .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
           .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
-          .parameters = {{.name = "offset",
+          .parameters = {{.name = "shown",
+                          .type = ParameterType::flag,
+                          .help = "Whether it is drawn: without it, planes and cells can be looked at alone."},
+                         {.name = "offset",
                           .type = ParameterType::number,
                           .help = "The distance whose surface is drawn; 0 at first.",
                           .unit = "world units"},
@@ -364,6 +386,9 @@ Command planeCommand() {
                           .valueName = "PX,PY,PZ,NX,NY,NZ",
                           .unit = "world units",
                           .counts = {6}},
+                         {.name = "in-space",
+                          .type = ParameterType::flag,
+                          .help = "Whether the plane stands in the surface's picture too."},
                          {.name = "zoom",
                           .type = ParameterType::number,
                           .help = "How many times larger than with the whole section in the picture.",
@@ -466,6 +491,40 @@ void addViewCommands(Registry& registry) {
   registry.add(surfaceCommand());
   registry.add(planeCommand());
   registry.add(colorCommand());
+  registry.add({.name = "cells",
+                .summary = "Choose which of the octree's cells stand in the explorer's surface picture.",
+                .help = "As 'render' has it. What is not given stays as it is.",
+                .examples = {"cells lines depths=0-3", "cells boxes degrees=4,5 ; surface shown=false"},
+                .parameters = {{.name = "style",
+                                .type = ParameterType::choice,
+                                .help = "Lines along their edges, or boxes of 0.8 of their extent.",
+                                .choices = {"none", "lines", "boxes"},
+                                .positional = true},
+                               {.name = "degrees",
+                                .type = ParameterType::text,
+                                .help = "Only cells of these degrees: numbers and ranges, as in 2,4-6; or all.",
+                                .valueName = "LIST"},
+                               {.name = "depths",
+                                .type = ParameterType::text,
+                                .help = "Only cells of these depths; or all.",
+                                .valueName = "LIST"}},
+                .action = runCells,
+                .scriptOnly = true});
+  registry.add({.name = "arrows",
+                .summary = "Draw arrows along the gradient in the explorer's picture.",
+                .help = "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection "
+                        "takes from it.",
+                .examples = {"arrows 40", "arrows 0"},
+                .parameters = {{.name = "apart",
+                                .type = ParameterType::wholeNumber,
+                                .help = "How far apart; 0 for none.",
+                                .unit = "pixels",
+                                .minimum = 0,
+                                .maximum = 1000,
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runArrows,
+                .scriptOnly = true});
   registry.add({.name = "beside",
                 .summary = "Show another field beside the current one, in the same way.",
                 .help =
@@ -511,7 +570,8 @@ void addViewCommands(Registry& registry) {
                 .scriptOnly = true});
   registry.add({.name = "undo",
                 .summary = "Take back the last change of what the explorer shows.",
-                .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, color, "
+                .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, "
+                        "arrows, color, "
                         "panel, worst and fly; what the mouse does in "
                         "one go is one change. The field itself is not changed back.",
                 .examples = {"undo"},

@@ -1,6 +1,7 @@
 #include "explorer/view_state.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "pictures.h"
 
@@ -17,7 +18,8 @@ std::string planeLine(const ViewState& view) {
   else
     line += fmt::format("axis={} offset={}", "xyz"[view.axis],
                         view.planeOffset ? fmt::format("{}", *view.planeOffset) : "auto");
-  return line + fmt::format(" zoom={} target={}\n", view.zoom, view.sliceTarget ? textOf(*view.sliceTarget) : "center");
+  return line + fmt::format(" in-space={} zoom={} target={}\n", view.planeInSpace, view.zoom,
+                            view.sliceTarget ? textOf(*view.sliceTarget) : "center");
 }
 
 std::string cameraLine(const render::OrbitCamera& camera) {
@@ -28,8 +30,8 @@ std::string cameraLine(const render::OrbitCamera& camera) {
 }
 
 std::string surfaceLine(const ViewState& view) {
-  std::string line = fmt::format("surface offset={} cracks={} clip={}", view.surfaceOffset, view.cracks,
-                                 view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
+  std::string line = fmt::format("surface shown={} offset={} cracks={} clip={}", view.surface, view.surfaceOffset,
+                                 view.cracks, view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
   if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
   return line + "\n";
 }
@@ -43,6 +45,13 @@ std::string colorLine(const Coloring& colors, const char* of) {
                      colors.mesh.empty() ? "" : " mesh=" + scriptWord(colors.mesh));
 }
 
+std::string cellsLine(const render::ShownCells& cells) {
+  const char* style = cells.style == render::CellStyle::none    ? "none"
+                      : cells.style == render::CellStyle::lines ? "lines"
+                                                                : "boxes";
+  return fmt::format("cells {} degrees={} depths={}\n", style, levelText(cells.degrees), levelText(cells.depths));
+}
+
 std::string panelLine(const ViewState& view) {
   std::string line = "panel";
   for (std::size_t panel = 0; panel < kPanels; ++panel)
@@ -52,25 +61,40 @@ std::string panelLine(const ViewState& view) {
 
 }  // namespace
 
+std::string levelText(const std::vector<int>& levels) {
+  return levels.empty() ? "all" : fmt::format("{}", fmt::join(levels, ","));
+}
+
+namespace {
+
+render::Plane planeOf(const ViewState& view, const Field& field) {
+  if (view.plane) return *view.plane;
+  return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
+}
+
+}  // namespace
+
 render::SlicePicture slicePicture(const ViewState& view, const Field& field) {
   render::SlicePicture picture;
-  if (view.plane)
-    picture.plane = *view.plane;
-  else
-    picture.plane = render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
+  picture.plane = planeOf(view, field);
   picture.zoom = view.zoom;
   picture.target = view.sliceTarget;
   picture.color = view.sliceColors.by;
   picture.scale = view.sliceColors.scale;
+  picture.arrows = view.arrows;
   return picture;
 }
 
-render::SurfacePicture surfacePicture(const ViewState& view) {
+render::SurfacePicture surfacePicture(const ViewState& view, const Field& field) {
   render::SurfacePicture picture;
   picture.camera = view.camera;
   picture.offset = view.surfaceOffset;
   picture.clip = view.clip;
   picture.cracks = view.cracks;
+  picture.surface = view.surface;
+  if (view.planeInSpace) picture.plane = planeOf(view, field);
+  picture.cells = view.cells;
+  picture.arrows = view.arrows;
   picture.color = view.surfaceColors.by;
   picture.scale = view.surfaceColors.scale;
   return picture;
@@ -79,7 +103,8 @@ render::SurfacePicture surfacePicture(const ViewState& view) {
 std::string scriptOf(const ViewState& view) {
   return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
                      view.samples, backendText(view.backend)) +
-         cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + colorLine(view.surfaceColors, "surface") +
+         cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
+         fmt::format("arrows {}\n", view.arrows) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") +
          fmt::format("beside {}\n", view.beside.empty() ? "none" : scriptWord(view.beside)) +
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",

@@ -30,6 +30,7 @@ struct ViewState {
   int axis = 2;                            ///< of the plane
   std::optional<double> planeOffset;       ///< 0, or the middle of the domain, when not given
   std::optional<render::FreePlane> plane;  ///< instead of axis and offset
+  bool planeInSpace = false;               ///< drawn beside the surface too
   double zoom = 1;
   std::optional<Vector3> sliceTarget;
 
@@ -37,6 +38,9 @@ struct ViewState {
   double surfaceOffset = 0;
   std::optional<render::ClipPlane> clip;
   bool cracks = false;
+  bool surface = true;  ///< drawn
+  render::ShownCells cells;
+  int arrows = 0;  ///< pixels apart; 0: none
 
   std::string beside;  ///< file of another field, seen beside the current one in the same way; or empty
 
@@ -58,7 +62,10 @@ struct ViewState {
 
 /// What render draws of it; sizes and samples are not set.
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
-render::SurfacePicture surfacePicture(const ViewState& view);
+render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
+
+/// "2,4"; "all" for none.
+std::string levelText(const std::vector<int>& levels);
 
 /// Script lines, each ending in a newline, that lead from any state to this one.
 std::string scriptOf(const ViewState& view);

@@ -61,8 +61,10 @@ struct FreePlane {
   Vector3 normal;
 };
 
+using Plane = std::variant<AxisPlane, FreePlane>;
+
 struct SlicePicture {
-  std::variant<AxisPlane, FreePlane> plane = AxisPlane{};
+  Plane plane = AxisPlane{};
   ColorBy color = ColorBy::degree;
   int width = 1280;  ///< of the whole picture, legend included
   int height = 720;
@@ -71,6 +73,20 @@ struct SlicePicture {
   bool bare = false;                   ///< the view alone, as large as the picture: no legend, no caption
   double zoom = 1;                     ///< 1 shows the whole section with the domain; above 0
   std::optional<Vector3> target = {};  ///< what is in the middle, moved into the plane; the section's middle
+  int arrows = 0;                      ///< pixels between arrows along the gradient, 4 to 1000; 0 for none
+};
+
+enum class CellStyle : std::uint8_t {
+  none,
+  lines,  ///< their edges; those of cells that are small in the picture fade
+  boxes,  ///< solids of 0.8 of their extent
+};
+
+/// Which of the octree's leaves stand in a picture, and how.
+struct ShownCells {
+  CellStyle style = CellStyle::none;
+  std::vector<int> degrees = {};  ///< ascending; all when empty
+  std::vector<int> depths = {};   ///< likewise
 };
 
 struct SurfacePicture {
@@ -84,13 +100,20 @@ struct SurfacePicture {
   std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, its cells outlined
   bool cracks = false;  ///< mark where the field jumps over the offset between two cells (`ViewBuffers::crack`)
   bool bare = false;
+  bool surface = true;              ///< whether the surface, and its section, are drawn
+  std::optional<Plane> plane = {};  ///< the domain's section with it is coloured likewise
+  ShownCells cells = {};
+  int arrows = 0;  ///< as in slices
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
 /// the whole field, so that colours keep their meaning from slice to slice.
 /// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8; no more than 64 Mi samples in
 /// all), before memory is taken; for colours that are not for such a view or whose evidence is missing; for limits that
-/// make no scale.
+/// make no scale; for a plane that misses the domain; for arrows out of range.
+///
+/// What is in a surface's picture hides what lies behind it: surface, section, plane and boxes in the buffers, lines
+/// over them. A clipping plane cuts all of it.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
@@ -121,7 +144,7 @@ struct Drawn {
   Legend legend = {};
   std::vector<std::string> details = {};  ///< what is shown, the most important first
   ScaleOptions scale = {};  ///< as drawn, with what was chosen: the same for another picture gives it the same colours
-  std::array<int, 2> corner = {0, 0};     ///< of the view in the picture, pixels from the upper left
+  std::array<int, 2> corner = {0, 0};  ///< of the view in the picture, pixels from the upper left
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
@@ -134,8 +157,8 @@ struct Pick {
   double value;  ///< f as the renderer has it; on a surface the offset but for rounding
 };
 
-/// Nothing where the pixel shows no part of the field: paper, backdrop, legend. Throws `Error` for a pixel outside of
-/// the picture.
+/// Of lines and arrows, what lies behind them. Nothing where the pixel shows no part of the field: paper, backdrop,
+/// legend. Throws `Error` for a pixel outside of the picture.
 std::optional<Pick> pickAt(const Drawn& drawn, int x, int y);
 
 /// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.

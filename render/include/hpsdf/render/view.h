@@ -68,6 +68,19 @@ Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height);
 /// The unit direction in which it looks.
 Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 
+/// Where a camera sees a point.
+struct PicturePoint {
+  double x, y;      ///< pixels from the view's upper left corner: the middle of pixel (0, 0) is at (½, ½)
+  double depth;     ///< along forward, from the eye; in perspective x and y mean nothing where it is not above 0
+  double distance;  ///< from where the ray of that place starts, world units
+};
+
+/// What `pixelEye` and `pixelRay` lead to, the other way round. The camera's forward, right and up are at right angles.
+PicturePoint project(const Camera& camera, const Vector3& point, int width, int height);
+
+/// Height that a pixel of a view of `height` pixels covers at a depth, world units.
+double pixelSize(const Camera& camera, double depth, int height);
+
 /// The plane {x_axis = offset}; the half on the eye's side is left out. Orthographically the eye is infinitely far
 /// away, and the side that of the target where one looks along the plane.
 struct ClipPlane {
@@ -84,6 +97,14 @@ struct SurfaceView {
 
 constexpr std::uint32_t kNoCell = 0xffffffff;
 
+/// What a pixel of a picture with several things in it shows.
+enum class Shown : std::uint8_t {
+  surface,
+  section,  ///< of the solid with the clipping plane
+  plane,    ///< of the whole domain
+  box,      ///< a cell as a solid
+};
+
 /// What the pixels of a view see, rows top to bottom; the colouring reads nothing else. Where a slice leaves the domain
 /// or a ray misses, `cell` is kNoCell and the rest 0.
 struct ViewBuffers {
@@ -98,10 +119,17 @@ struct ViewBuffers {
   /// 1 where the field jumps over the offset at a face between two cells instead of passing it within one: f − offset
   /// is the height of the step on the far side. Not filled for slices.
   std::vector<std::uint8_t> crack;
-  /// 1 where a pixel shows the section of the solid with a clipping plane; filled by `addSection`, else empty.
-  std::vector<std::uint8_t> section;
+  /// Filled where a picture has more in it than a surface, else empty.
+  std::vector<Shown> shown;
 
   bool hit(std::size_t pixel) const { return cell[pixel] != kNoCell; }
+  bool shows(std::size_t pixel, Shown what) const {
+    return hit(pixel) && (shown.empty() ? what == Shown::surface : shown[pixel] == what);
+  }
 };
+
+/// What a pixel of a view's buffers shows, world units; of a surface only where there is a hit.
+Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y);
+Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y);
 
 }  // namespace hpsdf::render

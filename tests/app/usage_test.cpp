@@ -1,0 +1,90 @@
+// Every verb and every control of the explorer is used by a script that `check` runs.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <vector>
+
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "script.h"
+#include "support/require_gl.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::IsEmpty;
+
+const fs::path kScripts = fs::path(HPSDF_SOURCE_DIR) / "screenshots/scripts";
+
+std::vector<Call> callsOf(const Registry& registry, const fs::path& script, const fs::path& folder) {
+  const Variables variables = {{"out", folder.string()},
+                               {"wrong", folder.string()},
+                               {"here", script.parent_path().string()},
+                               {"mesh", "builtin:torus"}};
+  return parseScript(registry, script.string(), readTextFile(script.string()), variables);
+}
+
+std::vector<fs::path> scripts() {
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(kScripts))
+    if (entry.path().extension() == ".hps") found.push_back(entry.path());
+  return found;
+}
+
+/// A control and what stands for it: the entries of a list are one, and so are the rows of a table.
+std::string controlOf(const std::string& path) {
+  const std::size_t panel = path.find('/');
+  if (panel == std::string::npos) return path;
+  const std::size_t entry = path.find('/', panel + 1);
+  if (entry != std::string::npos) return path.substr(0, entry) + "/…";
+  const std::string name = path.substr(panel + 1);
+  return name.find_first_not_of("0123456789") == std::string::npos ? path.substr(0, panel) + "/…" : path;
+}
+
+TEST(Usage, everyVerbIsInAScriptThatIsChecked) {
+  const Registry registry = makeRegistry();
+  const support::TemporaryDirectory folder;
+  // what a script of check cannot do: check itself, and a window; what `include` brings is checked where it stands
+  std::set<std::string> unused;
+  for (const Command& command : registry.commands()) unused.insert(command.name);
+  for (const char* exempt : {"check", "accept", "view"}) unused.erase(exempt);
+  for (const fs::path& script : scripts()) {
+    for (const Call& call : callsOf(registry, script, folder.path())) unused.erase(call.command->name);
+    if (readTextFile(script.string()).find("\ninclude ") != std::string::npos) unused.erase("include");
+  }
+  EXPECT_THAT(unused, IsEmpty());
+}
+
+TEST(Usage, everyControlOfTheExplorerIsUsedByAScriptThatIsChecked) {
+  HPSDF_REQUIRE_GL();
+  const Registry registry = makeRegistry();
+  const support::TemporaryDirectory folder;
+  std::set<std::string> seen, used;
+  std::istringstream in;
+  std::ostringstream out, err;
+  Session session(registry, Console{in, out, err});
+  for (const Call& call : callsOf(registry, kScripts / "explorer.hps", folder.path())) {
+    runScript(session, std::span(&call, 1));
+    if (call.command->name == "ui") used.insert(controlOf(call.arguments.text("target")));
+    for (const auto& [path, widget] : session.explorer().widgets()) seen.insert(controlOf(path));
+  }
+  std::set<std::string> unused;
+  std::ranges::set_difference(seen, used, std::inserter(unused, unused.end()));
+  unused.erase("build/progress");  // tells, and takes nothing
+  unused.erase("build/cancel");    // only while a construction is under way: see the window's tests
+  EXPECT_THAT(unused, IsEmpty());
+  EXPECT_GT(seen.size(), 60u);
+  for (const char* control : {"view/cells/…", "worst/…", "build/rebuild", "canvas", "beside"})
+    EXPECT_TRUE(seen.contains(control)) << control;
+}
+
+}  // namespace
+}  // namespace hpsdf::app
