@@ -208,7 +208,7 @@ TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
 
 TEST(LiveWork, showsAConstructionAndCancelsIt) {
   Desk desk;
-  desk.run(kFirst);
+  desk.run(std::string(kFirst) + "\npanel view=false");
   desk.explorer().frame();
   const std::uint64_t cells = desk.explorer().figures().leaves;
   int frames = 0;

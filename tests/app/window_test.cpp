@@ -135,6 +135,7 @@ class Follower {
   std::array<int, 2> middleOf(const std::string& widget) {
     session_.explorer().frame();
     const UiRect& rect = session_.explorer().widgets().at(widget).rect;
+    EXPECT_TRUE(rect.width() > 0 && rect.height() > 0) << widget << " is out of sight";
     return {int(rect.x0 + rect.x1) / 2, int(rect.y0 + rect.y1) / 2};
   }
   UiRect canvas() { return layoutOf(session_.explorer().view()).canvas; }
@@ -296,6 +297,8 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   const std::string field = "analytic:torus";
   ASSERT_NO_FATAL_FAILURE(open(field));
   Follower follower(field);
+  click(follower.middleOf("bar/view"));  // room for the construction's
+  follower.run("panel view=false");
   click(follower.middleOf("build/grid"));
   type("many");
   click(follower.middleOf("build/target-error"));
@@ -304,6 +307,8 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   desktop({"key", "Escape"});
   click(follower.middleOf("bar/slice"));
   ASSERT_EQ(close(), 0) << window_->err();
+  EXPECT_THAT(window_->err(), HasSubstr("hpsdf: cancelled"));
+  EXPECT_THAT(window_->err(), HasSubstr("many"));
   const std::string script = contents(file("session.hps"));
   EXPECT_THAT(script, HasSubstr("settings target-error=1e-30\n"));
   EXPECT_THAT(script, Not(HasSubstr("rebuild")));

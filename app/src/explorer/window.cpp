@@ -303,7 +303,7 @@ class Window {
     try {
       action();
     } catch (const Cancelled&) {
-      explorer_.message = "cancelled: all is as it was";
+      tell("cancelled: all is as it was");
     } catch (const Error& error) {
       tell(error.what());
     } catch (const std::bad_alloc&) {
