@@ -14,6 +14,7 @@ Registry makeRegistry() {
   addProbeCommand(registry);
   addViewCommands(registry);
   addUiCommand(registry);
+  addViewCommand(registry);
   addReportCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);

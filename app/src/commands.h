@@ -16,6 +16,7 @@ void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
 void addUiCommand(Registry& registry);
+void addViewCommand(Registry& registry);    ///< the window
 void addCheckCommands(Registry& registry);  ///< check, accept
 void addToolCommands(Registry& registry);   ///< run, set, include, mesh, shapes, doctor, help, docs
 

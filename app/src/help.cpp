@@ -144,7 +144,10 @@ std::string commandsMarkdown(const Registry& registry) {
       "`--name value` is written `name=value` (see [scripts.md](scripts.md)).\n";
   for (const Command& command : registry.commands()) {
     text += fmt::format("\n## {}\n\n{}{}\n\n```\n{}\n```\n\n{}\n", command.name, command.summary,
-                        command.scriptOnly ? " In scripts only." : "", usage(command), command.help);
+                        command.scriptOnly        ? " In scripts only."
+                        : command.commandLineOnly ? " On the command line only."
+                                                  : "",
+                        usage(command), command.help);
     text += fmt::format("\n```sh\n{}\n```\n", fmt::join(command.examples, "\n"));
     text += "\n| parameter | |\n|---|---|\n";
     for (const Parameter& parameter : command.parameters) {
@@ -172,6 +175,7 @@ nlohmann::ordered_json commandsJson(const Registry& registry) {
     commands.push_back({{"name", command.name},
                         {"summary", command.summary},
                         {"script_only", command.scriptOnly},
+                        {"command_line_only", command.commandLineOnly},
                         {"help", command.help},
                         {"examples", command.examples},
                         {"parameters", parameters}});

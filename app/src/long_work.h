@@ -8,17 +8,30 @@
 
 namespace hpsdf::app {
 
-/// Runs work(progress) with a progress line on the console; Ctrl-C cancels it. Throws `Cancelled` then.
+/// Runs work(progress) with a progress line on the console; Ctrl-C or the console's listener cancels it. Throws
+/// `Cancelled` then.
 template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;
   ProgressLine line(console.err, console.redrawsProgress);
+  WorkListener* const listener = console.listener;
+  struct AtEnd {
+    WorkListener* listener;
+    ~AtEnd() {
+      if (listener != nullptr) listener->ended();
+    }
+  } const atEnd{listener};
   const Progress progress{
-      .report = [&line](std::string_view task, double fraction) { line.report(task, fraction); },
-      .cancelled = &InterruptGuard::interrupted,
+      .report =
+          [&line, listener](std::string_view task, double fraction) {
+            line.report(task, fraction);
+            if (listener != nullptr) listener->report(task, fraction);
+          },
+      .cancelled =
+          [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
   };
   auto result = work(progress);
-  if (InterruptGuard::interrupted()) throw Cancelled();  // asked for in the very last moment
+  if (progress.cancelled()) throw Cancelled();  // asked for in the very last moment
   return result;
 }
 

@@ -96,6 +96,7 @@ struct Command {
   /// What of the arguments the parameters' types cannot tell: throws `Error`. Of a script, before its first line runs.
   std::function<void(const Arguments&)> check = {};
   bool scriptOnly = false;
+  bool commandLineOnly = false;
   bool takesVariables = false;    ///< positional `name=value` words are its own, not options
   bool definesVariables = false;  ///< and define variables for the rest of the script (`assignments`)
   bool includesScript = false;    ///< the lines of another (`script`) follow in its place

@@ -212,6 +212,8 @@ class ScriptReader {
     std::optional<Included> included;
     try {
       const Command& command = registry_.command(verb.text);
+      if (command.commandLineOnly)
+        throw Error(fmt::format("'{}' is a command of the command line: hpsdf {} …", verb.text, verb.text));
       Arguments arguments = parseArguments(command, rest, Origin::script);
       if (command.definesVariables)
         for (auto& [key, value] : parseVariables(arguments.texts("assignments"))) variables_[key] = value;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "hpsdf/field.h"
@@ -16,12 +17,25 @@
 
 namespace hpsdf::app {
 
+/// Watches long work and may end it.
+class WorkListener {
+ public:
+  virtual ~WorkListener() = default;
+  /// As `Progress` has it: from any thread, by one at a time.
+  virtual void report(std::string_view task, double fraction) = 0;
+  /// Asked often, from any thread.
+  virtual bool wantsCancel() = 0;
+  /// The work is over, whatever came of it.
+  virtual void ended() = 0;
+};
+
 /// Where the program reads and writes: the process's own streams, or a test's.
 struct Console {
   std::istream& in;
   std::ostream& out;             ///< results
   std::ostream& err;             ///< progress, notes and warnings
   bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
+  WorkListener* listener = nullptr;
 };
 
 /// The field that commands work on.
@@ -54,6 +68,8 @@ class Session {
 
   const Registry& registry() const { return registry_; }
   const Console& console() const { return console_; }
+  /// Nobody's, with nullptr. Kept by reference.
+  void setListener(WorkListener* listener) { console_.listener = listener; }
 
   bool wantsJson(const Arguments& arguments) const { return json_ || arguments.flag("json"); }
   /// Lets all commands report as JSON; returns the setting before.
@@ -70,6 +86,7 @@ class Session {
 
   /// The current field's jumps: measured when first asked for. Throws `Cancelled` after Ctrl-C.
   const Jumps& jumps();
+  bool knowsJumps() const { return jumps_.has_value(); }
 
   /// The exact distance that the current field was made from: of `surface`, or, where that is empty, of the shape that
   /// the field names or the mesh that it was built from just now. Kept. Throws `Error` when it is not to be had.

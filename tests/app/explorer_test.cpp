@@ -94,7 +94,7 @@ TEST(Explorer, whatIsShownIsUndoneAndDoneAgainStepByStep) {
   EXPECT_TRUE(bench.view() == second);
   bench.run("show surface");
   EXPECT_THAT(bench.failure("redo"), HasSubstr("nothing to redo"));
-  bench.run("undo; undo; undo");  // the size, to begin with
+  bench.run("undo; undo");  // but not the size
   EXPECT_THAT(bench.failure("undo"), HasSubstr("test:1:1: there is nothing to undo"));
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "pictures.h"
 #include "script.h"
@@ -19,6 +20,29 @@ constexpr double kDegreesAPixel = 0.4;
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
+
+/// What a line sets, without the values, where it sets the same whatever was set before: two lines of one kind do what
+/// the second does alone. Empty for all others.
+std::string kindOf(const std::string& line) {
+  constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
+                                   "arrows", "color",  "panel",   "worst", "settings"};
+  std::istringstream words(line);
+  std::string kind, word;
+  words >> kind;
+  if (std::ranges::find(kSetters, kind) == kSetters.end()) return {};
+  while (words >> word) {
+    const bool number = word.find_first_of("0123456789") <= 1;
+    kind += " " + (number ? "#" : word.substr(0, word.find('=')));
+  }
+  return kind;
+}
+
+ViewState withFrameOf(const ViewState& frame, ViewState view) {
+  view.width = frame.width;
+  view.height = frame.height;
+  view.backend = frame.backend;
+  return view;
+}
 
 /// Each sample of a small picture as a square of the large one.
 render::Image enlarged(const render::Image& image, int width, int height) {
@@ -59,25 +83,26 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  if (next == view_) return;
-  if (!gestureKept_) {
-    undone_.push_back(view_);
-    redone_.clear();
-  }
-  gestureKept_ = ui_.busy();
+  // a line that takes another's place leaves the history that it would have left alone
+  if (!replaces_) before_ = {view_, undone_.size(), redone_};
+  undone_.resize(before_.undone);
+  redone_ = before_.redone;
   view_ = std::move(next);
+  if (withFrameOf(view_, before_.view) == view_) return;
+  undone_.push_back(before_.view);
+  redone_.clear();
 }
 
 bool Explorer::undo() {
   if (undone_.empty()) return false;
-  redone_.push_back(std::exchange(view_, undone_.back()));
+  redone_.push_back(std::exchange(view_, withFrameOf(view_, undone_.back())));
   undone_.pop_back();
   return true;
 }
 
 bool Explorer::redo() {
   if (redone_.empty()) return false;
-  undone_.push_back(std::exchange(view_, redone_.back()));
+  undone_.push_back(std::exchange(view_, withFrameOf(view_, redone_.back())));
   redone_.pop_back();
   return true;
 }
@@ -135,11 +160,20 @@ void Explorer::fieldChanged() {
 
 void Explorer::run(const std::string& line) {
   message.clear();
-  const std::string verb = line.substr(0, line.find(' '));
-  const bool sameGesture = ui_.busy() && verb == lastVerb_;
-  lastVerb_ = ui_.busy() ? verb : "";
-  runScript(session_, parseScript(session_.registry(), "panel", line, {}));
-  if (onCommand) onCommand(line, sameGesture);
+  const std::string kind = ui_.busy() ? kindOf(line) : "";
+  replaces_ = !kind.empty() && kind == lastKind_;
+  lastKind_.clear();  // no line takes the place of one that fails
+  running_ = true;
+  try {
+    runScript(session_, parseScript(session_.registry(), "panel", line, {}));
+  } catch (...) {
+    running_ = replaces_ = false;
+    throw;
+  }
+  running_ = false;
+  lastKind_ = kind;
+  if (onCommand) onCommand(line, replaces_);
+  replaces_ = false;
 }
 
 void Explorer::runAll(const std::vector<std::string>& commands) {
@@ -147,6 +181,10 @@ void Explorer::runAll(const std::vector<std::string>& commands) {
 }
 
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
+  // beforehand: whoever listens to long work may draw panels
+  const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
+  if (!work && showsJumps) session_.jumps();
+  if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
@@ -158,7 +196,33 @@ void Explorer::settle() {
   }
 }
 
+void Explorer::inputWhileWorking(const Input& event) {
+  std::vector<std::string> ignored;
+  drawPanels(&event, ignored);
+  if (event.kind == Input::Kind::key && event.key == Key::escape && work->cancellable) cancelWanted = true;
+  if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
+}
+
+void Explorer::letGo() {
+  const auto act = [this](const Input& event) {
+    try {
+      input(event);
+    } catch (const Error&) {
+    }
+  };
+  for (int button = 0; button < 3; ++button)
+    if (ui_.holds(button)) act({.kind = Input::Kind::release, .button = button});
+  const auto pointer = ui_.pointer();
+  // a click on nothing
+  act({.kind = Input::Kind::move, .at = {-1, -1}});
+  act({.kind = Input::Kind::press});
+  act({.kind = Input::Kind::release});
+  const bool inside = UiRect{0, 0, double(view_.width), double(view_.height)}.contains(pointer[0], pointer[1]);
+  if (inside) act({.kind = Input::Kind::move, .at = pointer});
+}
+
 void Explorer::input(const Input& event) {
+  if (work) return inputWhileWorking(event);
   std::vector<std::string> commands;
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
@@ -167,10 +231,7 @@ void Explorer::input(const Input& event) {
   std::vector<std::string> late;
   drawPanels(nullptr, late);
   runAll(late);
-  if (!ui_.busy()) {
-    gestureKept_ = false;
-    lastVerb_.clear();
-  }
+  if (!ui_.busy()) lastKind_.clear();
 }
 
 const std::map<std::string, Widget>& Explorer::widgets() {
@@ -275,23 +336,25 @@ void Explorer::drawPicture(int shrink) {
     if (evidence.jumps != nullptr) evidence.jumps = &session_.otherJumps(view_.beside);
     beside_ = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, evidence, picture_->scale, shrink);
   }
+  shown_ = {picture_->image};
+  if (beside_) shown_.push_back(beside_->image);
   shrunk_ = shrink;
   drawnFor_ = pictureKey();
 }
 
 render::Image Explorer::frame(int shrink) {
-  if (isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
+  if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
   settle();
   render::Image image(view_.width, view_.height, {250, 250, 248});
   const Layout layout = layoutOf(view_);
-  const auto place = [&](const render::Drawn& drawn, const UiRect& rect) {
-    const render::Image view =
-        shrunk_ == 1 ? drawn.image : enlarged(drawn.image, int(rect.width()), int(rect.height()));
-    for (int y = 0; y < view.height; ++y)
-      std::copy_n(&view.at(0, y), view.width, &image.at(int(rect.x0), int(rect.y0) + y));
+  const auto place = [&](const render::Image& drawn, const UiRect& rect) {
+    const int width = int(rect.width()), height = int(rect.height());
+    const bool fits = drawn.width == width && drawn.height == height;
+    const render::Image view = fits ? drawn : enlarged(drawn, width, height);
+    for (int y = 0; y < height; ++y) std::copy_n(&view.at(0, y), width, &image.at(int(rect.x0), int(rect.y0) + y));
   };
-  place(*picture_, layout.canvas);
-  if (beside_) place(*beside_, layout.beside);
+  const std::array rects = {layout.canvas, layout.beside};
+  for (std::size_t i = 0; i < shown_.size(); ++i) place(shown_[i], rects[i]);
   ui_.paint(image);
   return image;
 }
@@ -309,7 +372,7 @@ const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
 }
 
 std::optional<Readout> Explorer::readout() {
-  if (isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
+  if (work || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
   const auto pickIn = [&](const std::optional<render::Drawn>& drawn, const UiRect& rect) {

@@ -29,7 +29,8 @@ class Explorer {
   explicit Explorer(Session& session);
 
   const ViewState& view() const { return view_; }
-  /// What was shown before can be had back by `undo`; changes of one gesture by one.
+  /// What was shown before can be had back by `undo`; changes of one gesture by one. The frame's size and the renderer
+  /// are not: they stay.
   void change(ViewState next);
   /// False where nothing is left to undo or to do again.
   bool undo();
@@ -45,8 +46,12 @@ class Explorer {
   /// Steps of the whole refinement, of which the field may be an earlier state; nothing where they are not known.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// What a person does: a frame of the panels, then the commands that they ask for. Throws what those throw.
+  /// What a person does: a frame of the panels, then the commands that they ask for. Throws what those throw. While
+  /// work is under way, all that can be done is to cancel it.
   void input(const Input& event);
+  /// Lets go of the mouse's buttons, closes lists, gives up a text that is being typed: what no script leads to. The
+  /// pointer stays where it is. Mistakes in what is given up are passed over.
+  void letGo();
 
   /// Of the panels as they stand now.
   const std::map<std::string, Widget>& widgets();
@@ -54,23 +59,27 @@ class Explorer {
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
   /// Draws the picture, if anything changed, and the panels. `shrink` draws the picture at so many times fewer pixels
-  /// along each axis: for the moment while the mouse moves.
+  /// along each axis: for the moment while the mouse moves. While work is under way the picture stays as it was.
   render::Image frame(int shrink = 1);
   /// Whether the last frame's picture was shrunk, or no longer is what `view` says.
   bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
 
   /// Runs a line of script as a widget does.
   void run(const std::string& line);
-  /// Called with each such line, and whether it takes the place of the one before, of the same gesture.
+  /// Called with each such line, and whether it takes the place of the one before, of the same gesture: then running
+  /// the last alone has the same effect.
   std::function<void(const std::string& line, bool replaces)> onCommand;
+  /// Whether such a line is running.
+  bool running() const { return running_; }
 
   /// The field is another one.
   void fieldChanged();
 
-  /// A construction under way: shown by the panels.
+  /// Long work under way: shown by the panels, which take no other input meanwhile.
   struct Work {
     std::string task;
     double fraction = 0;
+    bool cancellable = false;
   };
   std::optional<Work> work;
   /// Set by the panels when a person wants it to end.
@@ -96,6 +105,7 @@ class Explorer {
                       const render::ScaleOptions& scale, int shrink) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settle();
+  void inputWhileWorking(const Input& event);
   void runAll(const std::vector<std::string>& commands);
   std::optional<std::string> canvasCommand(const Input& event);
 
@@ -103,9 +113,17 @@ class Explorer {
   Ui ui_;
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
-  bool gestureKept_ = false;  ///< the state before the gesture is in undone_ already
+  /// As it was before the last line that took no other's place.
+  struct History {
+    ViewState view;
+    std::size_t undone = 0;
+    std::vector<ViewState> redone;
+  };
+  History before_;
   std::map<std::string, std::string> settings_;
-  std::string lastVerb_;  ///< of the gesture
+  std::string lastKind_;  ///< of the gesture's last line, see `run`
+  bool running_ = false;
+  bool replaces_ = false;  ///< the line that is running takes the place of the one before
 
   std::optional<std::uint64_t> allSteps_;
   bool keepsAllSteps_ = false;  ///< while the field becomes an earlier or later state of itself
@@ -116,6 +134,7 @@ class Explorer {
 
   std::optional<render::Drawn> picture_;
   std::optional<render::Drawn> beside_;  ///< of the other field
+  std::vector<render::Image> shown_;     ///< what they looked like last
   std::string drawnFor_;
   int shrunk_ = 1;
   std::size_t fields_ = 0;  ///< counts the fields there have been

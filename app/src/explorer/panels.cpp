@@ -163,22 +163,19 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   if (!render::isQuantity(colors.by)) return;
   choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
          fmt::format("color {} scale=", colorName(colors.by)), commands);
-  const auto range = [&](double low, double high) { change(fmt::format("range={},{}", low, high)); };
+  const auto range = [&](const std::string& low, const std::string& high) {
+    change("range=" + scriptWord(low + "," + high));
+  };
   if (const auto pinned = ui.checkbox("view/pinned", "pinned range", colors.scale.limits.has_value())) {
     if (!*pinned)
       change("range=auto");
     else if (picture && picture->scale.limits)
-      range((*picture->scale.limits)[0], (*picture->scale.limits)[1]);
+      range(fmt::format("{}", (*picture->scale.limits)[0]), fmt::format("{}", (*picture->scale.limits)[1]));
   }
   if (!colors.scale.limits) return;
   const auto [low, high] = *colors.scale.limits;
-  const auto typed = [&](const std::string& text) {
-    const auto value = parseNumber(text);
-    if (!value) throw Error(fmt::format("range: expected a number, found '{}'", text));
-    return *value;
-  };
-  if (const auto text = ui.field("view/low", "from", shortNumber(low))) range(typed(*text), high);
-  if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(low, typed(*text));
+  if (const auto text = ui.field("view/low", "from", shortNumber(low))) range(*text, fmt::format("{}", high));
+  if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(fmt::format("{}", low), *text);
 }
 
 /// Which half of the picture shows which field.
@@ -239,7 +236,12 @@ void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
          "settings strategy=", commands);
   if (explorer.work) {
     ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
+    if (!explorer.work->cancellable) return;
+    ui.freeze(false);
+    ui.enable(true);
     if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
+    ui.freeze(true);
+    ui.enable(true);
     return;
   }
   if (const auto all = explorer.allSteps()) {
@@ -344,20 +346,23 @@ void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) 
 
 void drawStatistics(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
   const Field& field = explorer.session().current().field;
-  const Jumps& jumps = explorer.session().jumps();
-  const std::pair<std::string, std::string> rows[] = {
+  std::vector<std::pair<std::string, std::string>> rows = {
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
       {"memory", bytesText(double(figures.bytes))},
       {"target error", shortNumber(field.metadata().targetError)},
       {"RMS estimate", shortNumber(field.metadata().rmsEstimate(field.domain()))},
-      {"jump of f, RMS", shortNumber(jumps.value.rms)},
-      {"jump of gradient, RMS", shortNumber(jumps.gradient.rms)},
   };
+  if (explorer.session().knowsJumps()) {
+    const Jumps& jumps = explorer.session().jumps();
+    rows.emplace_back("jump of f, RMS", shortNumber(jumps.value.rms));
+    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps.gradient.rms));
+  }
   ui.facts(rows);
 }
 
 void drawWorst(Ui& ui, Explorer& explorer, Commands& commands) {
+  if (!explorer.session().knowsJumps()) return;  // being measured
   const ViewState& view = explorer.view();
   const Jumps& jumps = explorer.session().jumps();
   choice(ui, "worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
@@ -382,8 +387,15 @@ void drawWorst(Ui& ui, Explorer& explorer, Commands& commands) {
 }
 
 void drawReadout(Ui& ui, Explorer& explorer) {
+  if (const auto& work = explorer.work) {
+    ui.text(fmt::format("{} {:.0f} %", work->task, std::floor(100 * work->fraction)));
+    if (work->cancellable) ui.text("Escape: cancel", true);
+    return;
+  }
   if (!explorer.message.empty()) {
+    ImGui::PushTextWrapPos(0);
     ui.text(explorer.message);
+    ImGui::PopTextWrapPos();
     return;
   }
   if (const auto readout = explorer.readout()) {
@@ -403,6 +415,7 @@ void drawPanels(Ui& ui, Explorer& explorer, Commands& commands) {
   const ViewState& view = explorer.view();
   const Layout layout = layoutOf(view);
   const bool empty = layout.right.width() <= 0;
+  ui.freeze(explorer.work.has_value());
   const FieldStatistics figures = empty ? FieldStatistics{} : explorer.figures();
   const auto scrolling = [&](const char* name, const UiRect& rect, double scroll, const auto& content) {
     if (rect.width() <= 0) return;

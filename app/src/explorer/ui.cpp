@@ -97,7 +97,8 @@ std::optional<Key> keyNamed(std::string_view name) {
 struct Ui::State {
   ImGuiContext* context = nullptr;
   Coverage texture;
-  bool enabled = true;
+  bool disabled = false;
+  bool frozen = false;
   std::string clipboard;
   std::string idText;
   std::pair<std::string, double> held;  ///< a slider that asks once it is let go, and where it stands until then
@@ -156,7 +157,6 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
   }
   io.MousePos = {float(pointer_[0]), float(pointer_[1])};
   widgets_.clear();
-  state_->enabled = true;
   ImGui::NewFrame();
   widgets();
   ImGui::Render();
@@ -178,6 +178,11 @@ bool Ui::busy() const {
   ImGui::SetCurrentContext(state_->context);
   const ImGuiIO& io = ImGui::GetIO();
   return io.MouseDown[0] || io.MouseDown[1] || io.MouseDown[2] || ImGui::IsAnyItemActive();
+}
+
+bool Ui::holds(int button) const {
+  ImGui::SetCurrentContext(state_->context);
+  return ImGui::GetIO().MouseDown[button];
 }
 
 bool Ui::editing() const {
@@ -202,7 +207,9 @@ double Ui::column(const char* name, const UiRect& rect, std::optional<double> sc
   if (std::abs(ImGui::GetScrollY() - scroll) > 0.5 && ImGui::GetIO().MouseWheel == 0 && !ImGui::IsMouseDown(0))
     ImGui::SetScrollY(float(scroll));
   ImGui::PushItemWidth(0.52F * ImGui::GetContentRegionAvail().x);
+  enable(true);
   content();
+  setDisabled(false);
   ImGui::PopItemWidth();
   const double now = std::min(ImGui::GetScrollY(), ImGui::GetScrollMaxY());
   ImGui::End();
@@ -210,7 +217,7 @@ double Ui::column(const char* name, const UiRect& rect, std::optional<double> sc
 }
 
 void Ui::note(const std::string& path) {
-  widgets_[path] = {visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()), state_->enabled};
+  widgets_[path] = {visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()), !state_->disabled};
 }
 
 const char* Ui::id(const std::string& path, const char* label) {
@@ -218,15 +225,15 @@ const char* Ui::id(const std::string& path, const char* label) {
   return state_->idText.c_str();
 }
 
-void Ui::enable(bool enabled) {
-  if (state_->enabled != enabled) {
-    if (enabled)
-      ImGui::EndDisabled();
-    else
-      ImGui::BeginDisabled();
-  }
-  state_->enabled = enabled;
+void Ui::setDisabled(bool disabled) {
+  if (disabled && !state_->disabled) ImGui::BeginDisabled();
+  if (!disabled && state_->disabled) ImGui::EndDisabled();
+  state_->disabled = disabled;
 }
+
+void Ui::enable(bool enabled) { setDisabled(!enabled || state_->frozen); }
+
+void Ui::freeze(bool frozen) { state_->frozen = frozen; }
 
 bool Ui::heading(const std::string& path, const char* label) {
   ImGui::AlignTextToFramePadding();

@@ -70,6 +70,7 @@ class Ui {
   bool wantsMouse() const;
   /// Whether a button is down or a widget is being edited: changes belong to one gesture.
   bool busy() const;
+  bool holds(int button) const;
   bool editing() const;
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
@@ -93,12 +94,15 @@ class Ui {
   void facts(std::span<const std::pair<std::string, std::string>> rows);
   void progress(const std::string& path, const std::string& task, double fraction);
   void enable(bool enabled);  ///< until the next call
+  /// From now on nothing is enabled, whatever `enable` says.
+  void freeze(bool frozen);
 
   /// Of a place that is drawn by other means.
   void place(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:
   void note(const std::string& path);
+  void setDisabled(bool disabled);
   const char* id(const std::string& path, const char* label);
 
   struct State;

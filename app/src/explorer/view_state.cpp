@@ -52,13 +52,6 @@ std::string cellsLine(const render::ShownCells& cells) {
   return fmt::format("cells {} degrees={} depths={}\n", style, levelText(cells.degrees), levelText(cells.depths));
 }
 
-std::string backendText(const Backend& backend) {
-  if (backend.cpu) return "cpu=true";
-  return std::string("gl=") + (backend.gl == render::GlChoice::software   ? "software"
-                               : backend.gl == render::GlChoice::hardware ? "hardware"
-                                                                          : "auto");
-}
-
 std::string panelLine(const ViewState& view) {
   std::string line = "panel";
   for (std::size_t panel = 0; panel < kPanels; ++panel)
@@ -117,6 +110,13 @@ std::string scriptOf(const ViewState& view) {
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstPage + 1) +
          panelLine(view);
+}
+
+std::string backendText(const Backend& backend) {
+  if (backend.cpu) return "cpu=true";
+  return std::string("gl=") + (backend.gl == render::GlChoice::software   ? "software"
+                               : backend.gl == render::GlChoice::hardware ? "hardware"
+                                                                          : "auto");
 }
 
 std::string scriptWord(const std::string& word) {

@@ -73,6 +73,9 @@ std::string scriptOf(const ViewState& view);
 /// By their script lines, which hold everything.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
+/// `show`'s word for it.
+std::string backendText(const Backend& backend);
+
 /// A word of a script, in quotes where it needs them.
 std::string scriptWord(const std::string& word);
 

@@ -144,7 +144,7 @@ struct Drawn {
   Legend legend = {};
   std::vector<std::string> details = {};  ///< what is shown, the most important first
   ScaleOptions scale = {};  ///< as drawn, with what was chosen: the same for another picture gives it the same colours
-  std::array<int, 2> corner = {0, 0};     ///< of the view in the picture, pixels from the upper left
+  std::array<int, 2> corner = {0, 0};  ///< of the view in the picture, pixels from the upper left
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});

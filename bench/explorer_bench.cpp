@@ -1,0 +1,37 @@
+// A frame of the explorer, slice and all panels, when its plane has been moved; by Mesa's software renderer.
+
+#include <fmt/format.h>
+
+#include <sstream>
+
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "scene.h"
+#include "script.h"
+
+namespace hpsdf::bench {
+namespace {
+
+void explorerFrame(benchmark::State& state) {
+  const app::Registry registry = app::makeRegistry();
+  std::istringstream in;
+  std::ostringstream out, err;
+  app::Session session(registry, {in, out, err});
+  session.setField({bunnyField(), "bunny"});
+  const auto run = [&](const std::string& line) {
+    app::runScript(session, app::parseScript(registry, "bench", line, {}));
+  };
+  run("show slice size=1280x720 gl=software");
+  session.explorer().frame();  // compiles the shaders, measures the jumps
+  int step = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    run(fmt::format("plane offset={}", 0.001 * (++step % 500)));
+    benchmark::DoNotOptimize(session.explorer().frame());
+  }
+  state.SetLabel(session.lastRenderer());
+}
+
+BENCHMARK(explorerFrame)->Name("frame/explorer")->UseRealTime()->Unit(benchmark::kSecond);
+
+}  // namespace
+}  // namespace hpsdf::bench

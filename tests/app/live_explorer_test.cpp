@@ -1,0 +1,289 @@
+// The explorer as a window leads it, without a window: recordings do again what was done, long work can be watched and
+// cancelled.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <random>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "explorer/live_work.h"
+#include "explorer/recording.h"
+#include "long_work.h"
+#include "script.h"
+
+namespace hpsdf::app {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kField = "build analytic:torus target-error=1e-4";
+constexpr const char* kFirst = "show size=900x560 cpu=true";
+
+/// A session with its explorer.
+class Desk {
+ public:
+  Desk() { run(kField); }
+  void run(const std::string& lines) { runScript(session_, parseScript(registry_, "test", lines, {})); }
+  Explorer& explorer() { return session_.explorer(); }
+  Session& session() { return session_; }
+
+  void move(double x, double y) { explorer().input({.kind = Input::Kind::move, .at = {x, y}}); }
+  void press(int button = 0, bool control = false) {
+    explorer().input({.kind = Input::Kind::press, .button = button, .control = control});
+  }
+  void release(int button = 0) { explorer().input({.kind = Input::Kind::release, .button = button}); }
+  void key(Key key, bool control = false) {
+    explorer().input({.kind = Input::Kind::key, .key = key, .control = control});
+  }
+  void type(const std::string& text) { explorer().input({.kind = Input::Kind::type, .text = text}); }
+  void moveTo(const std::string& widget) {
+    const UiRect rect = explorer().widgets().at(widget).rect;
+    move((rect.x0 + rect.x1) / 2, (rect.y0 + rect.y1) / 2);
+  }
+  void click(const std::string& widget, bool control = false) {
+    moveTo(widget);
+    press(0, control);
+    release();
+  }
+
+ private:
+  std::istringstream in_;
+  std::ostringstream out_, err_;
+  Registry registry_ = makeRegistry();
+  Session session_{registry_, {in_, out_, err_}};
+};
+
+/// What the states before look like, the last first.
+std::vector<std::string> history(Explorer& explorer) {
+  std::vector<std::string> states = {scriptOf(explorer.view())};
+  while (explorer.undo()) states.push_back(scriptOf(explorer.view()));
+  return states;
+}
+
+TEST(Recording, holdsOneLineAGesture) {
+  Desk desk;
+  Recording recording(desk.explorer(), {});
+  desk.explorer().run(kFirst);
+  desk.moveTo("canvas");
+  desk.press();
+  for (int i = 0; i < 5; ++i) desk.move(450 + 10 * i, 280);
+  desk.release();
+  EXPECT_EQ(recording.lines(), 2u) << recording.script();
+  desk.press(1);
+  desk.move(470, 300);
+  desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});  // another kind of line within the gesture
+  desk.move(480, 300);
+  desk.release(1);
+  EXPECT_EQ(recording.lines(), 5u) << recording.script();
+}
+
+TEST(Recording, anUndoTakesNoOthersPlace) {
+  Desk desk;
+  desk.run("camera 1,2,1 ; camera 3,4,1 ; camera 5,6,1");
+  Recording recording(desk.explorer(), {});
+  desk.moveTo("canvas");
+  desk.press();
+  desk.key(Key::z, true);
+  desk.key(Key::z, true);
+  desk.release();
+  EXPECT_EQ(recording.script(), "undo\nundo\n");
+}
+
+TEST(Recording, aGestureThatEndsWhereItBeganLeavesNoHistory) {
+  Desk desk;
+  desk.run("camera 1,2,1 ; camera 3,4,1 ; undo");
+  desk.moveTo("canvas");
+  const auto [x, y] = desk.explorer().ui().pointer();
+  desk.press();
+  desk.move(x + 50, y);
+  EXPECT_FALSE(desk.explorer().canRedo());
+  desk.move(x, y);
+  desk.release();
+  EXPECT_TRUE(desk.explorer().canRedo());
+  EXPECT_EQ(history(desk.explorer()).size(), 2u);
+}
+
+TEST(Recording, theFramesSizeIsNotUndone) {
+  Desk desk;
+  desk.run("camera 1,2,1 ; show size=700x500 ; undo");
+  EXPECT_EQ(desk.explorer().view().width, 700);
+  EXPECT_FALSE(desk.explorer().canUndo());
+}
+
+/// Something that a person might do.
+void doAnything(Desk& desk, std::mt19937& random) {
+  const auto below = [&](int n) { return int(random() % unsigned(n)); };
+  std::vector<std::string> targets;
+  for (const auto& [path, widget] : desk.explorer().widgets())
+    if (widget.enabled && widget.rect.width() > 2 && widget.rect.height() > 2 && path != "build/rebuild" &&
+        path != "build/steps" && path != "bar/copy-view")
+      targets.push_back(path);
+  for (int i = 0; i < 4; ++i) targets.emplace_back("canvas");
+  desk.moveTo(targets[std::size_t(below(int(targets.size())))]);
+  const auto [x, y] = desk.explorer().ui().pointer();
+  const int button = below(2);
+  switch (below(8)) {
+    case 0:
+      desk.explorer().input({.kind = Input::Kind::wheel, .turn = double(below(5) - 2)});
+      break;
+    case 1:
+    case 2:
+      desk.press(button);
+      for (int i = 0; i < 3; ++i) desk.move(x + below(61) - 30, y + below(61) - 30);
+      if (below(4) == 0) desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});
+      if (below(4) == 0) desk.key(Key::z, true);
+      if (below(8) != 0) desk.release(button);
+      break;
+    case 3:
+      desk.press(0, true);
+      desk.release();
+      desk.type(std::to_string(below(9)));
+      if (below(3) != 0) desk.key(Key::enter);
+      break;
+    case 4:
+      desk.key(below(2) == 0 ? Key::z : Key::y, true);
+      break;
+    default:
+      desk.press();
+      desk.release();
+  }
+}
+
+TEST(Recording, whateverIsDoneReplaysToTheSameFrameAndHistory) {
+  std::size_t lines = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Desk desk;
+    Recording recording(desk.explorer(), {});
+    desk.explorer().run(kFirst);
+    std::mt19937 random(seed);
+    for (int i = 0; i < 60; ++i) try {
+        doAnything(desk, random);
+      } catch (const Error&) {  // a value out of range: the window tells and goes on
+      }
+    desk.explorer().letGo();
+    for (bool drawn = false; !drawn;) try {
+        desk.explorer().frame();
+        drawn = true;
+      } catch (const Error&) {  // of a plane beside the domain
+        desk.explorer().run("undo");
+      }
+    desk.explorer().message.clear();
+    recording.notePointer();
+    Desk again;
+    again.run(recording.script());
+    ASSERT_EQ(scriptOf(again.explorer().view()), scriptOf(desk.explorer().view())) << recording.script();
+    const render::Image shown = desk.explorer().frame(), replayed = again.explorer().frame();
+    EXPECT_EQ(shown.pixels, replayed.pixels) << recording.script();
+    EXPECT_EQ(history(desk.explorer()), history(again.explorer())) << recording.script();
+    lines += recording.lines();
+  }
+  EXPECT_GT(lines, 100u);  // or nothing was put to the test
+}
+
+TEST(Recording, anotherScriptGivesAnotherFrame) {
+  Desk desk, other;
+  desk.run(std::string(kFirst) + "\ncamera 30,20,1.1");
+  other.run(std::string(kFirst) + "\ncamera 31,20,1.1");
+  EXPECT_NE(desk.explorer().frame().pixels, other.explorer().frame().pixels);
+}
+
+TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
+  Desk desk;
+  desk.run(std::string(kFirst) + "\nshow slice ; color value-jump range=1e-6,1e-2 ; panel build=false right-scroll=0");
+  desk.explorer().frame();
+  desk.click("view/low");
+  desk.type("many");
+  EXPECT_THROW(desk.key(Key::enter), Error);
+  desk.explorer().letGo();
+  EXPECT_NO_THROW(desk.explorer().frame());
+}
+
+TEST(LiveWork, showsAConstructionAndCancelsIt) {
+  Desk desk;
+  desk.run(kFirst);
+  desk.explorer().frame();
+  const std::uint64_t cells = desk.explorer().figures().leaves;
+  int frames = 0;
+  double furthest = 0;
+  {
+    LiveWork work(desk.explorer(), [&] {
+      Explorer& explorer = desk.explorer();
+      const render::Image frame = explorer.frame();
+      EXPECT_EQ(frame.width, 900);
+      const auto widgets = explorer.widgets();
+      ASSERT_TRUE(widgets.contains("build/progress"));
+      ASSERT_TRUE(widgets.contains("build/cancel"));
+      for (const auto& [path, widget] : widgets)
+        EXPECT_EQ(widget.enabled, path == "build/cancel" || path == "canvas") << path;
+      furthest = std::max(furthest, explorer.work->fraction);
+      // other widgets do nothing
+      const ViewState before = explorer.view();
+      desk.click("bar/slice");
+      desk.moveTo("canvas");
+      explorer.input({.kind = Input::Kind::wheel, .turn = 1});
+      EXPECT_TRUE(explorer.view() == before);
+      if (++frames == 3) desk.click("build/cancel");
+    });
+    desk.run("settings target-error=1e-30");
+    EXPECT_THROW(desk.click("build/rebuild"), Cancelled);
+  }
+  EXPECT_EQ(frames, 3);
+  EXPECT_GT(furthest, 0);
+  EXPECT_FALSE(desk.explorer().work);
+  EXPECT_EQ(desk.explorer().figures().leaves, cells);
+  EXPECT_TRUE(desk.explorer().widgets().contains("build/rebuild"));
+}
+
+TEST(LiveWork, escapeCancelsWhereThePanelIsClosed) {
+  Desk desk;
+  desk.run(std::string(kFirst) + "\npanel all=false\nsettings target-error=1e-30");
+  desk.explorer().frame();
+  LiveWork work(desk.explorer(), [&] { desk.key(Key::escape); });
+  EXPECT_THROW(desk.explorer().run("rebuild"), Cancelled);
+  // and the next construction runs to its end
+  desk.run("settings target-error=1e-3");
+  EXPECT_NO_THROW(desk.explorer().run("rebuild"));
+}
+
+TEST(LiveWork, whatAFrameNeedsCannotBeCancelled) {
+  Desk desk;
+  desk.run(kFirst);
+  desk.explorer().frame();
+  int frames = 0;
+  LiveWork work(desk.explorer(), [&] {
+    ++frames;
+    desk.key(Key::escape);
+    EXPECT_FALSE(desk.explorer().widgets().contains("build/cancel"));
+  });
+  const auto measure = [](const Progress& progress) {
+    for (int i = 0; i < 8; ++i) {
+      progress.report("measuring", i / 8.0);
+      if (progress.cancelled()) throw Cancelled();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return 0;
+  };
+  EXPECT_NO_THROW(withProgress(desk.session().console(), measure));
+  EXPECT_GE(frames, 1);
+}
+
+TEST(Registry, theWindowIsForTheCommandLine) {
+  const Registry registry = makeRegistry();
+  try {
+    parseScript(registry, "test", "view builtin:torus", {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("test:1:1: 'view' is a command of the command line"));
+  }
+}
+
+}  // namespace
+}  // namespace hpsdf::app

@@ -1,0 +1,343 @@
+// The window as a person meets it: a display of its own (Xvfb), a real mouse and keyboard (xdotool).
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "commands.h"
+#include "explorer/explorer.h"
+#include "hpsdf/render/image.h"
+#include "other_program.h"
+#include "script.h"
+#include "support/require_gl.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kPatience(30);
+constexpr int kWidth = 960, kHeight = 640;
+
+std::string contents(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return std::move(text).str();
+}
+
+template <typename Condition>
+bool comesTrue(const Condition& condition) {
+  for (const auto end = Clock::now() + kPatience; Clock::now() < end;) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return false;
+}
+
+/// Another program at work in `folder`; what it says goes to out.txt and err.txt there.
+class Child {
+ public:
+  Child(std::vector<std::string> words, const fs::path& folder, const std::string& display) : folder_(folder) {
+    std::vector<std::string> environment;
+    for (char** variable = environ; *variable != nullptr; ++variable)
+      if (!std::string_view(*variable).starts_with("DISPLAY=") &&
+          !std::string_view(*variable).starts_with("WAYLAND_DISPLAY="))
+        environment.emplace_back(*variable);
+    if (!display.empty()) environment.push_back("DISPLAY=" + display);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+    constexpr int kNew = O_WRONLY | O_CREAT | O_TRUNC;
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "out.txt", kNew, 0600);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "err.txt", kNew, 0600);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    sigset_t defaults;
+    sigemptyset(&defaults);
+    sigaddset(&defaults, SIGINT);  // a test run in the background inherits an ignored one
+    posix_spawnattr_setsigdefault(&attributes, &defaults);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    const auto pointers = [](std::vector<std::string>& texts) {
+      std::vector<char*> list;
+      for (std::string& text : texts) list.push_back(text.data());
+      list.push_back(nullptr);
+      return list;
+    };
+    const int error = posix_spawnp(&id_, words[0].c_str(), &actions, &attributes, pointers(words).data(),
+                                   pointers(environment).data());
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    if (error != 0) throw std::runtime_error(words[0] + ": " + std::strerror(error));
+  }
+  ~Child() {
+    if (ended()) return;
+    kill(id_, SIGKILL);
+    waitpid(id_, nullptr, 0);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  bool ended() {
+    int status = 0;
+    if (status_ || waitpid(id_, &status, WNOHANG) == 0) return status_.has_value();
+    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+    return true;
+  }
+  /// Exit status, or -signal.
+  int wait() {
+    if (!comesTrue([&] { return ended(); })) ADD_FAILURE() << "does not end; it said: " << err();
+    return status_.value_or(-SIGKILL);
+  }
+  void interrupt() const { kill(id_, SIGINT); }
+  std::string out() const { return contents(folder_ / "out.txt"); }
+  std::string err() const { return contents(folder_ / "err.txt"); }
+
+ private:
+  fs::path folder_;
+  pid_t id_ = 0;
+  std::optional<int> status_;
+};
+
+std::string problem() {
+#ifndef HPSDF_WINDOW
+  return "built without a window (libglfw3-dev)";
+#endif
+  for (const char* program : {"Xvfb", "xdotool"})
+    if (!findProgram(program)) return std::string(program) + " is not installed";
+  return support::glProblem();
+}
+
+/// The state that the window is in, followed step by step: where its widgets stand.
+class Follower {
+ public:
+  explicit Follower(const std::string& field) {
+    run("build " + field + " ; show size=" + std::to_string(kWidth) + "x" + std::to_string(kHeight) + " gl=software");
+  }
+  void run(const std::string& lines) { runScript(session_, parseScript(registry_, "test", lines, {})); }
+  std::array<int, 2> middleOf(const std::string& widget) {
+    session_.explorer().frame();
+    const UiRect& rect = session_.explorer().widgets().at(widget).rect;
+    return {int(rect.x0 + rect.x1) / 2, int(rect.y0 + rect.y1) / 2};
+  }
+  UiRect canvas() { return layoutOf(session_.explorer().view()).canvas; }
+
+ private:
+  std::istringstream in_;
+  std::ostringstream out_, err_;
+  Registry registry_ = makeRegistry();
+  Session session_{registry_, {in_, out_, err_}};
+};
+
+class WindowTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string missing = problem();
+    if (!missing.empty() && support::glRequired()) FAIL() << "HPSDF_REQUIRE_GL=1: " << missing;
+    if (!missing.empty()) GTEST_SKIP() << missing;
+    fs::create_directory(folder_ / "x");
+    server_.emplace(std::vector<std::string>{"Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-fbdir",
+                                             (folder_ / "x").string(), "-nolisten", "tcp"},
+                    folder_ / "x", "");
+    ASSERT_TRUE(comesTrue([&] { return server_->out().ends_with('\n') || server_->ended(); }));
+    ASSERT_FALSE(server_->ended()) << server_->err();
+    std::string number = server_->out();
+    number.pop_back();
+    display_ = ":" + number;
+  }
+
+  fs::path file(const std::string& name) const { return folder_ / name; }
+
+  /// The program in the folder, to its end.
+  int program(std::vector<std::string> words, const std::string& display = "") {
+    words.insert(words.begin(), HPSDF_PROGRAM);
+    Child child(std::move(words), folder_.path(), display);
+    const int status = child.wait();
+    said_ = child.out() + child.err();
+    return status;
+  }
+
+  void open(const std::string& field) {
+    const std::string size = std::to_string(kWidth) + "x" + std::to_string(kHeight);
+    window_.emplace(std::vector<std::string>{HPSDF_PROGRAM, "view", field, "--size", size, "--gl", "software",
+                                             "--record", "session.hps", "--shot", "last.png"},
+                    folder_.path(), display_);
+    id_ = desktop({"search", "--sync", "--onlyvisible", "--name", "hpsdf$"});
+    ASSERT_FALSE(id_.empty()) << window_->err();
+    id_.pop_back();
+    desktop({"windowfocus", "--sync", id_});
+  }
+
+  /// Ctrl+Q, or what another way of closing it gives.
+  int close() {
+    desktop({"key", "ctrl+q"});
+    return window_->wait();
+  }
+
+  std::string desktop(std::vector<std::string> words) {
+    words.insert(words.begin(), "xdotool");
+    Child child(std::move(words), folder_ / "x", display_);
+    EXPECT_EQ(child.wait(), 0) << child.err();
+    return child.out();
+  }
+  void move(const std::array<int, 2>& at) {
+    desktop({"mousemove", "--window", id_, std::to_string(at[0]), std::to_string(at[1])});
+  }
+  void drag(const std::array<int, 2>& from, int dx, int dy, const char* button = "1") {
+    move(from);
+    desktop({"mousedown", button});
+    move({from[0] + dx / 2, from[1] + dy / 2});
+    move({from[0] + dx, from[1] + dy});
+    desktop({"mouseup", button});
+  }
+  void click(const std::array<int, 2>& at) {
+    move(at);
+    desktop({"click", "1"});
+  }
+  void type(const std::string& text) {
+    desktop({"type", "--delay", "1", text});
+    desktop({"key", "Return"});
+  }
+
+  /// What the display shows at the window's place, over a part of a frame, where it agrees with the frame.
+  bool screenShows(const render::Image& frame, const UiRect& part) {
+    const std::string screen = contents(folder_ / "x" / "Xvfb_screen0");  // the format of xwd: big-endian words first
+    const auto word = [&](std::size_t index) {
+      std::uint32_t value = 0;
+      for (std::size_t byte = 0; byte < 4; ++byte)
+        value = value << 8 | static_cast<unsigned char>(screen[4 * index + byte]);
+      return value;
+    };
+    const std::size_t pixels = word(0) + 12 * word(19), line = word(12);
+    for (int y = int(part.y0); y < int(part.y1); ++y)
+      for (int x = int(part.x0); x < int(part.x1); ++x)
+        for (std::size_t channel = 0; channel < 3; ++channel) {  // blue first
+          const char shown = screen[pixels + std::size_t(y) * line + 4 * std::size_t(x) + 2 - channel];
+          if (static_cast<std::uint8_t>(shown) != frame.at(x, y)[channel]) return false;
+        }
+    return true;
+  }
+
+  support::TemporaryDirectory folder_;
+  std::optional<Child> server_, window_;
+  std::string display_, id_, said_;
+};
+
+TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
+  const std::string field = "builtin:torus";
+  ASSERT_NO_FATAL_FAILURE(open(field));
+  Follower follower(field);
+  const auto canvas = follower.middleOf("canvas");
+  drag(canvas, 60, -30);
+  drag(canvas, 20, 30, "3");
+  move(canvas);
+  desktop({"click", "4"});
+  click(follower.middleOf("bar/slice"));
+  follower.run("show slice");
+  click(follower.middleOf("view/color"));
+  follower.run("ui click view/color");
+  click(follower.middleOf("view/color/depth"));
+  follower.run("ui click view/color/depth");
+  move(follower.middleOf("view/zoom"));
+  desktop({"keydown", "ctrl", "click", "1", "keyup", "ctrl"});
+  type("4");
+  follower.run("plane zoom=4");
+  click(follower.middleOf("bar/worst"));
+  desktop({"key", "ctrl+z"});
+  click(follower.middleOf("build/target-error"));
+  type("1e-4");
+  click(follower.middleOf("build/rebuild"));
+  desktop({"key", "F12"});
+  ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
+  const render::Image shot = render::loadPng(file("hpsdf-0001.png"));
+  EXPECT_TRUE(comesTrue([&] { return screenShows(shot, follower.canvas()); }));
+  move(canvas);
+  click(follower.middleOf("view/axis"));  // a list that stays open
+  ASSERT_EQ(close(), 0) << window_->err();
+
+  const std::string script = contents(file("session.hps"));
+  for (const char* line :
+       {"build builtin:torus\nshow size=960x640 gl=software\ncamera 6,8,1.1\ncamera target=", "\nshow slice\n",
+        "\ncolor depth\n", "\nplane zoom=4\npanel worst=false\nundo\nsettings target-error=1e-4\nrebuild\nui hover ",
+        "\nshot output=hpsdf-0001.png\nui hover "})
+    EXPECT_THAT(script, HasSubstr(line));
+  const std::string first = contents(file("hpsdf-0001.png")), last = contents(file("last.png"));
+  EXPECT_FALSE(first == last);
+  fs::remove(file("hpsdf-0001.png"));
+  ASSERT_EQ(program({"run", "-e", "include session.hps", "-e", "shot output=replay.png"}), 0) << said_;
+  EXPECT_TRUE(contents(file("hpsdf-0001.png")) == first);
+  EXPECT_TRUE(contents(file("replay.png")) == last);
+
+  std::string other = script;
+  other.replace(other.find("plane zoom=4"), 12, "plane zoom=5");
+  std::ofstream(file("other.hps")) << other;
+  ASSERT_EQ(program({"run", "-e", "include other.hps", "-e", "shot output=other.png"}), 0) << said_;
+  EXPECT_FALSE(contents(file("other.png")) == last);
+}
+
+TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
+  const std::string field = "analytic:torus";
+  ASSERT_NO_FATAL_FAILURE(open(field));
+  Follower follower(field);
+  click(follower.middleOf("build/grid"));
+  type("many");
+  click(follower.middleOf("build/target-error"));
+  type("1e-30");
+  click(follower.middleOf("build/rebuild"));
+  desktop({"key", "Escape"});
+  click(follower.middleOf("bar/slice"));
+  ASSERT_EQ(close(), 0) << window_->err();
+  const std::string script = contents(file("session.hps"));
+  EXPECT_THAT(script, HasSubstr("settings target-error=1e-30\n"));
+  EXPECT_THAT(script, Not(HasSubstr("rebuild")));
+  EXPECT_THAT(script, Not(HasSubstr("many")));
+  ASSERT_EQ(program({"run", "-e", "include session.hps", "-e", "shot output=replay.png"}), 0) << said_;
+  EXPECT_TRUE(contents(file("replay.png")) == contents(file("last.png")));
+}
+
+TEST_F(WindowTest, anotherSizeIsRecorded) {
+  ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
+  desktop({"windowsize", id_, "700", "500"});
+  ASSERT_EQ(close(), 0) << window_->err();
+  EXPECT_THAT(contents(file("session.hps")), HasSubstr("show size=960x640 gl=software\nshow size=700x500\n"));
+  const render::Image last = render::loadPng(file("last.png"));
+  EXPECT_EQ(last.width, 700);
+  EXPECT_EQ(last.height, 500);
+}
+
+TEST_F(WindowTest, anInterruptionEndsItWithItsFilesWritten) {
+  ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
+  desktop({"key", "F12"});
+  ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
+  window_->interrupt();
+  EXPECT_EQ(window_->wait(), 0) << window_->err();
+  EXPECT_THAT(contents(file("session.hps")), HasSubstr("shot output=hpsdf-0001.png"));
+  EXPECT_TRUE(contents(file("last.png")) == contents(file("hpsdf-0001.png")));
+}
+
+TEST_F(WindowTest, withoutADisplayItSaysSo) {
+  EXPECT_EQ(program({"view", "analytic:torus", "--record", "session.hps"}), 2);
+  EXPECT_THAT(said_, HasSubstr("no window can be opened here"));
+  EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
+  EXPECT_FALSE(fs::exists(file("session.hps")));
+}
+
+}  // namespace
+}  // namespace hpsdf::app
