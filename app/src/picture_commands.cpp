@@ -80,6 +80,8 @@ void runSlice(Session& session, const Arguments& arguments) {
   render::SlicePicture picture = slicePicture(arguments);
   if (format != SliceFormat::png && picture.samples != 1)
     throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
+  if (format != SliceFormat::png && picture.arrows != 0)
+    throw Error(fmt::format("{}: raw values have no arrows; leave out arrows", file));
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
@@ -159,8 +161,8 @@ std::vector<Parameter> pictureParameters() {
                                         .maximum = 8}};
   parameters.push_back({.name = "arrows",
                         .type = ParameterType::wholeNumber,
-                        .help = "Arrows along the gradient, so many pixels apart; 0 for none. Where its length is 1, "
-                                "an arrow is 0.8 of that long, but for what the projection takes from it.",
+                        .help = "Arrows along the gradient, so many pixels apart, at least 4; 0 for none. Where its "
+                                "length is 1, an arrow is 0.8 of that long, but for what the projection takes from it.",
                         .defaultText = "0",
                         .unit = "pixels",
                         .minimum = 0,

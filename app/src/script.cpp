@@ -17,6 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
+constexpr std::size_t kDeepestInclude = 16;  // as deep as `run` goes
+
 bool isLower(char c) { return c >= 'a' && c <= 'z'; }
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 bool isLetter(char c) { return isLower(c) || (c >= 'A' && c <= 'Z') || c == '_'; }
@@ -237,6 +239,9 @@ class ScriptReader {
     if (std::ranges::any_of(open_, isThat))
       throw Error(
           fmt::format("{}: includes itself, directly or by others; take one of the includes out", path.string()));
+    if (open_.size() > kDeepestInclude)
+      throw Error(
+          fmt::format("{}: more than {} scripts include each other; take some apart", path.string(), kDeepestInclude));
     return {path.string(), readTextFile(path.string())};
   }
 

@@ -226,15 +226,18 @@ void addDistanceBar(Furniture& furniture, const Frame& frame, const DistanceScal
     furniture.boxes.push_back({left, y, right, y + 1, colorOf(divergingColor(value))});
   }
 
-  // As many numbers as stand well apart: at every 1st, 2nd, 5th or 10th line, zero always among them.
+  // As many numbers as stand well apart: at every 1st, 2nd, 5th, 10th … line, zero always among them.
   const double perLine = (bottom - top) * scale.step / (2 * scale.range);
   const double size = std::min(em, 0.9 * em + 1);
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // about 1e7 at most
   int every = 1;
-  for (int candidate : {2, 5, 10, 20, 50})
-    if (every * perLine < 1.7 * size) every = candidate;
-  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));
+  for (int decade = 1; every * perLine < 1.7 * size && every <= lines; decade *= 10)
+    for (const int digit : {2, 5, 10})
+      if (every * perLine < 1.7 * size) every = digit * decade;
   const double thin = std::max(1.0, em / 15);
-  for (int line = -lines; line <= lines; ++line) {
+  // Lines of a close look, which would cover the colours: only those with numbers.
+  const int next = perLine < 2 * thin ? every : 1;
+  for (int line = -(lines / next) * next; line <= lines; line += next) {
     const double y = rowOf(line * scale.step), half = line == 0 ? 1.2 * thin : 0.5 * thin;
     const bool labelled = line % every == 0;
     furniture.boxes.push_back({left, y - half, right + (labelled ? 0.35 * em : 0), y + half, kTick});

@@ -142,7 +142,7 @@ Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int hei
   const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
   Camera result;
   const Vector3 target = camera.target.value_or(domain.center());
-  checkRange("target", target.sum(), target.allFinite(), "three finite coordinates");
+  if (!target.allFinite()) throw Error("the camera's target is not finite: give three coordinates");
   result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
   result.forward = -towardsEye;
   result.right = right * (halfHeight * width / height);

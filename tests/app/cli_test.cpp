@@ -305,6 +305,7 @@ TEST_F(Cli, usageMistakesAreRefused) {
   expectRefused({{"slice", field(), "-o", at("x.gif")}}, "expected .png for a picture, .pfm or .csv");
   expectRefused({{"render", field(), "-o", at("x.csv")}}, "written as .png");
   expectRefused({{"slice", field(), "-o", at("x.pfm"), "--samples", "2"}}, "one sample a pixel");
+  expectRefused({{"slice", field(), "-o", at("x.csv"), "--arrows", "20"}}, "no arrows");
   expectRefused({{"render", field(), "-o", at("x.png"), "--cpu", "--gl", "software"}}, "cpu excludes gl");
 }
 

@@ -197,6 +197,15 @@ TEST_F(IncludeTest, scriptsThatIncludeThemselvesAreRefused) {
   EXPECT_THAT(complaintNamed(at("one.hps"), "include two.hps"), HasSubstr("two.hps:1:1: "));
 }
 
+TEST_F(IncludeTest, includesGoSixteenScriptsDeep) {
+  for (int depth = 1; depth < 18; ++depth)
+    write("d" + std::to_string(depth) + ".hps", "include d" + std::to_string(depth + 1) + ".hps");
+  write("d18.hps", "say deep");
+  EXPECT_THAT(complaintNamed(at("a.hps"), "include d1.hps"), HasSubstr("more than 16 scripts include each other"));
+  EXPECT_EQ(complaintNamed(at("a.hps"), "include d4.hps"), "no complaint");
+  EXPECT_THAT(said_, ElementsAre("[deep]"));
+}
+
 TEST_F(IncludeTest, includedCallsBelongToTheLineOfTheInclude) {
   write("b.hps", "say 1\nsay 2\n");
   const auto calls = parseScript(registry_, at("a.hps"), "say a\n\ninclude b.hps\nsay c", {});

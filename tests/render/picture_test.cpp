@@ -489,6 +489,13 @@ TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
       EXPECT_GE(furniture.texts.size(), 4U) << size << ": hardly a number beside the bar for range " << range;
       for (const TextItem& item : furniture.texts) EXPECT_EQ(item.text.find("…"), std::string::npos) << item.text;
     }
+    // close looks, far from the surface: very many lines within the range
+    for (const double spread : {7e-2, 7e-3, 7e-5, 1e-16}) {
+      Furniture furniture;
+      addDistanceBar(furniture, f, distanceScale(0.4648, 0.4648 + spread));
+      expectTidy(furniture, f, size + ", spread " + std::to_string(spread));
+      EXPECT_LT(furniture.boxes.size(), std::size_t(3 * f.height)) << size << ": all lines drawn";
+    }
     Furniture furniture;
     addFacts(furniture, f, titles, facts);
     addCaption(furniture, f, "", {});
@@ -559,7 +566,8 @@ TEST(Layout, EachLevelsNumberStandsAtItsColor) {
 
 TEST(Layout, EachDistancesNumberStandsAtItsColor) {
   for (const auto& [width, height] : {std::pair{1280, 720}, {320, 240}, {200, 1000}})
-    for (const DistanceScale& scale : {distanceScale(-0.4, 1.1), distanceScale(-3e4, 1e3), distanceScale(1e-6, 2e-5)}) {
+    for (const DistanceScale& scale : {distanceScale(-0.4, 1.1), distanceScale(-3e4, 1e3), distanceScale(1e-6, 2e-5),
+                                       distanceScale(0.4648, 0.4715)}) {
       const Frame f = frame(width, height);
       Furniture furniture;
       addDistanceBar(furniture, f, scale);
