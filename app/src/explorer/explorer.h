@@ -104,6 +104,7 @@ class Explorer {
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
   bool gestureKept_ = false;  ///< the state before the gesture is in undone_ already
+  bool byWidget_ = false;     ///< while a command runs that a person's gesture asked for
   std::map<std::string, std::string> settings_;
   std::string lastVerb_;  ///< of the gesture
 

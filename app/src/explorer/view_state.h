@@ -75,5 +75,7 @@ inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf
 
 /// A word of a script, in quotes where it needs them.
 std::string scriptWord(const std::string& word);
+/// The same; none in the place of an empty one.
+std::string wordOrNone(const std::string& word);
 
 }  // namespace hpsdf::app
