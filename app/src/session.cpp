@@ -1,5 +1,6 @@
 #include "session.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "building.h"
@@ -29,6 +30,7 @@ void Session::setField(CurrentField field) {
   renderer_.reset();
   jumps_.reset();
   exact_.reset();
+  given_.reset();
   picture_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
   if (explorer_) explorer_->fieldChanged();
@@ -47,17 +49,22 @@ const Jumps& Session::jumps() {
   return *jumps_;
 }
 
-bool Session::knowsExact() const { return exact_ || isShape(current().field.metadata().source.name); }
+bool Session::knowsExact() const { return exact_ || given_ || isShape(current().field.metadata().source.name); }
 
 const DistanceFunction& Session::exact(const std::string& surface) {
   const Source& source = current().field.metadata().source;
-  if (exact_ && (surface.empty() || surface == exactSurface_)) return *exact_;
-  if (surface.empty() && !knowsExact())
-    throw Error("errors need the mesh that the field was made from: give mesh=" +
-                (source.name.empty() ? "FILE" : source.name));
-  exact_ = exactDistance(console_, surface.empty() ? source.name : surface, source);
-  exactSurface_ = surface;
-  return *exact_;
+  if (surface.empty()) {
+    if (!knowsExact())
+      throw Error("errors need the mesh that the field was made from: give mesh=" +
+                  (source.name.empty() ? "FILE" : source.name));
+    if (!exact_ && isShape(source.name)) exact_ = exactDistance(console_, source.name, source);
+    return exact_ ? *exact_ : *given_;
+  }
+  if (!given_ || surface != givenSurface_) {
+    given_ = exactDistance(console_, surface, source);
+    givenSurface_ = surface;
+  }
+  return *given_;
 }
 
 const render::Drawn& Session::picture() const {
@@ -70,28 +77,47 @@ render::Evidence Session::evidence(render::ColorBy color, const std::string& sur
   if (color == render::ColorBy::valueJump || color == render::ColorBy::gradientJump) evidence.jumps = &jumps();
   if (color == render::ColorBy::error) evidence.exact = &exact(surface);
   if (color == render::ColorBy::difference) {
+    forgetChangedOthers();
     evidence.other = &this->other(other).field;
   }
   return evidence;
 }
 
-const Session::Other& Session::other(const std::string& file) {
-  if (!other_ || other_->file != file) other_ = std::make_unique<Other>(Other{file, load(file)});
-  return *other_;
+Session::Other& Session::keptOther(const std::string& file) {
+  const auto found = std::ranges::find(others_, file, &Other::file);
+  if (found != others_.end()) {
+    std::rotate(others_.begin(), found, found + 1);
+  } else {
+    std::error_code unknown;
+    const auto written = std::filesystem::last_write_time(file, unknown);  // before: what is written since is seen
+    others_.insert(others_.begin(), std::make_unique<Other>(Other{file, load(file), written}));
+    if (others_.size() > 2) others_.pop_back();
+  }
+  return *others_.front();
+}
+
+const Session::Other& Session::other(const std::string& file) { return keptOther(file); }
+
+bool Session::forgetChangedOthers() {
+  return std::erase_if(others_, [](const std::unique_ptr<Other>& other) {
+           std::error_code missing;
+           const auto written = std::filesystem::last_write_time(other->file, missing);
+           return !missing && written != other->written;
+         }) > 0;
 }
 
 const Jumps& Session::otherJumps(const std::string& file) {
-  const Field& field = other(file).field;
-  if (!other_->jumps)
-    other_->jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
-  return *other_->jumps;
+  Other& other = keptOther(file);
+  if (!other.jumps)
+    other.jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(other.field, 0, progress); });
+  return *other.jumps;
 }
 
 render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
-  const Field& field = other(file).field;
-  if (!other_->renderer || other_->backend != backend) other_->renderer = makeRenderer(field, backend);
-  other_->backend = backend;
-  return *other_->renderer;
+  Other& other = keptOther(file);
+  if (!other.renderer || other.backend != backend) other.renderer = makeRenderer(other.field, backend);
+  other.backend = backend;
+  return *other.renderer;
 }
 
 render::Renderer& Session::renderer(const Backend& backend) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
@@ -89,7 +90,8 @@ class Session {
   bool knowsJumps() const { return jumps_.has_value(); }
 
   /// The exact distance that the current field was made from: of `surface`, or, where that is empty, of the shape that
-  /// the field names or the mesh that it was built from just now. Kept. Throws `Error` when it is not to be had.
+  /// the field names or the mesh that it was built from just now; where neither is known, of the surface that was asked
+  /// for last. Kept. Throws `Error` when it is not to be had.
   const DistanceFunction& exact(const std::string& surface);
   /// Whether `exact` needs no surface.
   bool knowsExact() const;
@@ -102,15 +104,19 @@ class Session {
   /// Made when first asked for.
   Explorer& explorer();
 
-  /// A field to compare the current one with: read from its file when first asked for, and kept.
+  /// A field to compare the current one with: read from its file when first asked for, and kept; of two files at most,
+  /// one beside the current field and one that it differs from.
   struct Other {
     std::string file;
     Field field;
+    std::filesystem::file_time_type written = {};  ///< the file, when it was read
     std::optional<Jumps> jumps = {};
     std::unique_ptr<render::Renderer> renderer = {};
     Backend backend = {};
   };
   const Other& other(const std::string& file);
+  /// Forgets those whose files were written since; one that was deleted is kept. Whether there was any.
+  bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
@@ -124,15 +130,18 @@ class Session {
   const std::string& lastRenderer() const { return lastRenderer_; }
 
  private:
+  Other& keptOther(const std::string& file);
+
   const Registry& registry_;
   Console console_;
   bool json_ = false;
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
   std::optional<render::Drawn> picture_;
-  std::unique_ptr<Other> other_;  // its renderer refers to it
-  std::shared_ptr<const DistanceFunction> exact_;
-  std::string exactSurface_;  // what exact_ was asked for by; empty for the field\'s own
+  std::vector<std::unique_ptr<Other>> others_;     // last asked for first; their renderers refer to them
+  std::shared_ptr<const DistanceFunction> exact_;  // of the field's own surface
+  std::shared_ptr<const DistanceFunction> given_;  // of a surface that was asked for by its name
+  std::string givenSurface_;
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
   std::string lastRenderer_;

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "commands.h"
@@ -267,6 +268,11 @@ TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
   bench.run("settings mesh=builtin:torus ; rebuild");
   EXPECT_EQ(bench.session.current().field.metadata().source.name, "builtin:torus");
+  bench.run("settings max-steps=9 ; rebuild max-steps=2");
+  EXPECT_EQ(bench.session.current().field.metadata().steps, 2u) << "what rebuild is given wins";
+  bench.run("build analytic:sphere target-error=1e-2 coefficients=double ; settings max-steps=9 mesh=analytic:sphere");
+  bench.run("rebuild");
+  EXPECT_FALSE(bench.session.current().field.singlePrecision());
 }
 
 TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
@@ -300,6 +306,129 @@ TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
   EXPECT_THAT(bench.failure("beside " + (folder / "none.hpsdf").string()), HasSubstr("no such file"));
   bench.run("beside none");
   EXPECT_GT(halves(), 1000u) << "one picture over the whole width";
+}
+
+TEST(Explorer, aFieldBesideAndOneThatItDiffersFromMayBeTwo) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string twin = folder / "twin.hpsdf", sphere = folder / "sphere.hpsdf";
+  bench.run("build analytic:sphere target-error=1e-2 output=" + sphere);
+  bench.run(std::string(kTorus) + "save output=" + twin + "; panel all=false; show slice size=800x300");
+  bench.run("color difference other=" + sphere + "; beside " + twin);
+  for (const char* view : {"plane offset=0", "plane offset=0.1"}) {
+    bench.run(view);
+    const render::Image frame = bench.explorer().frame();
+    std::size_t differing = 0;
+    for (int y = 40; y < frame.height; ++y)  // below the names
+      for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
+    EXPECT_EQ(differing, 0u) << "left the field, right its twin, both against the sphere";
+  }
+}
+
+TEST(Explorer, aFileBesideThatIsWrittenAnewIsReadAnew) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string other = folder / "other.hpsdf";
+  bench.run("build analytic:sphere target-error=1e-2 output=" + other);
+  bench.run(std::string(kTorus) + "show slice; beside " + other);
+  const render::Image before = bench.explorer().frame();
+  EXPECT_TRUE(same(bench.explorer().frame(), before));
+  bench.run("build builtin:gear target-error=1e-2 output=" + other);
+  bench.run(kTorus);
+  EXPECT_FALSE(same(bench.explorer().frame(), before));
+  std::filesystem::remove(other);
+  bench.run("color depth");
+  bench.explorer().frame();  // of what was read
+}
+
+TEST(Explorer, whatCannotBeDrawnIsSaidAndTakenBack) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string thin = folder / "thin.hpsdf";
+  bench.run("build analytic:sphere target-error=1e-2 domain=-1.2,-1.2,-0.3,1.2,1.2,0.3 output=" + thin);
+  bench.run(std::string(kTorus) + "show slice size=1280x720; beside " + thin);
+  bench.explorer().frame();
+  const render::Image before = bench.explorer().picture()->image;
+  const std::string shot = "shot output=" + (folder / "a.png").string();
+  bench.run("plane offset=0.5");
+  EXPECT_THAT(bench.failure(shot), HasSubstr(thin + ": slice offset 0.5 lies outside")) << "which of the two";
+  bench.run("ui click bar/undo");
+  bench.explorer().frame();
+  EXPECT_TRUE(same(bench.explorer().picture()->image, before));
+}
+
+TEST(Explorer, panelsGiveWhatAPictureLacks) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string mesh = folder / "corner.obj", file = folder / "corner.hpsdf";
+  std::ofstream(mesh) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  bench.run("build " + mesh + " target-error=1e-2 output=" + file);
+  bench.run("load " + file + " ; show cpu=true size=1280x720");
+  bench.run("ui click view/color; ui click view/color/error");
+  EXPECT_THAT(bench.failure("shot output=" + (folder / "a.png").string()), HasSubstr("give mesh=corner.obj"));
+  bench.run("ui type view/mesh " + mesh);
+  bench.run("shot output=" + (folder / "a.png").string());
+}
+
+TEST(Explorer, theExactDistanceOfAnotherSurfaceIsNotTheFieldsOwn) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  bench.run(std::string(kTorus) + "expect at(0,0,0).exact == 0.4 within 1e-9");
+  bench.run("color error mesh=builtin:gear; shot output=" + (folder / "a.png").string());
+  bench.run("expect at(0,0,0).exact == 0.4 within 1e-9");
+}
+
+TEST(Explorer, aCopiedViewForgetsFilesThatItDoesNotName) {
+  Bench bench;
+  bench.run("copy-view");
+  const ViewState wanted = bench.view();
+  const std::string script = bench.out.str();
+  bench.run("color difference other=a.hpsdf of=slice ; color error mesh=b.obj of=surface");
+  bench.run(script);
+  EXPECT_TRUE(bench.view() == wanted) << scriptOf(bench.view());
+}
+
+TEST(Explorer, commandsOfAScriptAreStepsThoughAFieldIsBeingEdited) {
+  Bench bench;
+  bench.run(std::string(kTorus) + "show size=1280x720; ui click build/mesh; show slice");
+  const ViewState slice = bench.view();
+  bench.run("color depth; undo");
+  EXPECT_TRUE(bench.view() == slice) << scriptOf(bench.view());
+}
+
+TEST(Explorer, aFrameThatFailsIsEnded) {
+  Ui ui;
+  const auto widgets = [&](bool fails) {
+    ui.frame(300, 200, nullptr, [&] {
+      ui.column("left", {0, 0, 300, 200}, 0.0, [&] {
+        ui.button("a", "a");
+        ui.enable(false);
+        ui.button("b", "b");
+        if (fails) throw Error("halfway");
+        ui.enable(true);
+      });
+    });
+  };
+  const auto painted = [&] {
+    render::Image image(300, 200, {250, 250, 248});
+    ui.paint(image);
+    return image;
+  };
+  for (int i = 0; i < 3; ++i) widgets(false);
+  const render::Image before = painted();
+  EXPECT_THROW(widgets(true), Error);
+  for (int i = 0; i < 3; ++i) widgets(false);
+  EXPECT_TRUE(same(painted(), before));
+}
+
+TEST(Explorer, whatIsTypedIsCheckedByTheCommand) {
+  Bench bench;
+  bench.run(std::string(kTorus) + "show slice size=1280x720; color slope range=0.5,2");
+  EXPECT_THAT(bench.failure("ui type view/low abc"), HasSubstr("range: expected"));
+  EXPECT_THAT(bench.failure("ui type view/low 3"), HasSubstr("LOW below HIGH"));
+  EXPECT_THAT(bench.failure("ui type bar/slice abc"), HasSubstr("'bar/slice' takes no text"));
+  bench.run("ui type view/low 0.25");
+  EXPECT_EQ((*bench.view().sliceColors.scale.limits)[0], 0.25);
 }
 
 TEST(Explorer, everyLayoutHasRoomForThePicture) {

@@ -121,10 +121,11 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
       {"strategy", strategyName(made.strategy)},
       {"quadrature", fmt::format("{}", made.quadrature)},
       {"band", fmt::format("{}", made.band)}};
+  if (!field.singlePrecision()) settings["coefficients"] = "double";
   const auto mesh = settings_.find("mesh");
   if (mesh != settings_.end() && mesh->second != current.madeFrom()) return settings;
   settings["domain"] = corner(field.domain().min()) + "," + corner(field.domain().max());
-  if (made.source.normalization.scale != 1) settings["normalize"] = "true";
+  if (!made.source.normalization.isIdentity()) settings["normalize"] = "true";
   return settings;
 }
 
@@ -132,13 +133,13 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
   for (const auto& [name, value] : settings_) settings[name] = value;
+  if (maxSteps) settings["max-steps"] = fmt::format("{}", *maxSteps);
   const auto mesh = settings_.find("mesh");
   const std::string surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
   if (surface.empty()) throw Error("the field does not say what it was made from: give 'settings mesh=FILE'");
   std::string line = "build " + scriptWord(surface);
   for (const auto& [name, value] : settings)
     if (name != "mesh") line += " " + name + "=" + scriptWord(value);
-  if (maxSteps) line += fmt::format(" max-steps={}", *maxSteps);
   keepsAllSteps_ = maxSteps.has_value();
   try {
     runScript(session_, parseScript(session_.registry(), "rebuild", line, {}));
@@ -317,6 +318,7 @@ void Explorer::drawPicture(int shrink) {
   const Coloring& colors = view_.colors();
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
+  render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
   const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
   const auto levels = [&](const Field& of) {
     const FieldStatistics all = statistics(of);
@@ -329,13 +331,18 @@ void Explorer::drawPicture(int shrink) {
     std::ranges::sort(scale.levels);
     scale.levels.erase(std::ranges::unique(scale.levels).begin(), scale.levels.end());
   }
-  render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
-  picture_ = drawn(session_.renderer(view_.backend), field, evidence, scale, shrink);
-  beside_.reset();
+  render::Drawn picture = drawn(session_.renderer(view_.backend), field, evidence, scale, shrink);
+  std::optional<render::Drawn> beside;
   if (other != nullptr) {
     if (evidence.jumps != nullptr) evidence.jumps = &session_.otherJumps(view_.beside);
-    beside_ = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, evidence, picture_->scale, shrink);
+    try {
+      beside = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, evidence, picture.scale, shrink);
+    } catch (const Error& error) {
+      throw Error(view_.beside + ": " + error.what());
+    }
   }
+  picture_ = std::move(picture);  // both or none: what is kept is what drawnFor_ says
+  beside_ = std::move(beside);
   shown_ = {picture_->image};
   if (beside_) shown_.push_back(beside_->image);
   shrunk_ = shrink;
@@ -343,6 +350,7 @@ void Explorer::drawPicture(int shrink) {
 }
 
 render::Image Explorer::frame(int shrink) {
+  if (session_.forgetChangedOthers()) drawnFor_.clear();
   if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
   settle();
   render::Image image(view_.width, view_.height, {250, 250, 248});

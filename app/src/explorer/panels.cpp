@@ -157,9 +157,9 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
     commands.push_back(fmt::format("color {} {}", colorName(colors.by), what));
   };
   if (colors.by == render::ColorBy::difference)
-    if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + scriptWord(*file));
+    if (const auto file = ui.field("view/other", "other field", colors.other)) change("other=" + wordOrNone(*file));
   if (colors.by == render::ColorBy::error)
-    if (const auto mesh = ui.field("view/mesh", "made from", colors.mesh)) change("mesh=" + scriptWord(*mesh));
+    if (const auto mesh = ui.field("view/mesh", "made from", colors.mesh)) change("mesh=" + wordOrNone(*mesh));
   if (!render::isQuantity(colors.by)) return;
   choice(ui, "view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
          fmt::format("color {} scale=", colorName(colors.by)), commands);
@@ -174,8 +174,9 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   }
   if (!colors.scale.limits) return;
   const auto [low, high] = *colors.scale.limits;
-  if (const auto text = ui.field("view/low", "from", shortNumber(low))) range(*text, fmt::format("{}", high));
-  if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(fmt::format("{}", low), *text);
+  const auto typed = [&](const std::string& limits) { change("range=" + scriptWord(limits)); };
+  if (const auto text = ui.field("view/low", "from", shortNumber(low))) typed(fmt::format("{},{}", *text, high));
+  if (const auto text = ui.field("view/high", "to", shortNumber(high))) typed(fmt::format("{},{}", low, *text));
 }
 
 /// Which half of the picture shows which field.
@@ -207,7 +208,7 @@ void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
     commands.push_back(fmt::format("arrows {:.0f}", *v));
   drawColors(ui, view, explorer.picture(), commands);
   if (const auto file = ui.field("view/beside", "beside", view.beside))
-    commands.push_back("beside " + (file->empty() ? "none" : scriptWord(*file)));
+    commands.push_back("beside " + wordOrNone(*file));
 }
 
 void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {

@@ -1,6 +1,7 @@
 #include "explorer/ui.h"
 
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
@@ -157,11 +158,21 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
   }
   io.MousePos = {float(pointer_[0]), float(pointer_[1])};
   widgets_.clear();
+  const auto end = [&] {
+    ImGui::Render();
+    if (input != nullptr && input->kind == Input::Kind::key) io.KeysDown[static_cast<int>(input->key)] = false;
+    if (input == nullptr || input->kind != Input::Kind::press) io.KeyCtrl = io.KeyShift = false;
+  };
   ImGui::NewFrame();
-  widgets();
-  ImGui::Render();
-  if (input != nullptr && input->kind == Input::Kind::key) io.KeysDown[static_cast<int>(input->key)] = false;
-  if (input == nullptr || input->kind != Input::Kind::press) io.KeyCtrl = io.KeyShift = false;
+  try {
+    widgets();
+  } catch (...) {
+    state_->disabled = false;
+    ImGui::ErrorCheckEndFrameRecover(nullptr);  // ends what was begun, or the next frame would stand within it
+    end();
+    throw;
+  }
+  end();
 }
 
 void Ui::paint(render::Image& image) const {
@@ -216,8 +227,8 @@ double Ui::column(const char* name, const UiRect& rect, std::optional<double> sc
   return now;
 }
 
-void Ui::note(const std::string& path) {
-  widgets_[path] = {visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()), !state_->disabled};
+void Ui::note(const std::string& path, bool takesText) {
+  widgets_[path] = {visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()), !state_->disabled, takesText};
 }
 
 const char* Ui::id(const std::string& path, const char* label) {
@@ -291,7 +302,7 @@ std::optional<double> Ui::slider(const std::string& path, const char* label, dou
     if (changed) value = state_->held.second;
     if (!ImGui::IsItemActive() && state_->held.first == path) state_->held = {};
   }
-  note(path);
+  note(path, true);
   return changed && value != before ? std::optional(value) : std::nullopt;
 }
 
@@ -300,7 +311,7 @@ std::optional<std::string> Ui::field(const std::string& path, const char* label,
   value.copy(buffer.data(), buffer.size() - 1);
   const bool entered = ImGui::InputText(id(path, label), buffer.data(), buffer.size(),
                                         ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
-  note(path);
+  note(path, true);
   return entered && buffer.data() != value ? std::optional<std::string>(buffer.data()) : std::nullopt;
 }
 

@@ -43,8 +43,9 @@ struct UiRect {
 
 /// Where a widget stands in the last frame.
 struct Widget {
-  UiRect rect;          ///< the part of it that is not scrolled away or covered by its column's ends
-  bool enabled = true;  ///< takes input
+  UiRect rect;             ///< the part of it that is not scrolled away or covered by its column's ends
+  bool enabled = true;     ///< takes input
+  bool takesText = false;  ///< a field or a slider
 };
 
 /// When a slider asks: at each movement, or once it is let go.
@@ -57,7 +58,8 @@ class Ui {
   Ui(const Ui&) = delete;
   Ui& operator=(const Ui&) = delete;
 
-  /// One frame of width × height pixels: `input` happens, then `widgets` calls the functions below.
+  /// One frame of width × height pixels: `input` happens, then `widgets` calls the functions below. What it throws
+  /// goes on, with the frame ended.
   void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
 
   /// Paints the last frame over a picture of its size.
@@ -101,7 +103,7 @@ class Ui {
   void place(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:
-  void note(const std::string& path);
+  void note(const std::string& path, bool takesText = false);
   void setDisabled(bool disabled);
   const char* id(const std::string& path, const char* label);
 

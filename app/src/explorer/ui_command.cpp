@@ -22,7 +22,7 @@ std::optional<Point> pointIn(const std::string& text) {
 }
 
 /// The middle of a widget, or the pixel itself.
-Point placeOf(Explorer& explorer, const std::string& target) {
+Point placeOf(Explorer& explorer, const std::string& target, bool types) {
   if (const auto pixel = pointIn(target)) return *pixel;
   const auto& widgets = explorer.widgets();
   const auto found = widgets.find(target);
@@ -37,6 +37,8 @@ Point placeOf(Explorer& explorer, const std::string& target) {
   if (!(rect.width() > 0 && rect.height() > 0))
     throw Error(fmt::format("widget '{}' is scrolled out of sight: scroll its column, or close panels", target));
   if (!found->second.enabled) throw Error(fmt::format("widget '{}' takes no input now", target));
+  if (types && !found->second.takesText)
+    throw Error(fmt::format("widget '{}' takes no text: click it, or type into a field or slider", target));
   return {std::floor((rect.x0 + rect.x1) / 2), std::floor((rect.y0 + rect.y1) / 2)};
 }
 
@@ -49,7 +51,11 @@ void runUi(Session& session, const Arguments& arguments) {
   const std::string target = arguments.textOr("target", "");
   const std::string value = arguments.textOr("value", "");
   const int button = arguments.text("button") == "right" ? 1 : 0;
-  explorer.frame();  // what lies over the picture depends on it
+  try {
+    explorer.frame();  // what lies over the picture depends on it
+  } catch (const Error&) {
+    // the widgets are there all the same, to give what the picture lacks; 'shot' says what that is
+  }
   if (action == "list") {
     for (const auto& [path, widget] : explorer.widgets())
       session.console().out << path << (widget.enabled ? "" : " (takes no input now)") << '\n';
@@ -59,7 +65,7 @@ void runUi(Session& session, const Arguments& arguments) {
     explorer.input({.kind = Input::Kind::key, .key = *keyNamed(target), .control = arguments.flag("control")});
     return;
   }
-  const Point at = placeOf(explorer, target);
+  const Point at = placeOf(explorer, target, action == "type");
   const bool control = arguments.flag("control") || action == "type";
   const auto press = [&] { explorer.input({.kind = Input::Kind::press, .button = button, .control = control}); };
   const auto release = [&] { explorer.input({.kind = Input::Kind::release, .button = button}); };

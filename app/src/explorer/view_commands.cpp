@@ -22,6 +22,11 @@ std::optional<Vector3> pointOr(const Arguments& arguments, const char* name, std
   return pointOf(arguments, name);
 }
 
+/// Empty for the word none.
+std::string textOrNone(const Arguments& arguments, const char* name) {
+  return arguments.text(name) == "none" ? "" : arguments.text(name);
+}
+
 void runShow(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
   if (arguments.given("kind")) view.slice = arguments.text("kind") == "slice";
@@ -114,8 +119,8 @@ void runColor(Session& session, const Arguments& arguments) {
     throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
   if (by != colors.by) colors.scale.limits.reset();  // of another quantity
   colors.by = by;
-  if (arguments.given("other")) colors.other = arguments.text("other");
-  if (arguments.given("mesh")) colors.mesh = arguments.text("mesh");
+  if (arguments.given("other")) colors.other = textOrNone(arguments, "other");
+  if (arguments.given("mesh")) colors.mesh = textOrNone(arguments, "mesh");
   if (by == render::ColorBy::difference && colors.other.empty())
     throw Error("color difference: needs other, the file of the field to compare with");
   if (arguments.given("range")) {
@@ -162,7 +167,7 @@ void runArrows(Session& session, const Arguments& arguments) {
 
 void runBeside(Session& session, const Arguments& arguments) {
   ViewState view = session.explorer().view();
-  view.beside = arguments.text("field") == "none" ? "" : arguments.text("field");
+  view.beside = textOrNone(arguments, "field");
   if (!view.beside.empty()) session.other(view.beside);  // an unreadable one shows now
   session.explorer().change(std::move(view));
 }
@@ -430,11 +435,11 @@ Command colorCommand() {
                           .choices = {"log", "linear"}},
                          {.name = "other",
                           .type = ParameterType::path,
-                          .help = "For difference: the field to compare with.",
+                          .help = "For difference: the field to compare with, or none.",
                           .valueName = "FIELD"},
                          {.name = "mesh",
                           .type = ParameterType::text,
-                          .help = "For error: what the field was made from, where the field does not know it.",
+                          .help = "For error: what the field was made from, where it does not know that; or none.",
                           .valueName = "MESH"}},
           .action = runColor,
           .scriptOnly = true};

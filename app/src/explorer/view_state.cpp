@@ -38,11 +38,9 @@ std::string surfaceLine(const ViewState& view) {
 
 std::string colorLine(const Coloring& colors, const char* of) {
   const render::ScaleOptions& scale = colors.scale;
-  return fmt::format("color {} of={} range={} scale={}{}{}\n", colorName(colors.by), of,
+  return fmt::format("color {} of={} range={} scale={} other={} mesh={}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
-                     scale.logarithmic ? "log" : "linear",
-                     colors.other.empty() ? "" : " other=" + scriptWord(colors.other),
-                     colors.mesh.empty() ? "" : " mesh=" + scriptWord(colors.mesh));
+                     scale.logarithmic ? "log" : "linear", wordOrNone(colors.other), wordOrNone(colors.mesh));
 }
 
 std::string cellsLine(const render::ShownCells& cells) {
@@ -105,8 +103,7 @@ std::string scriptOf(const ViewState& view) {
                      view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
          fmt::format("arrows {}\n", view.arrows) + colorLine(view.surfaceColors, "surface") +
-         colorLine(view.sliceColors, "slice") +
-         fmt::format("beside {}\n", view.beside.empty() ? "none" : scriptWord(view.beside)) +
+         colorLine(view.sliceColors, "slice") + fmt::format("beside {}\n", wordOrNone(view.beside)) +
          fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstPage + 1) +
          panelLine(view);
@@ -118,6 +115,8 @@ std::string backendText(const Backend& backend) {
                                : backend.gl == render::GlChoice::hardware ? "hardware"
                                                                           : "auto");
 }
+
+std::string wordOrNone(const std::string& word) { return word.empty() ? "none" : scriptWord(word); }
 
 std::string scriptWord(const std::string& word) {
   if (!word.empty() && word.find_first_of(" \t\r;#=$\"\\") == std::string::npos) return word;

@@ -78,5 +78,7 @@ std::string backendText(const Backend& backend);
 
 /// A word of a script, in quotes where it needs them.
 std::string scriptWord(const std::string& word);
+/// The same; none in the place of an empty one.
+std::string wordOrNone(const std::string& word);
 
 }  // namespace hpsdf::app
