@@ -295,6 +295,7 @@ void addAxes(Furniture& furniture, const Frame& frame, const PixelRect& section,
     x = section.x0 - gap - reach;
     y = std::min<double>(section.y1, frame.view.y1 - gap);
   } else if (frame.view.y1 - section.y1 >= reach + 2 * gap) {
+    x = std::max<double>(x, frame.view.x0 + gap);  // the letter above the arrow reaches to its left
     y = section.y1 + gap + reach;
   } else {
     x += gap;

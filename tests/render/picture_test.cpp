@@ -598,8 +598,9 @@ TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
     const Frame f = frame(width, height);
     const int w = f.view.width(), h = f.view.height(), side = static_cast<int>(0.94 * std::min(w, h));
     const PixelRect middle = {(w - side) / 2, (h - side) / 2, (w + side) / 2, (h + side) / 2};
+    const PixelRect band = {0, h / 4, w, 3 * h / 4};  // zoomed: from edge to edge
     const PixelRect flat = {w / 40, h / 4, w - w / 40, 3 * h / 4}, full = {w / 40, h / 40, w - w / 40, h - h / 40};
-    for (const PixelRect& section : {middle, flat, full, f.view}) {
+    for (const PixelRect& section : {middle, band, flat, full, f.view}) {
       Furniture furniture;
       addAxes(furniture, f, section, 'x', 'z');
       ASSERT_EQ(furniture.texts.size(), 2U) << width << "x" << height;

@@ -140,14 +140,14 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   std::string line = "build " + scriptWord(surface);
   for (const auto& [name, value] : settings)
     if (name != "mesh") line += " " + name + "=" + scriptWord(value);
-  keepsAllSteps_ = maxSteps.has_value();
+  rebuilding_ = maxSteps ? Rebuilding::steps : Rebuilding::whole;
   try {
     runScript(session_, parseScript(session_.registry(), "rebuild", line, {}));
   } catch (...) {
-    keepsAllSteps_ = false;
+    rebuilding_ = Rebuilding::no;
     throw;
   }
-  keepsAllSteps_ = false;
+  rebuilding_ = Rebuilding::no;
 }
 
 void Explorer::fieldChanged() {
@@ -155,7 +155,8 @@ void Explorer::fieldChanged() {
   figures_.reset();
   worst_.clear();
   const auto steps = session_.current().field.metadata().steps;
-  if (!keepsAllSteps_ || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
+  if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
+  if (rebuilding_ == Rebuilding::no) settings_.clear();  // they were meant for another field
   ++fields_;
 }
 

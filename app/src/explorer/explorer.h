@@ -126,7 +126,8 @@ class Explorer {
   bool replaces_ = false;  ///< the line that is running takes the place of the one before
 
   std::optional<std::uint64_t> allSteps_;
-  bool keepsAllSteps_ = false;  ///< while the field becomes an earlier or later state of itself
+  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: the field becomes another state of itself
+  Rebuilding rebuilding_ = Rebuilding::no;
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;

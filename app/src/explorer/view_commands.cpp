@@ -475,7 +475,7 @@ Command panelCommand() {
 Command settingsCommand() {
   Command command{.name = "settings",
                   .summary = "Set how 'rebuild' builds; what is not set is as it was.",
-                  .help = "The options are those of 'build'. Nothing is built yet.",
+                  .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
                   .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
                   .parameters = {{.name = "mesh",
                                   .type = ParameterType::text,
