@@ -17,7 +17,7 @@ namespace {
 /// What the last picture shows at a pixel; null where that is nothing of the field. With what takes longer to find:
 /// the exact distance, where it is known, and the jumps at the cell's nearest face.
 Json pickJson(Session& session, int x, int y, bool withAll) {
-  const auto pick = render::pickAt(session.picture(), x, y);
+  const auto pick = render::pickAt(session.current().field, session.picture(), x, y);
   if (!pick) return {};
   const Vector3 gradient = session.current().field.valueAndGradient(pick->position).gradient;
   Json json = {{"position", vectorJson(pick->position)},

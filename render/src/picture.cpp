@@ -501,7 +501,24 @@ std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const
   return quantityIn(field, view, buffers, quantity, evidence);
 }
 
-std::optional<Pick> pickAt(const Drawn& drawn, int x, int y) {
+namespace {
+
+// The point, or one next to it that lies in the cell: distances along rays are single precision, and a crack lies on a
+// face itself.
+Vector3 withinCell(const Field& field, const Vector3& point, std::uint32_t cell) {
+  if (field.cellAt(point).id == cell) return point;
+  for (const double step : {1e-7, 1e-6, 1e-5})
+    for (int way = 0; way < 27; ++way) {
+      const Vector3 direction(way % 3 - 1, way / 3 % 3 - 1, way / 9 - 1);
+      const Vector3 moved = point + step * direction.cwiseProduct(field.domain().sizes());
+      if (field.cellAt(moved).id == cell) return moved;
+    }
+  return point;
+}
+
+}  // namespace
+
+std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y) {
   const Image& image = drawn.image;
   if (x < 0 || y < 0 || x >= image.width || y >= image.height)
     throw Error("pixel " + std::to_string(x) + "," + std::to_string(y) + " lies outside of the picture of " +
@@ -516,7 +533,8 @@ std::optional<Pick> pickAt(const Drawn& drawn, int x, int y) {
   if (!buffers.hit(i)) return std::nullopt;
   const Vector3 position =
       std::visit([&](const auto& view) { return pointAt(view, buffers, column, row); }, drawn.view);
-  return Pick{position, buffers.cell[i], buffers.degree[i], buffers.depth[i], buffers.value[i]};
+  return Pick{withinCell(field, position, buffers.cell[i]), buffers.cell[i], buffers.degree[i], buffers.depth[i],
+              buffers.value[i]};
 }
 
 bool meetsWalls(const Field& field, double offset) {

@@ -136,11 +136,12 @@ TEST(Explorer, aPointStaysUnderTheMouseThatDragsIt) {
     bench.explorer().frame();
     const auto [x, y] = bench.explorer().ui().pointer();
     const UiRect canvas = layoutOf(bench.view()).canvas;
-    const auto before = render::pickAt(*bench.explorer().picture(), int(x - canvas.x0), int(y - canvas.y0) - 80);
+    const auto before = render::pickAt(bench.session.current().field, *bench.explorer().picture(), int(x - canvas.x0),
+                                       int(y - canvas.y0) - 80);
     bench.run(std::string("ui drag canvas 32,48") + (slice ? "" : " button=right"));
     bench.explorer().frame();
-    const auto after =
-        render::pickAt(*bench.explorer().picture(), int(x - canvas.x0) + 32, int(y - canvas.y0) - 80 + 48);
+    const auto after = render::pickAt(bench.session.current().field, *bench.explorer().picture(),
+                                      int(x - canvas.x0) + 32, int(y - canvas.y0) - 80 + 48);
     ASSERT_TRUE(before && after) << view;
     // of a surface in perspective, points away from the target's plane move by a little more or less
     EXPECT_LT((before->position - after->position).norm(), slice ? 0.004 : 0.1) << view;
@@ -220,23 +221,29 @@ TEST(Explorer, theReadoutIsWhatQueriesSay) {
 }
 
 TEST(Explorer, picksOfAShotAreWhatTheFieldSays) {
+  HPSDF_REQUIRE_GL();
   Bench bench;
   const support::TemporaryDirectory folder;
   bench.run(std::string(kTorus) + "shot output=" + (folder / "a.png").string());
   const render::Image image = render::loadPng(folder / "a.png");
   EXPECT_TRUE(same(image, bench.explorer().frame()));
-  EXPECT_FALSE(render::pickAt(bench.session.picture(), 10, 300)) << "a panel";
-  int hits = 0;
-  for (int x = 280; x < 620; x += 7)
-    for (int y = 40; y < 540; y += 11) {
-      const auto pick = render::pickAt(bench.session.picture(), x, y);
-      if (!pick) continue;
-      ++hits;
-      const Cell cell = bench.session.current().field.cellAt(pick->position);
-      EXPECT_NEAR(bench.session.current().field.value(pick->position), pick->value, 1e-5);
-      EXPECT_EQ(pick->degree, cell.degree);
-    }
-  EXPECT_GT(hits, 200);
+  EXPECT_FALSE(render::pickAt(bench.session.current().field, bench.session.picture(), 10, 300)) << "a panel";
+  for (const char* backend : {"cpu=true", "cpu=false gl=software"}) {
+    bench.run(std::string("show ") + backend + "; shot output=" + (folder / "b.png").string());
+    int hits = 0;
+    for (int x = 280; x < 620; x += 3)
+      for (int y = 40; y < 540; y += 5) {
+        const auto pick = render::pickAt(bench.session.current().field, bench.session.picture(), x, y);
+        if (!pick) continue;
+        ++hits;
+        const Cell cell = bench.session.current().field.cellAt(pick->position);
+        EXPECT_NEAR(bench.session.current().field.value(pick->position), pick->value, 1e-5);
+        EXPECT_EQ(pick->cell, cell.id);
+        EXPECT_EQ(pick->degree, cell.degree);
+        EXPECT_EQ(pick->depth, cell.depth);
+      }
+    EXPECT_GT(hits, 2000) << backend;
+  }
   bench.run("expect pick(450,200).jump.value < 1");
 }
 
@@ -247,7 +254,8 @@ TEST(Explorer, flyingLooksAtTheInterface) {
     bench.explorer().frame();
     const auto& picture = *bench.explorer().picture();
     const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
-    const auto pick = render::pickAt(picture, picture.image.width / 2, picture.image.height / 2);
+    const auto pick =
+        render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
     ASSERT_TRUE(pick) << kind;
     EXPECT_LT((pick->position - face.worst).norm(), 0.05) << kind;
   }

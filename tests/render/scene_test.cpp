@@ -301,17 +301,13 @@ TEST(Scene, PicksTellWhatEachKindOfPixelShows) {
     std::map<Shown, int> seen;
     for (int y = 0; y < picture.height; y += 3)
       for (int x = 0; x < picture.width; x += 3) {
-        const auto pick = pickAt(drawn, x, y);
+        const auto pick = pickAt(field, drawn, x, y);
         if (!pick) continue;
         const std::size_t i = std::size_t(2 * y + 1) * drawn.buffers.width + (2 * x + 1);
         const Shown shown = drawn.buffers.shown[i];
         ++seen[shown];
-        if (shown == Shown::surface) continue;
-        Vector3 p = pick->position;
-        if (shown == Shown::plane) {
-          EXPECT_NEAR(p.z(), 0.2, 1e-6);
-          p.z() = 0.2;
-        }
+        const Vector3 p = pick->position;
+        EXPECT_TRUE(shown != Shown::plane || std::abs(p.z() - 0.2) < 2e-6);
         const Cell cell = field.cellAt(p);
         EXPECT_EQ(pick->cell, cell.id);
         EXPECT_EQ(pick->degree, cell.degree);
@@ -344,7 +340,7 @@ TEST(Scene, TheSurfaceCanBeLeftOut) {
   picture.cells.style = CellStyle::lines;
   const Drawn lines = drawSurface(none, field, picture);
   EXPECT_TRUE(lines.seen);
-  EXPECT_FALSE(pickAt(lines, 100, 60)) << "lines are over what is picked";
+  EXPECT_FALSE(pickAt(field, lines, 100, 60)) << "lines are over what is picked";
   picture.cells.style = CellStyle::boxes;
   EXPECT_TRUE(drawSurface(none, field, picture).seen);
   EXPECT_THROW(picture.surface = true; drawSurface(none, field, picture), std::logic_error);
@@ -368,7 +364,7 @@ TEST(Scene, APlaneHasTheColorsOfItsCellsAndALineWhereTheSurfaceIs) {
   int same = 0, pixels = 0, onLine = 0, light = 0;
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x) {
-      const auto pick = pickAt(drawn, x, y);
+      const auto pick = pickAt(field, drawn, x, y);
       if (!pick) continue;
       ++pixels;
       same += drawn.image.at(x, y) == colors.at(pick->degree);

@@ -384,15 +384,17 @@ std::optional<Readout> Explorer::readout() {
   if (work || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
-  const auto pickIn = [&](const std::optional<render::Drawn>& drawn, const UiRect& rect) {
+  const auto pickIn = [&](const Field& field, const std::optional<render::Drawn>& drawn, const UiRect& rect) {
     const bool inside = drawn && rect.contains(x, y) && x - rect.x0 < drawn->image.width;
-    return inside ? render::pickAt(*drawn, int(x - rect.x0), int(y - rect.y0)) : std::nullopt;
+    return inside ? render::pickAt(field, *drawn, int(x - rect.x0), int(y - rect.y0)) : std::nullopt;
   };
-  if (const auto pick = pickIn(picture_, layout.canvas)) return readoutAt(session_, *pick);
-  const auto pick = pickIn(beside_, layout.beside);
+  if (const auto pick = pickIn(session_.current().field, picture_, layout.canvas)) return readoutAt(session_, *pick);
+  if (!beside_) return std::nullopt;
+  const Field& other = session_.other(view_.beside).field;
+  const auto pick = pickIn(other, beside_, layout.beside);
   if (!pick) return std::nullopt;
-  return readoutAt(session_.other(view_.beside).field, session_.otherJumps(view_.beside),
-                   session_.knowsExact() ? &session_.exact("") : nullptr, *pick);
+  return readoutAt(other, session_.otherJumps(view_.beside), session_.knowsExact() ? &session_.exact("") : nullptr,
+                   *pick);
 }
 
 }  // namespace hpsdf::app

@@ -151,7 +151,9 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
 
 /// What a pixel of a picture shows, at its middle sample.
 struct Pick {
-  Vector3 position;    ///< world units
+  /// World units; within the cell: where rounding has left it across a face, it is moved back, by 1e-5 of the domain at
+  /// most.
+  Vector3 position;
   std::uint32_t cell;  ///< `Cell::id`
   int degree, depth;
   double value;  ///< f as the renderer has it; on a surface the offset but for rounding
@@ -159,7 +161,7 @@ struct Pick {
 
 /// Of lines and arrows, what lies behind them. Nothing where the pixel shows no part of the field: paper, backdrop,
 /// legend. Throws `Error` for a pixel outside of the picture.
-std::optional<Pick> pickAt(const Drawn& drawn, int x, int y);
+std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y);
 
 /// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
