@@ -9,7 +9,6 @@
 #include "data_table.h"
 #include "failed.h"
 #include "hpsdf/nearest_name.h"
-#include "hpsdf/output_file.h"
 #include "hpsdf/render/image.h"
 #include "session.h"
 #include "summaries.h"
@@ -19,12 +18,6 @@ namespace hpsdf::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-void writeWhole(const fs::path& file, std::string_view text) {
-  OutputFile out(file);
-  out.write(text);
-  out.commit();
-}
 
 /// By which a check and the `accept` after it know the same folder.
 std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folder).string(); }
@@ -104,9 +97,9 @@ void runCheck(Session& session, const Arguments& arguments) {
   const CheckOutcome outcome = check(session.registry(), session.console(), request);
   const Json json = outcomeJson(outcome, request);
   const fs::path page = request.output / "index.html";
-  writeWhole(page, checkHtml(outcome, checkPage(request)));
-  if (!request.junit.empty()) writeWhole(request.junit, junitXml(outcome));
-  writeWhole(request.output / kCheckResults, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  writeTextFile(page, checkHtml(outcome, checkPage(request)));
+  if (!request.junit.empty()) writeTextFile(request.junit, junitXml(outcome));
+  writeTextFile(request.output / kCheckResults, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   std::ostream& out = session.console().out;
   if (session.wantsJson(arguments))
     printJson(out, json);
@@ -188,7 +181,7 @@ Json acceptOne(const Candidate& taken, const fs::path& folder, const fs::path& f
   if (arguments.given("budget")) facts.budget = arguments.number("budget");
   if (arguments.given("bound")) facts.bound = arguments.number("bound");
   fs::create_directories(baseline.parent_path());
-  writeWhole(baseline, readTextFile(actual.string()));
+  writeTextFile(baseline, readTextFile(actual.string()));
   saveFacts(facts, baseline);
   return {{"name", taken.name},
           {"baseline", baseline.string()},

@@ -27,11 +27,7 @@ bool isFrameName(std::string_view name) {
   return std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-void copyFile(const fs::path& from, const fs::path& to) {
-  OutputFile out(to);
-  out.write(readTextFile(from.string()));
-  out.commit();
-}
+void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readTextFile(from.string())); }
 
 std::string lastLine(const std::string& text) {
   std::istringstream lines(text);
@@ -92,9 +88,7 @@ void Film::publishFolder(const Json& about) {
   folder_->startAnew(kAbout, isFrameName);
   for (std::size_t frame = 0; frame < frames_; ++frame)
     copyFile(work_.path() / frameName(frame), output_ / frameName(frame));
-  OutputFile out(output_ / kAbout);
-  out.write(about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  out.commit();
+  writeTextFile(output_ / kAbout, about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace hpsdf::app

@@ -379,6 +379,10 @@ render::CellStyle cellStyle(std::string_view name) {
                            : render::CellStyle::none;
 }
 
+std::string cellStyleName(render::CellStyle style) {
+  return style == render::CellStyle::lines ? "lines" : style == render::CellStyle::boxes ? "boxes" : "none";
+}
+
 namespace {
 
 render::ShownCells shownCells(const Arguments& arguments) {

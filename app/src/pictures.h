@@ -32,6 +32,7 @@ std::string viewName(const render::OrbitCamera& camera);
 
 /// none, lines or boxes.
 render::CellStyle cellStyle(std::string_view name);
+std::string cellStyleName(render::CellStyle style);
 
 /// "2,4-6" → 2, 4, 5, 6; empty for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);

@@ -12,6 +12,7 @@
 #include "failed.h"
 #include "hpsdf/error.h"
 #include "hpsdf/nearest_name.h"
+#include "hpsdf/output_file.h"
 #include "session.h"
 
 namespace hpsdf::app {
@@ -271,6 +272,12 @@ std::string readTextFile(const std::string& file) {
   std::stringstream text;
   text << stream.rdbuf();
   return std::move(text).str();
+}
+
+void writeTextFile(const std::filesystem::path& file, std::string_view text) {
+  OutputFile out(file);
+  out.write(text);
+  out.commit();
 }
 
 bool isVariableAssignment(std::string_view word) {

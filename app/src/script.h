@@ -1,6 +1,7 @@
 #pragma once
 // Scripts: a command a line, `verb value key=value …`; docs/scripts.md is the manual.
 
+#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -33,6 +34,8 @@ void runScript(Session& session, std::span<const Call> calls);
 
 /// All of a file. Throws `Error` naming it.
 std::string readTextFile(const std::string& file);
+/// Throws `Error` naming it; then nothing of it is left behind.
+void writeTextFile(const std::filesystem::path& file, std::string_view text);
 
 /// "name=value" words. Throws `Error` for one that is not of that form.
 Variables parseVariables(const std::vector<std::string>& words);

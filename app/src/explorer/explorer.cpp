@@ -250,16 +250,15 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
     if (event.key == Key::y && canRedo()) return "redo";
     if (event.key == Key::c) return "copy-view";
   }
-  if (event.kind == Input::Kind::press && !dragged_ && !ui_.wantsMouse() &&
-      (layout.canvas.contains(x, y) || layout.beside.contains(x, y))) {
+  const bool overPicture = !ui_.wantsMouse() && (layout.canvas.contains(x, y) || layout.beside.contains(x, y));
+  if (event.kind == Input::Kind::press && !dragged_ && overPicture) {
     dragged_ = event.button;
     dragFrom_ = {x, y};
     viewAtPress_ = view_;
   }
   if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
   const double height = layout.canvas.height();
-  if (event.kind == Input::Kind::wheel && !ui_.wantsMouse() &&
-      (layout.canvas.contains(x, y) || layout.beside.contains(x, y))) {
+  if (event.kind == Input::Kind::wheel && overPicture) {
     if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, event.turn));
     const render::OrbitCamera& c = view_.camera;
     return fmt::format("camera {},{},{:.5g}", c.azimuthDegrees, c.elevationDegrees,
@@ -321,14 +320,13 @@ void Explorer::drawPicture(int shrink) {
   render::ScaleOptions scale = colors.scale;
   render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
   const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
-  const auto levels = [&](const Field& of) {
-    const FieldStatistics all = statistics(of);
+  const auto levels = [&](const FieldStatistics& all) {
     for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
       scale.levels.push_back(level);
   };
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
-    levels(field);
-    levels(*other);
+    levels(figures());
+    levels(statistics(*other));
     std::ranges::sort(scale.levels);
     scale.levels.erase(std::ranges::unique(scale.levels).begin(), scale.levels.end());
   }

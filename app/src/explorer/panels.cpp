@@ -138,10 +138,7 @@ void drawCells(Ui& ui, const ViewState& view, const Field& field, Commands& comm
   if (const auto on = ui.checkbox("view/plane", "plane", view.planeInSpace))
     commands.push_back(fmt::format("plane in-space={}", *on));
   if (view.planeInSpace) drawPlaneOffset(ui, view, field, commands);
-  const char* style = view.cells.style == render::CellStyle::none    ? "none"
-                      : view.cells.style == render::CellStyle::lines ? "lines"
-                                                                     : "boxes";
-  choice(ui, "view/cells", "cells", {"none", "lines", "boxes"}, style, "cells ", commands);
+  choice(ui, "view/cells", "cells", {"none", "lines", "boxes"}, cellStyleName(view.cells.style), "cells ", commands);
   if (view.cells.style == render::CellStyle::none) return;
   if (const auto list = ui.field("view/degrees", "of degrees", levelText(view.cells.degrees)))
     commands.push_back("cells degrees=" + scriptWord(*list));
@@ -174,9 +171,8 @@ void drawColors(Ui& ui, const ViewState& view, const std::optional<render::Drawn
   }
   if (!colors.scale.limits) return;
   const auto [low, high] = *colors.scale.limits;
-  const auto typed = [&](const std::string& limits) { change("range=" + scriptWord(limits)); };
-  if (const auto text = ui.field("view/low", "from", shortNumber(low))) typed(fmt::format("{},{}", *text, high));
-  if (const auto text = ui.field("view/high", "to", shortNumber(high))) typed(fmt::format("{},{}", low, *text));
+  if (const auto text = ui.field("view/low", "from", shortNumber(low))) range(*text, fmt::format("{}", high));
+  if (const auto text = ui.field("view/high", "to", shortNumber(high))) range(fmt::format("{}", low), *text);
 }
 
 /// Which half of the picture shows which field.
@@ -336,7 +332,8 @@ void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& share
   ImGui::Dummy({widthLeft(), height + 2 * line + 2});
 }
 
-void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
+void drawHistograms(Ui& ui, Explorer& explorer) {
+  const FieldStatistics& figures = explorer.figures();
   const auto& picture = explorer.picture();
   const auto legendOf = [&](render::ColorBy color) {
     return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
@@ -345,7 +342,8 @@ void drawHistograms(Ui& ui, Explorer& explorer, const FieldStatistics& figures) 
   drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
 }
 
-void drawStatistics(Ui& ui, Explorer& explorer, const FieldStatistics& figures) {
+void drawStatistics(Ui& ui, Explorer& explorer) {
+  const FieldStatistics& figures = explorer.figures();
   const Field& field = explorer.session().current().field;
   std::vector<std::pair<std::string, std::string>> rows = {
       {"cells", grouped(figures.leaves)},
@@ -415,9 +413,7 @@ void drawReadout(Ui& ui, Explorer& explorer) {
 void drawPanels(Ui& ui, Explorer& explorer, Commands& commands) {
   const ViewState& view = explorer.view();
   const Layout layout = layoutOf(view);
-  const bool empty = layout.right.width() <= 0;
   ui.freeze(explorer.work.has_value());
-  const FieldStatistics figures = empty ? FieldStatistics{} : explorer.figures();
   const auto scrolling = [&](const char* name, const UiRect& rect, double scroll, const auto& content) {
     if (rect.width() <= 0) return;
     const double now = ui.column(name, rect, scroll, content);
@@ -431,8 +427,8 @@ void drawPanels(Ui& ui, Explorer& explorer, Commands& commands) {
   });
   scrolling("right", layout.right, view.scroll[1], [&] {
     section(ui, view, Panel::legend, "Legend", commands, [&] { drawLegend(ui, explorer.picture()); });
-    section(ui, view, Panel::histograms, "Histograms", commands, [&] { drawHistograms(ui, explorer, figures); });
-    section(ui, view, Panel::statistics, "Statistics", commands, [&] { drawStatistics(ui, explorer, figures); });
+    section(ui, view, Panel::histograms, "Histograms", commands, [&] { drawHistograms(ui, explorer); });
+    section(ui, view, Panel::statistics, "Statistics", commands, [&] { drawStatistics(ui, explorer); });
     section(ui, view, Panel::worst, "Worst interfaces", commands, [&] { drawWorst(ui, explorer, commands); });
   });
   if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });

@@ -231,9 +231,7 @@ void runCopyView(Session& session, const Arguments& arguments) {
     session.console().out << script;
     return;
   }
-  OutputFile out(arguments.text("output"));
-  out.write(script);
-  out.commit();
+  writeTextFile(arguments.text("output"), script);
 }
 
 void runSettings(Session& session, const Arguments& arguments) {

@@ -44,10 +44,8 @@ std::string colorLine(const Coloring& colors, const char* of) {
 }
 
 std::string cellsLine(const render::ShownCells& cells) {
-  const char* style = cells.style == render::CellStyle::none    ? "none"
-                      : cells.style == render::CellStyle::lines ? "lines"
-                                                                : "boxes";
-  return fmt::format("cells {} degrees={} depths={}\n", style, levelText(cells.degrees), levelText(cells.depths));
+  return fmt::format("cells {} degrees={} depths={}\n", cellStyleName(cells.style), levelText(cells.degrees),
+                     levelText(cells.depths));
 }
 
 std::string panelLine(const ViewState& view) {
