@@ -113,9 +113,9 @@ TEST(FieldFile, OtherFilesAreNamedForWhatTheyAre) {
   EXPECT_NE(refusal(file).find("not a .hpsdf file"), std::string::npos);
   save(small(), file);
   std::string bytes = readAll(file);
-  bytes[8] = 3;
+  bytes[8] = 99;
   writeAll(file, bytes);
-  EXPECT_NE(refusal(file).find("version 3"), std::string::npos);
+  EXPECT_NE(refusal(file).find("version 99"), std::string::npos);
 }
 
 /// `bytes` with a checksum that is right again.
@@ -125,8 +125,10 @@ std::string withChecksum(std::string bytes) {
   return bytes;
 }
 
-/// As older programs wrote them: version 1, and no steps between the settings and the nodes.
-TEST(FieldFile, FilesOfVersionOneAreRead) {
+constexpr std::size_t kSinceVersion3 = 4 * 1 + 2 * 8 + 8;  // bytes at the header's end
+
+/// As older programs wrote them: version 2 without what came after the steps, version 1 without these too.
+TEST(FieldFile, FilesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
   const Field field = small();
@@ -136,8 +138,12 @@ TEST(FieldFile, FilesOfVersionOneAreRead) {
   std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
+  bytes[8] = 2;
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion3, kSinceVersion3)));
+  EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
+  EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 1;
-  writeAll(file, withChecksum(bytes.erase(nodes - 8, 8)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion3 - 8, 8)));
   const Field old = load(file);
   EXPECT_EQ(old.metadata().steps, std::nullopt);
   EXPECT_EQ(old.metadata().roundingRms, field.metadata().roundingRms);
@@ -145,6 +151,30 @@ TEST(FieldFile, FilesOfVersionOneAreRead) {
   EXPECT_EQ(old.data().coefficients, field.data().coefficients);
   save(old, file);
   EXPECT_EQ(load(file).metadata().steps, std::nullopt) << "what is unknown stays so";
+}
+
+TEST(FieldFile, ContinuityAndBoundsAreKept) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "more.hpsdf";
+  FieldData data = small().data();
+  data.blend = 0.125;
+  data.bounds.assign(data.nodes.size(), CellBound{0.25f, 1.5f});
+  data.metadata.estimator = Estimator::residual;
+  data.metadata.criterion = Criterion::optimal;
+  data.metadata.nearnessKind = NearnessKind::exponential;
+  data.metadata.enriched = true;
+  data.metadata.continuityWeight = 3;
+  save(Field(data), file);
+  const Field again = load(file);
+  EXPECT_EQ(again.data().blend, 0.125);
+  ASSERT_EQ(again.data().bounds.size(), data.nodes.size());
+  EXPECT_EQ(again.data().bounds.back().error, 0.25f);
+  EXPECT_EQ(again.data().bounds.back().slope, 1.5f);
+  EXPECT_EQ(again.metadata().estimator, Estimator::residual);
+  EXPECT_EQ(again.metadata().criterion, Criterion::optimal);
+  EXPECT_EQ(again.metadata().nearnessKind, NearnessKind::exponential);
+  EXPECT_TRUE(again.metadata().enriched);
+  EXPECT_EQ(again.metadata().continuityWeight, 3);
 }
 
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.

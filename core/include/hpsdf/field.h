@@ -19,10 +19,31 @@ namespace hpsdf {
 constexpr int kMaxDegree = 30;
 constexpr int kMaxDepth = 20;  ///< so that a cell's local coordinate keeps 32 bits of a double's 52
 
+constexpr double kMaxBlend = 0.25;
+
 /// n(p) = (p+1)(p+2)(p+3)/6: coefficients of a polynomial of total degree p (paper, sec. 3.3).
 constexpr int coefficientCount(int degree) { return (degree + 1) * (degree + 2) * (degree + 3) / 6; }
 
 enum class Strategy : std::uint8_t { hp, h1, h2 };
+
+/// How far a cell is from its share of the target, before nearness weighs it.
+enum class Estimator : std::uint8_t {
+  embedded,  ///< ε_e: what the top degree adds (paper, eq. 6)
+  residual,  ///< ∫Φ² − ∫f²: what the fit leaves of the samples that it was made from
+};
+
+/// Which of degree and depth a step raises.
+enum class Criterion : std::uint8_t {
+  paper,    ///< the gain a coefficient (paper, eqs. 7 to 9)
+  slope,    ///< the steeper fall of the error over coefficients, both in logarithms
+  optimal,  ///< refines beyond the target and takes back whatever saves most for its error
+};
+
+/// κ(s) of the mean distance s, d being the domain's diagonal.
+enum class NearnessKind : std::uint8_t {
+  polynomial,   ///< (1 − s/d)^θ (paper, eq. 10)
+  exponential,  ///< exp(−θ s/d) (Koschier et al. 2017)
+};
 
 /// How a field came to be: stored with it, shown by `info`. Distances are in mesh units unless said.
 struct FieldMetadata {
@@ -40,9 +61,20 @@ struct FieldMetadata {
   /// Leaves that the construction raised or split; nothing where that is not known, as of files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by keeping its coefficients as float; 0 for double
+  Estimator estimator = Estimator::embedded;
+  Criterion criterion = Criterion::paper;
+  NearnessKind nearnessKind = NearnessKind::polynomial;
+  bool enriched = false;        ///< every cell was fitted anew, one degree higher, at the end
+  double continuityWeight = 0;  ///< λ of weak continuity, see `continuity.h`; 0: the cells' own fits
 
   /// √(ε/|Ω|) in the field's own units: the estimated RMS error that the construction ended with.
   double rmsEstimate(const Box& domain) const;
+};
+
+/// What holds throughout a leaf, whatever lies between samples. See `safe_distance.h`.
+struct CellBound {
+  float error = 0;  ///< |f − Φ| at most, in the field's units
+  float slope = 0;  ///< ‖∇f‖ at most
 };
 
 /// The finished octree as arrays. The first `grid.prod()` nodes are the base cells, x fastest, then y, then z. A node
@@ -57,6 +89,10 @@ struct FieldData {
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< base cells an axis
   std::vector<std::uint64_t> nodes;
   std::variant<std::vector<double>, std::vector<float>> coefficients;
+  /// Width of the zone along a leaf's faces, as a part of its edges, in which it is blended with its neighbours, so
+  /// that the field and its gradient are continuous; 0 to `kMaxBlend`. 0: leaves answer alone, and the field jumps.
+  double blend = 0;
+  std::vector<CellBound> bounds;  ///< by node, those of internal nodes 0; empty where they are not kept
   FieldMetadata metadata;
 };
 
@@ -143,7 +179,7 @@ class Field {
   /// The arrays themselves: for files, uploads and tests.
   const FieldData& data() const { return data_; }
 
-  /// Bytes that queries need: nodes, coefficients and directory.
+  /// Bytes that queries need: nodes, coefficients, directory, and bounds where they are kept.
   std::size_t bytes() const;
 
  private:

@@ -59,6 +59,13 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   }
 }
 
+void checkBlendAndBounds(const FieldData& data) {
+  if (!(data.blend >= 0 && data.blend <= kMaxBlend)) notAField("its blended zones have a width out of range");
+  if (!data.bounds.empty() && data.bounds.size() != data.nodes.size()) notAField("its bounds do not fit its nodes");
+  for (const CellBound& bound : data.bounds)
+    if (!(bound.error >= 0) || !(bound.slope >= 0)) notAField("a bound is not a number above 0");
+}
+
 template <typename Answer>
 Answer answerOne(const FieldData& field, const Directory& directory, const Vector3& x) {
   Answer result;
@@ -138,12 +145,14 @@ Field::Field(FieldData data) : data_(std::move(data)) {
           if (!std::isfinite(c)) notAField("a coefficient is not finite");
       },
       data_.coefficients);
+  checkBlendAndBounds(data_);
   directory_ = makeDirectory(data_);
 }
 
 std::size_t Field::bytes() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
-  return sizeOf(data_.nodes) + sizeOf(directory_.entries) + std::visit(sizeOf, data_.coefficients);
+  return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(directory_.entries) +
+         std::visit(sizeOf, data_.coefficients);
 }
 
 double Field::value(const Vector3& x) const { return answerOne<double>(data_, directory_, x); }

@@ -28,7 +28,7 @@ static_assert(sizeof(float) == 4 && std::numeric_limits<float>::is_iec559);
 
 // Like PNG's: a carriage return, a line feed and an end-of-file mark show a transfer that took it for text.
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-constexpr std::uint32_t kVersion = 2;  // 1 had no steps
+constexpr std::uint32_t kVersion = 3;  // 1 had no steps, 2 nothing of continuity, bounds and other ways to steer
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 constexpr std::uint32_t kLongestName = 4096;
 constexpr std::size_t kChecksumBytes = 8;
@@ -155,6 +155,7 @@ struct Sizes {
   std::uint64_t nodes = 0;
   std::uint64_t coefficients = 0;
   std::uint32_t coefficientBytes = 8;
+  std::uint64_t bounds = 0;
 };
 
 void stepsItem(Writer& writer, const std::optional<std::uint64_t>& steps) {
@@ -165,6 +166,15 @@ void stepsItem(Reader& reader, std::optional<std::uint64_t>& steps) {
   std::uint64_t stored = 0;
   reader.item(stored);
   if (stored != kUnknownSteps) steps = stored;
+}
+
+void flagItem(Writer& writer, bool flag) { writer.item(std::uint8_t{flag}); }
+
+void flagItem(Reader& reader, bool& flag) {
+  std::uint8_t stored = 0;
+  reader.item(stored);
+  if (stored > 1) reader.damaged("a flag is neither 0 nor 1");
+  flag = stored == 1;
 }
 
 /// Every scalar of the file after magic and version, in order. `Data` is const when writing.
@@ -200,6 +210,14 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(m.exactEvaluations);
   stream.item(m.roundingRms);
   if (version >= 2) stepsItem(stream, m.steps);
+  if (version < 3) return;
+  stream.item(m.estimator);
+  stream.item(m.criterion);
+  stream.item(m.nearnessKind);
+  flagItem(stream, m.enriched);
+  stream.item(m.continuityWeight);
+  stream.item(data.blend);
+  stream.item(sizes.bounds);
 }
 
 }  // namespace
@@ -211,12 +229,13 @@ void save(const Field& field, const std::filesystem::path& file) {
   writer.item(kVersion);
   std::visit(
       [&](const auto& coefficients) {
-        const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0])};
+        const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0]), data.bounds.size()};
         header(writer, data, sizes, kVersion);
         writer.put(std::as_bytes(std::span(data.nodes)));
         writer.put(std::as_bytes(std::span(coefficients)));
       },
       data.coefficients);
+  writer.put(std::as_bytes(std::span(data.bounds)));
   writer.finish();
 }
 
@@ -239,12 +258,16 @@ Field load(const std::filesystem::path& file) {
   header(reader, data, sizes, version);
   if (sizes.coefficientBytes != 4 && sizes.coefficientBytes != 8)
     reader.damaged("its coefficients have an unknown type");
-  if (data.metadata.strategy > Strategy::h2) reader.damaged("its strategy is unknown");
+  const FieldMetadata& made = data.metadata;
+  if (made.strategy > Strategy::h2 || made.estimator > Estimator::residual || made.criterion > Criterion::optimal ||
+      made.nearnessKind > NearnessKind::exponential)
+    reader.damaged("it was made by an unknown strategy, estimator, criterion or kind of nearness");
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);
   else
     reader.array(data.coefficients.emplace<std::vector<double>>(), sizes.coefficients);
+  reader.array(data.bounds, sizes.bounds);
   reader.finish();
   try {
     return Field(std::move(data));
