@@ -26,25 +26,40 @@ const Parameter* parameterOf(const Study& study, const std::string& name) {
 
 bool takes(const Study& study, const std::string& name) { return parameterOf(study, name) != nullptr; }
 
-std::vector<std::string> kindsThatTake(const std::string& name) {
-  std::vector<std::string> kinds;
+std::vector<const Study*> studiesThatTake(const std::string& name) {
+  std::vector<const Study*> takers;
   for (const Study& study : studies())
-    if (takes(study, name)) kinds.push_back(study.name);
-  return kinds;
+    if (takes(study, name)) takers.push_back(&study);
+  return takers;
+}
+
+std::vector<std::string> namesOf(const std::vector<const Study*>& studies) {
+  std::vector<std::string> names;
+  for (const Study* study : studies) names.push_back(study->name);
+  return names;
 }
 
 const Study& studyOf(const Arguments& arguments) {
   return *std::ranges::find(studies(), arguments.text("kind"), &Study::name);
 }
 
-/// The parameters of all kinds, each once.
+/// The parameters of all kinds, each once. One whose default depends on the kind is left without: see `buildArguments`.
 std::vector<Parameter> kindParameters() {
   std::vector<Parameter> all;
   for (const Study& study : studies())
     for (Parameter parameter : study.parameters) {
-      if (std::ranges::any_of(all, [&](const Parameter& known) { return known.name == parameter.name; })) continue;
-      if (const auto kinds = kindsThatTake(parameter.name); kinds.size() < studies().size())
-        parameter.help += fmt::format(" For {}.", fmt::join(kinds, " and "));
+      if (std::ranges::find(all, parameter.name, &Parameter::name) != all.end()) continue;
+      const std::vector<const Study*> takers = studiesThatTake(parameter.name);
+      if (takers.size() < studies().size())
+        parameter.help += fmt::format(" For {}.", fmt::join(namesOf(takers), " and "));
+      const auto sameDefault = [&](const Study* other) {
+        return parameterOf(*other, parameter.name)->defaultText == parameter.defaultText;
+      };
+      if (!std::ranges::all_of(takers, sameDefault)) {
+        for (const Study* taker : takers)
+          parameter.help += fmt::format(" {} takes {}.", taker->name, parameterOf(*taker, parameter.name)->defaultText);
+        parameter.defaultText.clear();
+      }
       all.push_back(std::move(parameter));
     }
   return all;
@@ -55,7 +70,7 @@ void checkStudy(const Arguments& arguments) {
   for (const Parameter& parameter : kindParameters())
     if (arguments.given(parameter.name) && !takes(study, parameter.name))
       throw Error(fmt::format("{}: is for 'study {}', not for 'study {}'", parameter.name,
-                              fmt::join(kindsThatTake(parameter.name), "' and 'study "), study.name));
+                              fmt::join(namesOf(studiesThatTake(parameter.name)), "' and 'study "), study.name));
 }
 
 }  // namespace
@@ -91,7 +106,8 @@ Arguments buildArguments(const Session& session, const Arguments& arguments, std
     const Parameter* own = parameterOf(study, parameter.name);
     const bool hasOwnDefault = own != nullptr && own->defaultText != parameter.defaultText;
     if (own == nullptr || !(arguments.given(parameter.name) || hasOwnDefault)) continue;
-    const std::vector<std::string> values = arguments.texts(parameter.name);
+    const std::vector<std::string> values =
+        arguments.given(parameter.name) ? arguments.texts(parameter.name) : std::vector{own->defaultText};
     if (values.size() != 1 && values.size() != meshes.size())
       throw Error(fmt::format("{}: given {} times for {} meshes; give it once for all, or once for each",
                               parameter.name, values.size(), meshes.size()));

@@ -51,7 +51,8 @@ struct Convergence {
 /// Ends a construction that has become large enough.
 struct LargeEnough {};
 
-/// After no step, and then so many times more each time.
+/// After no step, and then so many times more each time. How many coefficients they add differs from step to step, so
+/// that more fields are looked at than become stages.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
       double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // the smallest step
@@ -81,13 +82,11 @@ Curve curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sa
   options.targetError = std::numeric_limits<double>::min();  // whatever can be refined is
   Curve curve{strategy, {}};
   try {
-    buildStages(*input.exact, input.domain, options, stageSteps(growth, most),
+    buildStages(*input.exact, input.domain, options, stageSteps(std::pow(growth, 0.25), most),
                 [&](const Field& field) {
                   const std::size_t coefficients = statistics(field).coefficients;
                   if (coefficients > most) throw LargeEnough();
-                  // early steps add little to the base cells
-                  if (!curve.stages.empty() &&
-                      double(coefficients) < double(curve.stages.back().coefficients) * std::sqrt(growth))
+                  if (!curve.stages.empty() && double(coefficients) < growth * double(curve.stages.back().coefficients))
                     return;
                   curve.stages.push_back(stageOf(field, samples, options.threads));
                   if (progress.report)
@@ -307,6 +306,13 @@ void runConvergence(Session& session, const Arguments& arguments) {
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
 }
 
+/// The paper's curves are of plain errors, not of weighted ones.
+std::vector<Parameter> plainBuildParameters() {
+  auto parameters = buildParametersWithout({"target-error", "strategy", "max-steps", "coefficients", "band", "paper"});
+  std::ranges::find(parameters, "nearness", &Parameter::name)->defaultText = "0";
+  return parameters;
+}
+
 }  // namespace
 
 Study convergenceStudy() {
@@ -332,7 +338,8 @@ Study convergenceStudy() {
                               .maximum = 4e8},
                              {.name = "stages",
                               .type = ParameterType::wholeNumber,
-                              .help = "How many points of a curve, for each factor of ten in the number of steps.",
+                              .help = "How many points of a curve, about, for each factor of ten in the number of "
+                                      "coefficients.",
                               .defaultText = "8",
                               .minimum = 1,
                               .maximum = 100},
@@ -341,9 +348,7 @@ Study convergenceStudy() {
                               .help = "Write no pictures: gnuplot is not needed then.",
                               .defaultText = "false"}},
               .run = runConvergence};
-  for (auto& parameters :
-       {samplingParameters("200000"),
-        buildParametersWithout({"target-error", "strategy", "max-steps", "coefficients", "band", "paper"})})
+  for (auto& parameters : {samplingParameters("200000"), plainBuildParameters()})
     for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
   return study;
 }

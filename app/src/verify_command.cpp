@@ -211,8 +211,7 @@ std::string verifiedText(const Verified& verified) {
                       shortNumber(verified.jumps.gradient.max));
   if (figures.uniform.signs.mismatches + figures.nearSurface.signs.mismatches > 0)
     text += fmt::format(
-        "  signs are wrong wherever a point lies between the surface and the field's zero: within {} "
-        "that is its error, no defect\n",
+        "  a sign must be wrong between the surface and the field's own zero; farther away than {} it is a defect\n",
         shortNumber(figures.uniform.signs.beyond));
   return text + worstText(figures.worst);
 }
