@@ -25,7 +25,7 @@ Study tableStudy();
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);
 
 /// How many points errors are measured at, and which.
-std::vector<Parameter> samplingParameters(const std::string& defaultPoints);
+std::vector<Parameter> samplingParameters();
 
 /// For one of the meshes, the arguments of `build` that are among a study's: of an option that is given once for each
 /// mesh the one of its place. Throws `Error` for one that is given another number of times.

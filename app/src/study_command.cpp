@@ -82,11 +82,11 @@ std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& na
   return parameters;
 }
 
-std::vector<Parameter> samplingParameters(const std::string& defaultPoints) {
+std::vector<Parameter> samplingParameters() {
   return {{.name = "points",
            .type = ParameterType::wholeNumber,
            .help = "Random points in the domain at which errors are measured.",
-           .defaultText = defaultPoints,
+           .defaultText = "200000",
            .minimum = 1,
            .maximum = 1e9},
           {.name = "seed",

@@ -348,7 +348,7 @@ Study convergenceStudy() {
                               .help = "Write no pictures: gnuplot is not needed then.",
                               .defaultText = "false"}},
               .run = runConvergence};
-  for (auto& parameters : {samplingParameters("200000"), plainBuildParameters()})
+  for (auto& parameters : {samplingParameters(), plainBuildParameters()})
     for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
   return study;
 }

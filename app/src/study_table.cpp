@@ -304,7 +304,7 @@ Study tableStudy() {
                   "index.html, one page without network that can be mailed, table.md with its pictures, and "
                   "table.json.",
               .run = runTable};
-  for (auto& parameters : {samplingParameters("200000"), buildParametersWithout({"max-steps"}), backendParameters()})
+  for (auto& parameters : {samplingParameters(), buildParametersWithout({"max-steps"}), backendParameters()})
     for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
   return study;
 }

@@ -313,7 +313,7 @@ void addVerifyCommand(Registry& registry) {
       .examples = {"hpsdf verify bunny.hpsdf bunny.obj",
                    "hpsdf verify bunny.hpsdf bunny.obj --max-rms 5e-4 --max-error 0.02 --max-mismatches 0",
                    "hpsdf verify torus.hpsdf --points 1e7 --band 0.05 --json",
-                   "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps && hpsdf run worst.hps"},
+                   "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps"},
       .parameters = {fieldParameter(),
                      {.name = "mesh",
                       .type = ParameterType::text,
