@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <limits>
 
 #include "hpsdf/exact_distance.h"
@@ -66,19 +68,13 @@ void warnOfCutSurface(const Console& console, const Box& surface, const Box& dom
                 << (domain.intersects(surface) ? "part of the surface" : "the whole surface") << std::endl;
 }
 
-Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments) {
-  const Box domain = domainOf(arguments, distance.source().box);
-  warnOfCutSurface(console, distance.source().box, domain);
-  const BuildOptions options = buildOptions(arguments);
-  Field field =
-      withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); });
-  if (field.metadata().measuredError > options.maxError)
+void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
+  if (made.measuredError > made.maxError)
     console.err << fmt::format(
                        "hpsdf: warning: errors of {} are left, above the maximum error {}: allow a higher degree, a "
                        "greater depth, more steps or bytes",
-                       shortNumber(field.metadata().measuredError), shortNumber(options.maxError))
+                       shortNumber(made.measuredError), shortNumber(made.maxError))
                 << std::endl;
-  return field;
 }
 
 /// Errors of the construction speak of options; the user thinks of the mesh.
@@ -86,6 +82,10 @@ Field construct(const Console& console, const DistanceFunction& distance, const 
   const std::string message = error.what();
   if (message.find(surface) != std::string::npos) throw error;
   throw Error(surface + ": " + message);
+}
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 /// A surface as a field is made from it.
@@ -112,13 +112,37 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
   return prepared;
 }
 
+std::shared_ptr<const DistanceFunction> distanceOf(const std::shared_ptr<const ExactDistance>& exact,
+                                                   const Normalization& normalization) {
+  Source source = exact->source();
+  source.normalization = normalization;
+  auto evaluate = [exact](std::span<const Vector3> points, std::span<double> out) { (*exact)(points, out); };
+  return std::make_shared<const DistanceFunction>(std::move(evaluate), std::move(source));
+}
+
 std::shared_ptr<const DistanceFunction> distanceTo(const PreparedSurface& surface, int threads) {
   if (surface.analytic) return std::make_shared<const DistanceFunction>(*surface.analytic);
-  ExactDistance exact(surface.mesh, threads);
-  Source source = exact.source();
-  source.normalization = surface.normalization;
-  return std::make_shared<const DistanceFunction>(std::move(exact), std::move(source));  // moved: kept, not referred to
+  return distanceOf(std::make_shared<const ExactDistance>(surface.mesh, threads), surface.normalization);
 }
+
+/// ∇Φ of a shape in closed form, by differences across a millionth of it.
+Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
+  const double step = 1e-6 * distance.source().box.sizes().maxCoeff();
+  std::array<Vector3, 6> points;
+  for (int axis = 0; axis < 3; ++axis) {
+    points[2 * axis] = x + step * Vector3::Unit(axis);
+    points[2 * axis + 1] = x - step * Vector3::Unit(axis);
+  }
+  std::array<double, 6> values;
+  distance(points, values);
+  return Vector3(values[0] - values[1], values[2] - values[3], values[4] - values[5]) / (2 * step);
+}
+
+bool isMadeFrom(const Source& given, const Source& source) {
+  return given.fingerprint == source.fingerprint && (source.fingerprint != 0 || given.name == source.name);
+}
+
+std::string nameOf(const Source& source) { return source.name.empty() ? "unknown" : source.name; }
 
 }  // namespace
 
@@ -329,14 +353,29 @@ BuildOptions buildOptions(const Arguments& arguments) {
   return options;
 }
 
-BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
+BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   try {
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
-    auto exact = distanceTo(prepared, arguments.whole("threads"));
-    Field field = construct(console, *exact, arguments);
-    return {std::move(field), std::move(exact), prepared.report,
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+    BuildInput input{distanceTo(prepared, arguments.whole("threads")), prepared.report, {}, buildOptions(arguments)};
+    input.setUpSeconds = secondsSince(start);
+    const Box& box = input.exact->source().box;
+    input.domain = domainOf(arguments, box);
+    warnOfCutSurface(console, box, input.domain);
+    return input;
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
+  BuildInput input = buildInput(console, surface, arguments);
+  try {
+    const auto start = std::chrono::steady_clock::now();
+    Field field = withProgress(
+        console, [&](const Progress& progress) { return build(*input.exact, input.domain, input.options, progress); });
+    warnOfErrorLeft(console, field.metadata());
+    return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }
@@ -348,11 +387,40 @@ std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, co
                                                       const Source& source) {
   try {
     auto exact = distanceTo(prepare(console, surface, !source.normalization.isIdentity()), 0);
-    const Source& given = exact->source();
-    if (given.fingerprint != source.fingerprint || (source.fingerprint == 0 && given.name != source.name))
-      console.err << "hpsdf: warning: " << surface << " is not what the field was made from ("
-                  << (source.name.empty() ? "unknown" : source.name) << ")" << std::endl;
+    if (!isMadeFrom(exact->source(), source))
+      console.err << "hpsdf: warning: " << surface << " is not what the field was made from (" << nameOf(source) << ")"
+                  << std::endl;
     return exact;
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
+  try {
+    PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
+    ReferenceSurface reference;
+    if (prepared.analytic) {
+      reference.distance = std::make_shared<const DistanceFunction>(*prepared.analytic);
+      reference.mesh = shapes::mesh(surface.substr(kAnalytic.size()));
+      const Normalization to = prepared.analytic->source().normalization;
+      for (Vector3& vertex : reference.mesh.vertices) vertex = to.scale * (vertex - to.center);
+      reference.normal = [distance = reference.distance](const Vector3& x, double) {
+        return differenceQuotient(*distance, x);
+      };
+    } else {
+      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh);
+      reference.distance = distanceOf(exact, prepared.normalization);
+      reference.mesh = std::move(prepared.mesh);
+      // nearer than this, rounding decides the direction
+      const double least = 1e-9 * exact->source().box.sizes().maxCoeff();
+      reference.normal = [exact, least](const Vector3& x, double signedDistance) {
+        if (std::abs(signedDistance) < least) return Vector3(Vector3::Zero());
+        return Vector3((x - exact->closestPoint(x).point) / signedDistance);
+      };
+    }
+    reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
+    return reference;
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }

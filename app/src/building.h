@@ -1,6 +1,7 @@
 #pragma once
 // From a mesh file or a shape's name to a field, as `build` and `report` do it.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,11 +14,23 @@
 
 namespace hpsdf::app {
 
-/// The parameters of a construction, shared by `build` and `report`.
+/// The parameters of a construction, shared by `build`, `report` and others.
 std::vector<Parameter> buildParameters();
 
 /// The options that such arguments ask for. --paper gives way to what is written beside it.
 BuildOptions buildOptions(const Arguments& arguments);
+
+/// What a construction starts from.
+struct BuildInput {
+  std::shared_ptr<const DistanceFunction> exact;
+  std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
+  Box domain;
+  BuildOptions options;
+  double setUpSeconds = 0;  ///< for the hierarchy over the triangles
+};
+
+/// Throws `Error` naming `surface`. Warnings go to the console's `err`.
+BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
 
 struct BuiltField {
   Field field;
@@ -36,6 +49,18 @@ bool isShape(std::string_view surface);
 /// surface is another one. Throws `Error` naming `surface`.
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source);
+
+/// A surface to measure a field against: its distance and, in the units of the field, its mesh; of an analytic shape
+/// that of the built-in one, from which it hardly differs.
+struct ReferenceSurface {
+  std::shared_ptr<const DistanceFunction> distance;
+  std::function<Vector3(const Vector3&, double)> normal;  ///< as `VerifiedSurface` has it
+  TriangleMesh mesh;
+  bool fieldIsMadeFromIt = false;
+};
+
+/// Of a mesh file or a shape, for a field that was made from `source`. Throws `Error` naming `surface`.
+ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
 
 /// The report of a mesh file or a built-in shape; throws `Error` for an analytic one.
 MeshReport inspectSurface(const std::string& surface);

@@ -55,22 +55,9 @@ constexpr std::string_view kSlider =
     "seen\"><div class=\"ends\"><span>left of the knob the baseline</span><span>right of it the actual picture</span>"
     "</div></div>\n";
 
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t n = 0; n < bytes.size(); n += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8 | (n + k < bytes.size() ? static_cast<unsigned char>(bytes[n + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += n + k > bytes.size() ? '=' : kDigits[group >> (18 - 6 * k) & 63];
-  }
-  return text;
-}
-
 std::string figureOf(const std::string& title, const fs::path& file) {
-  return fmt::format(
-      "<figure><img src=\"data:image/png;base64,{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
-      base64(readTextFile(file.string())), htmlEscaped(title));
+  return fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
+                     htmlPng(readTextFile(file.string())), htmlEscaped(title));
 }
 
 bool isPicture(const fs::path& file) { return lowerExtension(file) == ".png" && fs::exists(file); }

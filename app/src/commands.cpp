@@ -8,6 +8,7 @@ Registry makeRegistry() {
   Registry registry;
   addFieldCommands(registry);
   addJumpsCommand(registry);
+  addVerifyCommand(registry);
   addPictureCommands(registry);
   addMotionCommands(registry);
   addFigureCommands(registry);
@@ -16,6 +17,7 @@ Registry makeRegistry() {
   addUiCommand(registry);
   addViewCommand(registry);
   addReportCommand(registry);
+  addStudyCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);
   return registry;

@@ -9,11 +9,13 @@ Registry makeRegistry();
 
 void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
 void addJumpsCommand(Registry& registry);
+void addVerifyCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render
 void addMotionCommands(Registry& registry);   ///< turntable, frames: after those above, whose parameters they share
 void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
+void addStudyCommand(Registry& registry);
 void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
 void addUiCommand(Registry& registry);
 void addViewCommand(Registry& registry);    ///< the window

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <sstream>
 
 #include "hpsdf/error.h"
 #include "hpsdf/output_file.h"
@@ -28,14 +27,6 @@ bool isFrameName(std::string_view name) {
 }
 
 void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readTextFile(from.string())); }
-
-std::string lastLine(const std::string& text) {
-  std::istringstream lines(text);
-  std::string last;
-  for (std::string line; std::getline(lines, line);)
-    if (!line.empty()) last = line;
-  return last;
-}
 
 fs::path requireFfmpeg(const std::string& output) {
   if (const auto found = findProgram("ffmpeg")) return *found;

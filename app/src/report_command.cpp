@@ -21,16 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "bunny" of bunny.obj, "torus" of builtin:torus,major=0.7: plain characters only, since it goes into commands.
-std::string plainName(const std::string& source) {
-  const bool isShape = source.starts_with("builtin:") || source.starts_with("analytic:");
-  std::string name = isShape ? source.substr(source.find(':') + 1) : fs::path(source).stem().string();
-  name = name.substr(0, name.find(','));
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
-  return name.empty() ? "field" : name;
-}
-
 std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
   std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
   for (const Parameter& parameter : buildParameters()) {

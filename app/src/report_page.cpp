@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
+
 namespace hpsdf::app {
 namespace {
 
@@ -57,6 +59,18 @@ std::string figure(const ReportPicture& picture) {
 }
 
 }  // namespace
+
+std::string htmlPng(std::string_view bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text = "data:image/png;base64,";
+  for (std::size_t n = 0; n < bytes.size(); n += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (n + k < bytes.size() ? static_cast<unsigned char>(bytes[n + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) text += n + k > bytes.size() ? '=' : kDigits[group >> (18 - 6 * k) & 63];
+  }
+  return text;
+}
 
 std::string htmlEscaped(const std::string& text) {
   std::string result;

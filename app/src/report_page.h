@@ -37,6 +37,9 @@ std::string reportHtml(const ReportPage& page);
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
 
+/// The bytes of a PNG file as the source of an <img>, so that it lies in the page.
+std::string htmlPng(std::string_view bytes);
+
 /// Text that is safe between tags and in quoted attributes.
 std::string htmlEscaped(const std::string& text);
 

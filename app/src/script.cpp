@@ -274,6 +274,14 @@ std::string readTextFile(const std::string& file) {
   return std::move(text).str();
 }
 
+std::string lastLine(const std::string& text) {
+  std::istringstream lines(text);
+  std::string last;
+  for (std::string line; std::getline(lines, line);)
+    if (!line.empty()) last = line;
+  return last;
+}
+
 void writeTextFile(const std::filesystem::path& file, std::string_view text) {
   OutputFile out(file);
   out.write(text);

@@ -34,6 +34,8 @@ void runScript(Session& session, std::span<const Call> calls);
 
 /// All of a file. Throws `Error` naming it.
 std::string readTextFile(const std::string& file);
+/// The last line that is not empty; "" where there is none.
+std::string lastLine(const std::string& text);
 /// Throws `Error` naming it; then nothing of it is left behind.
 void writeTextFile(const std::filesystem::path& file, std::string_view text);
 

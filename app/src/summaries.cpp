@@ -101,6 +101,15 @@ std::string estimatorName(Estimator estimator) { return estimator == Estimator::
 
 std::string criterionName(Criterion criterion) { return criterion == Criterion::paper ? "paper" : "optimal"; }
 
+std::string plainName(const std::string& source) {
+  const bool isShape = source.starts_with("builtin:") || source.starts_with("analytic:");
+  std::string name = isShape ? source.substr(source.find(':') + 1) : std::filesystem::path(source).stem().string();
+  name = name.substr(0, name.find(','));
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
+  return name.empty() ? "field" : name;
+}
+
 std::string strategyName(Strategy strategy) {
   switch (strategy) {
     case Strategy::h1:

@@ -46,6 +46,9 @@ std::string vectorText(const Vector3& v);
 /// ".png" of a.PNG
 std::string lowerExtension(const std::filesystem::path& file);
 
+/// "bunny" of bunny.obj, "torus" of builtin:torus,major=0.7: plain characters only, for commands and file names.
+std::string plainName(const std::string& source);
+
 /// A word of a command as a shell takes it, quoted where it must be.
 std::string shellWord(const std::string& word);
 

@@ -262,6 +262,22 @@ TEST(Explorer, flyingLooksAtTheInterface) {
   EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("rank: the field has"));
 }
 
+TEST(Explorer, flyingToAPointPutsItInTheMiddle) {
+  Bench bench;
+  for (const char* kind : {"slice", "surface"}) {
+    bench.run(std::string(kTorus) + "show " + kind + "; fly to=0.71,-0.2,0.3");
+    bench.explorer().frame();
+    const auto& picture = *bench.explorer().picture();
+    const auto pick =
+        render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
+    ASSERT_TRUE(pick) << kind;
+    EXPECT_LT((pick->position - Vector3(0.71, -0.2, 0.3)).norm(), 0.05) << kind;
+  }
+  EXPECT_THAT(bench.failure("fly to=5,0,0"), HasSubstr("to: the point lies outside the field's domain"));
+  EXPECT_THAT(bench.failure("fly 1 to=0,0,0"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
+  EXPECT_THAT(bench.failure("fly"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
+}
+
 TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   Bench bench;
   bench.run("build builtin:gear target-error=1e-3 margin=0.2 grid=3,4,5 nearness=2 max-depth=4");

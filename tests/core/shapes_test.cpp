@@ -64,7 +64,8 @@ double surfaceDeviation(const TriangleMesh& mesh, const DistanceFunction& smooth
 }
 
 TEST(Shapes, CatalogueListsThemInOrder) {
-  EXPECT_THAT(shapeNames(), ::testing::ElementsAre("sphere", "torus", "box", "gear"));
+  EXPECT_THAT(shapeNames(),
+              ::testing::ElementsAre("sphere", "torus", "box", "gear", "helix-bowl", "marble-run", "structured-bowl"));
   for (const auto& shape : shapes::catalogue()) {
     EXPECT_FALSE(shape.help.empty());
     for (const auto& p : shape.parameters) {
@@ -162,12 +163,91 @@ TEST(Shapes, GearCapsAllLookOutward) {
   }
 }
 
+/// Where a vertical line through (x, y) crosses the mesh, from below.
+std::vector<double> crossings(const TriangleMesh& mesh, double x, double y) {
+  std::vector<double> heights;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+    const auto side = [&](const Vector3& u, const Vector3& v) {
+      return (v.x() - u.x()) * (y - u.y()) - (v.y() - u.y()) * (x - u.x());
+    };
+    const double w0 = side(q, r), w1 = side(r, p), w2 = side(p, q);
+    if ((w0 > 0) != (w1 > 0) || (w1 > 0) != (w2 > 0)) continue;
+    heights.push_back((w0 * p.z() + w1 * q.z() + w2 * r.z()) / (w0 + w1 + w2));
+  }
+  std::ranges::sort(heights);
+  return heights;
+}
+
+TEST(Shapes, BowlsAreOneWallOpenTowardsPositiveZ) {
+  for (const std::string name : {"helix-bowl", "structured-bowl"}) {
+    const TriangleMesh mesh = shapes::mesh(name);
+    const Box box = boundingBox(mesh);
+    EXPECT_EQ(mesh.triangles.size(), 37'632u) << name;  // 16 cells (cells + 1)
+    double thinnest = 1e9, thickest = 0;
+    for (const double x : {0.013, 0.21, 0.47, 0.63})
+      for (const double y : {0.007, -0.18, 0.33, -0.52}) {
+        const std::vector<double> wall = crossings(mesh, x, y);
+        ASSERT_EQ(wall.size(), 2u) << name << " at " << x << ", " << y;  // and nothing above it
+        EXPECT_NEAR(wall[0], box.min().z() + 0.8 * (x * x + y * y), 1e-3) << name;
+        const double slope = 1.6 * std::hypot(x, y);
+        const double thickness = (wall[1] - wall[0]) / std::hypot(1, slope);
+        thinnest = std::min(thinnest, thickness);
+        thickest = std::max(thickest, thickness);
+      }
+    EXPECT_GT(thinnest, 0.03) << name;
+    EXPECT_LT(thinnest, 0.08) << name;  // there is a relief
+    EXPECT_LT(thickest, 0.13) << name;
+  }
+}
+
+TEST(Shapes, TheHelixBowlsGrooveWindsOutwards) {
+  // along a ray the wall is thinnest once a turn; a quarter round the axis it is so a quarter of that farther out
+  const TriangleMesh mesh = shapes::mesh("helix-bowl,cells=96,height=0.1");
+  const auto depthAt = [&](double radius, double angle) {
+    const auto wall = crossings(mesh, radius * std::cos(angle) + 1e-4, radius * std::sin(angle) + 1e-4);
+    return wall.size() == 2 ? 0.1 - (wall[1] - wall[0]) : 0;
+  };
+  for (const double angle : {0.1, 0.1 + kPi / 2}) {
+    const double groove = 0.5 + angle / (2 * kPi) / 4;  // the second of the four turns
+    EXPECT_GT(depthAt(groove, angle), 0.05);
+    EXPECT_LT(depthAt(groove + 0.125, angle), 0.01);
+    EXPECT_GT(depthAt(groove + 0.25, angle), 0.05);
+  }
+}
+
+TEST(Shapes, TheMarbleRunIsSmallAgainstItsBoxAndDescends) {
+  const TriangleMesh mesh = shapes::mesh("marble-run");
+  const MeshReport report = inspect(mesh);
+  EXPECT_EQ(report.faces, 2u * 18 * 4 * 96 + 4 * 8);
+  EXPECT_LT(report.volume / report.box.volume(), 0.03);
+  // half an annulus of 16 corners, upright, along the turns
+  const double length = 4 * 2 * kPi * 0.92, area = 8 * std::sin(kPi / 8) / 2 * (0.08 * 0.08 - 0.06 * 0.06);
+  EXPECT_NEAR(report.volume, length * area, 0.002 * length * area);
+  // below the channel's middle, on the far side of the axis half a turn later, its floors
+  const std::vector<double> floors = crossings(mesh, 0.92, 1e-3);
+  ASSERT_EQ(floors.size(), 8u);  // four turns, the wall's two sides each
+  for (int turn = 0; turn < 4; ++turn) EXPECT_NEAR(floors[2 * turn + 1] - floors[2 * turn], 0.02, 2e-3);
+  EXPECT_NEAR(floors[2] - floors[0], 0.25, 1e-3);
+  const std::vector<double> opposite = crossings(mesh, -0.92, 1e-3);
+  EXPECT_NEAR(std::abs(opposite[0] - floors[0]), 0.125, 2e-3);
+}
+
+TEST(Shapes, TheBowlsAndTheRunReachThePapersFaces) {
+  EXPECT_NEAR(double(shapes::mesh("helix-bowl,cells=143").triangles.size()), 329'800, 1000);
+  EXPECT_NEAR(double(shapes::mesh("marble-run,steps=255,sides=12").triangles.size()), 53'000, 200);
+  EXPECT_NEAR(double(shapes::mesh("structured-bowl,cells=506,bumps=40").triangles.size()), 4'100'000, 10'000);
+}
+
 TEST(Shapes, ExtremeParametersStayClosed) {
   for (const std::string spec :
        {"sphere,radius=0.001,subdivisions=0", "sphere,radius=1000,subdivisions=4", "torus,segments=3,sides=3",
         "torus,major=1000,minor=0.001,segments=4096,sides=3", "torus,major=1,minor=0.9999,sides=1024,segments=5",
         "box,width=0.001,height=1000,depth=1", "gear,teeth=3,segments=1", "gear,teeth=500,segments=1",
-        "gear,radius=1000,hole=0.001,thickness=0.001", "gear,radius=1,tooth-depth=0.001,hole=0.9985,segments=64"}) {
+        "gear,radius=1000,hole=0.001,thickness=0.001", "gear,radius=1,tooth-depth=0.001,hole=0.9985,segments=64",
+        "helix-bowl,cells=8,turns=64", "helix-bowl,thickness=0.5,depth=0.499,height=0.9", "structured-bowl,cells=8",
+        "structured-bowl,radius=1000,height=0.001,thickness=0.002,depth=0.001", "marble-run,turns=1,steps=8,sides=2",
+        "marble-run,turns=64,width=0.03,thickness=0.014,steps=1024", "marble-run,width=0.9,height=10"}) {
     const TriangleMesh mesh = shapes::mesh(spec);
     const auto [clean, report] = cleaned(mesh);
     EXPECT_TRUE(report.closed()) << spec;
@@ -192,6 +272,11 @@ TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
   EXPECT_THAT(errorOf("builtin:gera"), HasSubstr("did you mean gear?"));
   EXPECT_THAT(errorOf("dodecahedron"), HasSubstr("known: sphere, torus, box, gear"));
   EXPECT_THAT(errorOf(""), HasSubstr("known: sphere, torus, box, gear"));
+  EXPECT_THAT(errorOf("helix-bowl,depth=0.1"), HasSubstr("make depth smaller than thickness"));
+  EXPECT_THAT(errorOf("structured-bowl,thickness=0.7"), HasSubstr("make thickness or height smaller"));
+  EXPECT_THAT(errorOf("marble-run,thickness=0.08"), HasSubstr("make thickness smaller than half of the width"));
+  EXPECT_THAT(errorOf("marble-run,turns=13"), HasSubstr("the turns meet"));
+  EXPECT_THAT(errorOf("marble-run,width=1"), HasSubstr("make width smaller than radius"));
   EXPECT_THAT(errorOf("torus,majro=1"), HasSubstr("torus has no parameter 'majro'; did you mean major?"));
   EXPECT_THAT(errorOf("box,radius=1"), HasSubstr("known: width, height, depth"));
   EXPECT_THAT(errorOf("box,"), HasSubstr("box has no parameter ''"));

@@ -182,37 +182,64 @@ void runWorst(Session& session, const Arguments& arguments) {
   session.explorer().change(std::move(view));
 }
 
-/// So near that the smaller of the two cells takes about a sixth of the picture.
-void runFly(Session& session, const Arguments& arguments) {
-  Explorer& explorer = session.explorer();
-  const Field& field = session.current().field;
-  const auto rank = static_cast<std::size_t>(arguments.whole("rank"));
-  const auto& worst = explorer.worst(rank);
+/// Where to look closely, and the size of a cell there.
+struct Place {
+  Vector3 point;
+  double cellSize;
+  int sliceAxis;  ///< across which a slice shows it best
+};
+
+double cellSize(const Field& field, int depth) {
+  return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
+}
+
+/// Where the interface jumps most; a slice shows its face from the edge.
+Place placeOfWorst(Session& session, std::size_t rank) {
+  const auto& worst = session.explorer().worst(rank);
   if (rank > worst.size())
     throw Error(fmt::format("rank: the field has {} interfaces; give one of them", session.jumps().interfaces.size()));
   const Interface& face = session.jumps().interfaces[worst[rank - 1]];
-  const int depth = std::max(face.depths[0], face.depths[1]);
-  const double size = std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
+  return {face.worst, cellSize(session.current().field, std::max(face.depths[0], face.depths[1])),
+          face.axis == 2 ? 1 : 2};
+}
+
+Place placeOf(Session& session, const Vector3& point) {
+  const Field& field = session.current().field;
+  if (!field.domain().contains(point)) throw Error("to: the point lies outside the field's domain; give one within it");
+  return {point, cellSize(field, field.cellAt(point).depth), session.explorer().view().axis};
+}
+
+/// So near that the cell takes about a sixth of the picture.
+void runFly(Session& session, const Arguments& arguments) {
+  Explorer& explorer = session.explorer();
+  const Field& field = session.current().field;
+  const Place place = arguments.has("to") ? placeOf(session, pointOf(arguments, "to"))
+                                          : placeOfWorst(session, static_cast<std::size_t>(arguments.whole("rank")));
   ViewState view = explorer.view();
   if (view.slice) {
     view.plane.reset();
-    view.axis = face.axis == 2 ? 1 : 2;  // so that the face is seen from its edge
-    view.planeOffset = face.worst[view.axis];
-    view.zoom = std::max(1.0, field.domain().sizes().maxCoeff() / (6 * size));
-    view.sliceTarget = face.worst;
+    view.axis = place.sliceAxis;
+    view.planeOffset = place.point[view.axis];
+    view.zoom = std::max(1.0, field.domain().sizes().maxCoeff() / (6 * place.cellSize));
+    view.sliceTarget = place.point;
   } else {
-    view.camera.target = face.worst;
-    view.camera.distance = 10 * size / field.domain().diagonal().norm();
+    view.camera.target = place.point;
+    view.camera.distance = 10 * place.cellSize / field.domain().diagonal().norm();
     // what lies in front of it is cut away, unless it is the surface that one looks at
     view.clip.reset();
-    if (std::abs(field.value(face.worst) - view.surfaceOffset) > size) {
+    if (std::abs(field.value(place.point) - view.surfaceOffset) > place.cellSize) {
       const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
       Eigen::Index axis = 0;
       forward.cwiseAbs().maxCoeff(&axis);
-      view.clip = render::ClipPlane{int(axis), face.worst[axis]};
+      view.clip = render::ClipPlane{int(axis), place.point[axis]};
     }
   }
   explorer.change(std::move(view));
+}
+
+void checkFly(const Arguments& arguments) {
+  if (arguments.has("rank") == arguments.has("to"))
+    throw Error("fly: expected either the rank of an interface or to=X,Y,Z");
 }
 
 void runUndo(Session& session, const Arguments&) {
@@ -559,17 +586,24 @@ void addViewCommands(Registry& registry) {
                 .action = runWorst,
                 .scriptOnly = true});
   registry.add({.name = "fly",
-                .summary = "Take a close look at one of the worst interfaces between cells.",
-                .help = "A slice goes through it; a camera looks at it, and what lies before it is cut away.",
-                .examples = {"fly 1"},
+                .summary = "Take a close look at one of the worst interfaces between cells, or at a point.",
+                .help = "A slice goes through it; a camera looks at it, and what lies before it is cut away. 'verify' "
+                        "writes such lines for the worst points that it finds.",
+                .examples = {"fly 1", "fly to=0.2,0.6,-0.1"},
                 .parameters = {{.name = "rank",
                                 .type = ParameterType::wholeNumber,
                                 .help = "Its place in the list, 1 for the worst.",
                                 .minimum = 1,
                                 .maximum = 8000,
-                                .positional = true,
-                                .need = Need::always}},
+                                .positional = true},
+                               {.name = "to",
+                                .type = ParameterType::numbers,
+                                .help = "A point within the domain instead.",
+                                .valueName = "X,Y,Z",
+                                .unit = "world units",
+                                .counts = {3}}},
                 .action = runFly,
+                .check = checkFly,
                 .scriptOnly = true});
   registry.add({.name = "undo",
                 .summary = "Take back the last change of what the explorer shows.",

@@ -28,7 +28,8 @@ struct Shape {
   bool analytic;  ///< `distance` knows this shape
 };
 
-/// All shapes, in the order in which to list them: sphere, torus, box, gear.
+/// All shapes, in the order in which to list them: sphere, torus, box, gear, helix-bowl, marble-run,
+/// structured-bowl.
 std::span<const Shape> catalogue();
 
 /// `spec` is `NAME` or `NAME,parameter=value,…`, with or without a leading `builtin:`; e.g.

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <unordered_map>
@@ -53,6 +54,29 @@ const std::vector<Shape>& shapeList() {
         length("tooth-depth", 0.22, "from the tips down to the roots"), length("hole", 0.3, "radius of the bore"),
         length("thickness", 0.5, "full size along z"),
         count("segments", 8, 1, 64, "steps along each tip and each root; even ones put a corner mid-tip")},
+       false},
+      {"helix-bowl",
+       "a bowl, open towards +z, with a groove that runs down in a spiral; 329k faces with cells=143",
+       {length("radius", 1, "of the rim, outside"), length("height", 0.8, "of the bowl's outside"),
+        length("thickness", 0.1, "of the wall beside the groove"),
+        length("depth", 0.06, "of the groove, below thickness"),
+        count("turns", 4, 1, 64, "of the groove around the axis"),
+        count("cells", 48, 8, 700, "of the mesh from the middle to the rim")},
+       false},
+      {"marble-run",
+       "a channel, open towards +z, that winds down around the axis z; 53k faces with steps=255,sides=12",
+       {length("radius", 1, "outer radius of the turns"), length("height", 1, "that it descends"),
+        length("width", 0.16, "of the channel, outside"),
+        length("thickness", 0.02, "of its wall, below half of the width"), count("turns", 4, 1, 64, "around the axis"),
+        count("steps", 96, 8, 1024, "a turn"), count("sides", 8, 2, 64, "steps around the channel's half circle")},
+       false},
+      {"structured-bowl",
+       "a bowl, open towards +z, with fine bumps all over its inside; 4.1M faces with cells=506,bumps=40",
+       {length("radius", 1, "of the rim, outside"), length("height", 0.8, "of the bowl's outside"),
+        length("thickness", 0.1, "of the wall under the highest bumps"),
+        length("depth", 0.03, "from their tops to their valleys, below thickness"),
+        count("bumps", 8, 1, 200, "across the bowl, each with smaller ones on it"),
+        count("cells", 48, 8, 700, "of the mesh from the middle to the rim")},
        false},
   };
   return list;
@@ -323,7 +347,136 @@ TriangleMesh gearMesh(const Request& request) {
   return mesh;
 }
 
+/// Moved so that its box is about the origin.
+TriangleMesh centred(TriangleMesh mesh) {
+  const Vector3 center = boundingBox(mesh).center();
+  for (Vector3& v : mesh.vertices) v -= center;
+  return mesh;
+}
+
+/// A point of the unit disc for one of the square [-1, 1]²: cells of a grid keep about the same size, and there is no
+/// pole where they shrink.
+Eigen::Vector2d onDisc(double x, double y) { return {x * std::sqrt(1 - y * y / 2), y * std::sqrt(1 - x * x / 2)}; }
+
+/// A wall between two sheets over the unit disc, `inside` above `outside`, joined along their rims.
+template <typename Sheet>
+TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& outside) {
+  const std::uint32_t n = 2 * cells, row = n + 1, sheet = row * row;
+  TriangleMesh mesh;
+  mesh.vertices.reserve(std::size_t{2} * sheet);
+  mesh.triangles.reserve(std::size_t{4} * n * n + std::size_t{8} * n);
+  for (const Sheet& place : {inside, outside})
+    for (std::uint32_t j = 0; j <= n; ++j)
+      for (std::uint32_t i = 0; i <= n; ++i)
+        mesh.vertices.push_back(place(onDisc((double(i) - cells) / cells, (double(j) - cells) / cells)));
+  for (std::uint32_t j = 0; j < n; ++j)
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::array<std::uint32_t, 4> at = {j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i};
+      // diagonals towards the square's corners, where two sides of a cell lie on the rim
+      const std::uint32_t first = (i < cells) == (j < cells) ? 0 : 1;
+      const auto corner = [&](std::uint32_t k) { return at[(first + k) % 4]; };
+      addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
+      addQuad(mesh, sheet + corner(0), sheet + corner(3), sheet + corner(2), sheet + corner(1));
+    }
+  const auto rim = [&](std::uint32_t k) {  // anticlockwise from the corner (-1, -1)
+    const std::uint32_t along = k % n;
+    switch (k / n % 4) {
+      case 0:
+        return along;
+      case 1:
+        return along * row + n;
+      case 2:
+        return n * row + n - along;
+      default:
+        return (n - along) * row;
+    }
+  };
+  for (std::uint32_t k = 0; k < 4 * n; ++k) addQuad(mesh, rim(k + 1), rim(k), sheet + rim(k), sheet + rim(k + 1));
+  return mesh;
+}
+
+/// A paraboloid's wall, its inside lowered by relief(point of the unit disc), from 0 to 1 of the depth.
+template <typename Relief>
+TriangleMesh bowlMesh(const Request& request, const Relief& relief) {
+  const double radius = request["radius"], height = request["height"];
+  using Sheet = std::function<Vector3(const Eigen::Vector2d&)>;
+  const Sheet outside = [&](const Eigen::Vector2d& d) {
+    return Vector3(radius * d.x(), radius * d.y(), height * d.squaredNorm());
+  };
+  const Sheet inside = [&](const Eigen::Vector2d& d) {
+    const double slope = 2 * height / radius;
+    const Vector3 normal = Vector3(-slope * d.x(), -slope * d.y(), 1).normalized();
+    return Vector3(outside(d) + (request["thickness"] - request["depth"] * relief(d)) * normal);
+  };
+  return centred(wallMesh(request.whole("cells"), inside, outside));
+}
+
+TriangleMesh helixBowlMesh(const Request& request) {
+  const double turns = request["turns"];
+  return bowlMesh(request, [turns](const Eigen::Vector2d& d) {
+    const double fromMiddle = d.norm();
+    const double phase = 2 * kPi * turns * fromMiddle - std::atan2(d.y(), d.x());
+    const double begun = std::clamp(2 * turns * fromMiddle - 1, 0.0, 1.0);  // a spiral has no end in the middle
+    return begun * begun * (3 - 2 * begun) * (0.5 + 0.5 * std::cos(phase));
+  });
+}
+
+TriangleMesh structuredBowlMesh(const Request& request) {
+  const double step = kPi * request["bumps"];
+  return bowlMesh(request, [step](const Eigen::Vector2d& d) {
+    const auto waves = [&](double times) { return std::cos(times * step * d.x()) * std::cos(times * step * d.y()); };
+    return 0.5 - 0.35 * waves(1) - 0.15 * waves(3);
+  });
+}
+
+TriangleMesh marbleRunMesh(const Request& request) {
+  const double outer = request["width"] / 2, inner = outer - request["thickness"];
+  const std::uint32_t sides = request.whole("sides"), loop = 2 * (sides + 1);
+  const std::uint32_t steps = request.whole("turns") * request.whole("steps");
+  std::vector<Eigen::Vector2d> section;  // away from the axis, and up: outside from lip to lip, and back inside
+  for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(outer * onCircle(sides + i, 2.0 * sides));
+  for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(inner * onCircle(2.0 * sides - i, 2.0 * sides));
+  TriangleMesh mesh;
+  for (std::uint32_t step = 0; step <= steps; ++step) {
+    const Eigen::Vector2d direction = onCircle(-double(step), request["steps"]);
+    const double z = -request["height"] * step / steps;
+    for (const Eigen::Vector2d& s : section) {
+      const double fromAxis = request["radius"] - outer + s.x();
+      mesh.vertices.emplace_back(fromAxis * direction.x(), fromAxis * direction.y(), z + s.y());
+    }
+  }
+  for (std::uint32_t step = 0; step < steps; ++step)
+    for (std::uint32_t i = 0; i < loop; ++i) {
+      const std::uint32_t a = step * loop + i, b = step * loop + (i + 1) % loop;
+      addQuad(mesh, a, b, b + loop, a + loop);
+    }
+  for (std::uint32_t i = 0; i < sides; ++i) {  // the two ends
+    const std::uint32_t last = steps * loop, back = loop - 1 - i;
+    addQuad(mesh, i, back, back - 1, i + 1);
+    addQuad(mesh, last + i, last + i + 1, last + back - 1, last + back);
+  }
+  return centred(std::move(mesh));
+}
+
+void requireSoundBowl(const Request& request, std::string_view spec) {
+  if (request["depth"] >= request["thickness"])
+    fail(spec, "the relief cuts through the wall; make depth smaller than thickness");
+  // the radius of curvature in the middle, where it is least
+  if (request["thickness"] >= request["radius"] * request["radius"] / (2 * request["height"]))
+    fail(spec, "the wall is thicker than the bowl is wide at its bottom; make thickness or height smaller");
+}
+
+void requireSoundRun(const Request& request, std::string_view spec) {
+  if (request["thickness"] >= request["width"] / 2)
+    fail(spec, "the wall fills the channel; make thickness smaller than half of the width");
+  if (request["width"] >= request["radius"]) fail(spec, "the channel meets the axis; make width smaller than radius");
+  if (request["turns"] > 1 && request["height"] / request["turns"] <= request["width"] / 2)
+    fail(spec, "the turns meet; make height larger, or turns or width smaller");
+}
+
 void requireSoundProportions(const Request& request, std::string_view spec) {
+  if (request.shape->name.ends_with("-bowl")) requireSoundBowl(request, spec);
+  if (request.shape->name == "marble-run") requireSoundRun(request, spec);
   if (request.shape->name == "torus") {
     if (request["minor"] >= request["major"]) fail(spec, "the tube meets the axis; make minor smaller than major");
     if (request["minor"] * equalAreaFactor(request["sides"]) >= request["major"])
@@ -343,8 +496,13 @@ std::span<const Shape> catalogue() { return shapeList(); }
 
 TriangleMesh mesh(std::string_view spec) {
   using Maker = TriangleMesh (*)(const Request&);
-  static const std::map<std::string, Maker, std::less<>> makers = {
-      {"sphere", sphereMesh}, {"torus", torusMesh}, {"box", boxMesh}, {"gear", gearMesh}};
+  static const std::map<std::string, Maker, std::less<>> makers = {{"sphere", sphereMesh},
+                                                                   {"torus", torusMesh},
+                                                                   {"box", boxMesh},
+                                                                   {"gear", gearMesh},
+                                                                   {"helix-bowl", helixBowlMesh},
+                                                                   {"marble-run", marbleRunMesh},
+                                                                   {"structured-bowl", structuredBowlMesh}};
   const Request request = parse(spec, "builtin:");
   TriangleMesh result = makers.at(request.shape->name)(request);
   result.name = "builtin:" + request.text;

@@ -1,0 +1,43 @@
+#pragma once
+// Random numbers that depend on a seed and a place in a sequence alone: the same for any number of threads and any
+// standard library.
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf {
+
+/// SplitMix64 (Steele, Lea, Flood 2014), a generator for each number of a sequence.
+class Random {
+ public:
+  Random(std::uint64_t seed, std::uint64_t number) : state_(mixed(mixed(seed) + number)) {}
+
+  std::uint64_t next() { return mixed(state_ += 0x9e3779b97f4a7c15); }
+  /// In [0, 1), 53 bits.
+  double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
+
+  Vector3 inBox(const Box& box) {
+    const double x = unit(), y = unit(), z = unit();
+    return box.min() + box.sizes().cwiseProduct(Vector3(x, y, z));
+  }
+
+  Vector3 inBall(double radius) {
+    const double z = 2 * unit() - 1, angle = 2 * std::numbers::pi * unit(), fromCenter = radius * std::cbrt(unit());
+    const double fromAxis = std::sqrt(1 - z * z);
+    return fromCenter * Vector3(fromAxis * std::cos(angle), fromAxis * std::sin(angle), z);
+  }
+
+ private:
+  static std::uint64_t mixed(std::uint64_t x) {
+    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;
+    x = (x ^ x >> 27) * 0x94d049bb133111eb;
+    return x ^ x >> 31;
+  }
+
+  std::uint64_t state_;
+};
+
+}  // namespace hpsdf
