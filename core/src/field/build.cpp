@@ -17,6 +17,7 @@
 #include "field/build_options.h"
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
+#include "field/weak_continuity.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
@@ -75,29 +76,58 @@ class Construction {
   }
 
   /// The field as it is now. The first takes a copy of the tree, the other the tree itself.
-  FieldData frozen(const Source& source) const {
-    return freeze(BuildTree(tree_), options_.coefficients, metadata(source));
-  }
-  FieldData finish(const Source& source) {
-    FieldMetadata known = metadata(source);
-    return freeze(std::move(tree_), options_.coefficients, std::move(known));
-  }
+  FieldData frozen(const Source& source) { return finished(BuildTree(tree_), source); }
+  FieldData finish(const Source& source) { return finished(std::move(tree_), source); }
 
  private:
-  FieldMetadata metadata(const Source& source) const {
+  FieldData finished(BuildTree&& tree, const Source& source) {
+    const std::uint64_t before = fitter_.evaluations();
+    if (options_.enrich) enrich(tree);
+    FieldMetadata known = metadata(source, sumOfErrors(tree));
+    FieldData field = layOut(std::move(tree), std::move(known));
+    if (options_.continuityWeight) makeWeaklyContinuous(field, {.weight = *options_.continuityWeight}, progress_);
+    keepAs(options_.coefficients, field);
+    ofFinishing_ += fitter_.evaluations() - before;
+    return field;
+  }
+
+  int raisedDegree(int degree) const { return std::max(degree, std::min(degree + 1, options_.maxDegree)); }
+
+  /// Every leaf one degree higher, all of its coefficients from samples of its own.
+  void enrich(BuildTree& tree) const {
+    const auto raised = [&](const BuildNode& node) { return raisedDegree(node.fit.degree); };
+    std::size_t coefficients = 0;
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0) coefficients += coefficientCount(raised(node));
+    checkFitsMemory(tree.nodes.size(), coefficients);
+    for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
+      report("raising every degree", double(begin) / double(tree.nodes.size()));
+      tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
+        BuildNode& node = tree.nodes[n];
+        if (node.firstChild == 0 && node.fit.degree < raised(node))
+          node.fit = fitter_.fit(tree.boxOf(node), raised(node));
+      });
+    }
+  }
+
+  FieldMetadata metadata(const Source& source, double totalError) const {
     FieldMetadata metadata;
     metadata.source = source;
     metadata.targetError = options_.targetError;
-    metadata.totalError = sumOfErrors() / std::pow(length_ / 2, 5);
+    metadata.totalError = totalError / std::pow(length_ / 2, 5);
     metadata.referenceLength = length_;
     metadata.nearness = options_.nearness;
-    metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
+    metadata.maxDegree = options_.strategy == Strategy::hp
+                             ? options_.maxDegree
+                             : options_.enrich ? raisedDegree(startDegree(options_))
+                                               : startDegree(options_);
     metadata.maxDepth = options_.maxDepth;
     metadata.quadrature = options_.quadrature;
     metadata.strategy = options_.strategy;
     metadata.band = options_.band;
-    metadata.exactEvaluations = fitter_.evaluations();
+    metadata.exactEvaluations = fitter_.evaluations() - ofFinishing_;
     metadata.steps = steps_;
+    metadata.enriched = options_.enrich;
     return metadata;
   }
 
@@ -111,7 +141,7 @@ class Construction {
 
   static constexpr std::size_t kRound = 32;    // few enough to stay close to the paper's order, one cell at a time
   static constexpr std::size_t kResum = 1000;  // steps between exact sums of the total error (paper, sec. 3.6)
-  static constexpr std::size_t kBaseChunk = 4096;
+  static constexpr std::size_t kChunk = 4096;
 
   void fitBaseCells() {
     const std::size_t count = std::size_t(options_.grid[0]) * options_.grid[1] * options_.grid[2];
@@ -122,9 +152,9 @@ class Construction {
                               static_cast<std::uint32_t>(n / options_.grid[0] / options_.grid[1])};
     }
     const int degree = startDegree(options_);
-    for (std::size_t begin = 0; begin < count; begin += kBaseChunk) {
+    for (std::size_t begin = 0; begin < count; begin += kChunk) {
       report("fitting base cells", double(begin) / double(count));
-      tbb::parallel_for(begin, std::min(begin + kBaseChunk, count),
+      tbb::parallel_for(begin, std::min(begin + kChunk, count),
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
     }
     coefficients_ = count * std::size_t(coefficientCount(degree));
@@ -224,14 +254,14 @@ class Construction {
     return mu > nu;
   }
 
-  double sumOfErrors() const {
+  static double sumOfErrors(const BuildTree& tree) {
     double sum = 0;
-    for (const BuildNode& node : tree_.nodes)
+    for (const BuildNode& node : tree.nodes)
       if (node.firstChild == 0) sum += node.fit.error;
     return sum;
   }
 
-  void sumTotalError() { totalError_ = lastSum_ = sumOfErrors(); }
+  void sumTotalError() { totalError_ = lastSum_ = sumOfErrors(tree_); }
 
   void report(std::string_view task, double fraction) const {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
@@ -249,6 +279,7 @@ class Construction {
   double lastSum_ = 0;            ///< what it was when it was last summed anew
   std::size_t coefficients_ = 0;  ///< of all leaves
   std::uint64_t steps_ = 0;
+  std::uint64_t ofFinishing_ = 0;  ///< calls of Φ for fields that were handed out on the way
   ProgressEstimate estimate_;
 };
 

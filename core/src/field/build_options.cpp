@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 
+#include "field/weak_continuity.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -66,6 +67,7 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
     refuse("quadrature ", options.quadrature, ": expected an order of 2 to 8 times the degree");
   if (!(options.band >= 0) || !std::isfinite(options.band))
     refuse("band ", options.band, ": expected a width of at least 0");
+  if (options.continuityWeight) checkWeakContinuity({.weight = *options.continuityWeight});
   if (options.threads < 0) refuse("threads ", options.threads, ": expected 0 (all) or more");
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))

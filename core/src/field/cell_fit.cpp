@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "field/nearness.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -133,9 +134,7 @@ double CellFitter::shellError(const Fit& fit, double volume) const {
 }
 
 double CellFitter::nearnessWeight(const Fit& fit) const {
-  // Mean of the cell's own fit: c_000, the others having none (paper, eq. 10).
-  const double mean = fit.coefficients[0];
-  return std::pow(std::clamp(1 - std::abs(mean) / diagonal_, 0.0, 1.0), options_.nearness);
+  return hpsdf::nearnessWeight(NearnessKind::polynomial, options_.nearness, fit.coefficients[0], diagonal_);
 }
 
 Fit CellFitter::makeFit(std::vector<double> coefficients, int degree, const Box& cell, double meanSquare,
