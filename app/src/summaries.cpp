@@ -182,6 +182,8 @@ Json fieldJson(const CurrentField& current) {
       {"max_depth", metadata.maxDepth},
       {"quadrature", metadata.quadrature},
       {"band", metadata.band},
+      {"enriched", metadata.enriched},
+      {"continuity_weight", metadata.continuityWeight > 0 ? Json(metadata.continuityWeight) : Json()},
       {"reference_length", metadata.referenceLength},
       {"normalization",
        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -240,6 +242,9 @@ std::string fieldText(const CurrentField& current) {
                      fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
                                  strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
                                  metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
+  if (metadata.enriched) text += summaryRow("enriched", "every cell, by one degree at the end");
+  if (metadata.continuityWeight > 0)
+    text += summaryRow("continuity", fmt::format("weak, weight {}", shortNumber(metadata.continuityWeight)));
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);

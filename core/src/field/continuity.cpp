@@ -3,9 +3,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 #include <sstream>
+#include <vector>
 
 #include "field/evaluate.h"
 #include "field/face_coupling.h"
@@ -20,16 +21,24 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;
 
-/// Σ f(i) for i < count, parallel: in chunks of fixed size, so that rounding does not depend on the number of threads.
-template <typename F>
-double chunkedSum(std::size_t count, const F& f) {
-  std::vector<double> sums((count + kChunk - 1) / kChunk);
-  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t chunk) {
-    double sum = 0;
-    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) sum += f(i);
-    sums[chunk] = sum;
+/// Calls f(first, last, sums) for chunks of fixed size, parallel, and adds up the sums: chunk by chunk, so that rounding
+/// does not depend on the number of threads.
+template <std::size_t Sums, typename F>
+std::array<double, Sums> chunked(std::size_t count, const F& f) {
+  std::vector<std::array<double, Sums>> parts((count + kChunk - 1) / kChunk);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
+    f(chunk * kChunk, std::min(count, (chunk + 1) * kChunk), parts[chunk]);
   });
-  return std::accumulate(sums.begin(), sums.end(), 0.0);
+  std::array<double, Sums> total{};
+  for (const auto& part : parts)
+    for (std::size_t s = 0; s < Sums; ++s) total[s] += part[s];
+  return total;
+}
+
+double squaredNorm(const std::vector<double>& x) {
+  return chunked<1>(x.size(), [&](std::size_t first, std::size_t last, auto& sums) {
+    for (std::size_t i = first; i < last; ++i) sums[0] += x[i] * x[i];
+  })[0];
 }
 
 void report(const Progress& progress, double fraction) {
@@ -37,51 +46,40 @@ void report(const Progress& progress, double fraction) {
   if (progress.report) progress.report("closing jumps", std::clamp(fraction, 0.0, 1.0));
 }
 
-/// Conjugate gradients on (M + λ)d = −Mx₀, preconditioned by the diagonal; returns d.
+/// Conjugate gradients on (M + λ)d = −Mx₀, preconditioned by the diagonal.
 class ConjugateGradients {
  public:
-  ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options)
-      : coupling_(coupling), options_(options), diagonal_(coupling.diagonal()) {
-    for (double& entry : diagonal_) entry += options.weight;
+  ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
+      : coupling_(coupling), options_(options), change_(x0.size(), 0.0), residual_(x0.size()) {
+    for (const double entry : coupling.diagonal()) scale_.push_back(static_cast<float>(1 / (entry + options.weight)));
+    coupling_.apply(0, x0, residual_);
+    for (double& r : residual_) r = -r;
   }
 
-  std::vector<double> solve(const std::vector<double>& x0, const Progress& progress) {
-    const std::size_t n = x0.size();
-    std::vector<double> change(n, 0.0), residual(n), direction(n), product(n);
-    coupling_.apply(0, x0, residual);
-    const double size = chunkedSum(n, [&](std::size_t i) { return x0[i] * x0[i]; });
-    const double first = chunkedSum(n, [&](std::size_t i) { return residual[i] * residual[i]; });
-    if (first <= kRounding * kRounding * size) return change;  // continuous as it is
-    double slope = chunkedSum(n, [&](std::size_t i) {
-      residual[i] = -residual[i];
-      direction[i] = residual[i] / diagonal_[i];
-      return residual[i] * direction[i];
-    });
+  /// d.
+  std::vector<double> solve(double sizeOfX0, const Progress& progress) {
+    const double first = squaredNorm(residual_);
+    if (first <= kRounding * kRounding * sizeOfX0) return std::move(change_);  // continuous as it is
+    direction_.assign(change_.size(), 0.0);
+    product_.resize(change_.size());
+    double slope = step(0).slope, turn = 0;
     while (figures.iterations < options_.maxIterations) {
-      const double length = slope / coupling_.apply(options_.weight, direction, product);
-      const double squares = chunkedSum(n, [&](std::size_t i) {
-        change[i] += length * direction[i];
-        residual[i] -= length * product[i];
-        return residual[i] * residual[i];
-      });
+      turnDirection(turn);
+      const Progressed to = step(slope / coupling_.apply(options_.weight, direction_, product_));
+      turn = to.slope / slope;
+      slope = to.slope;
       ++figures.iterations;
-      figures.residual = std::sqrt(squares / first);
+      figures.residual = std::sqrt(to.squares / first);
       if (figures.residual <= options_.tolerance) {
-        figures.change = std::sqrt(chunkedSum(n, [&](std::size_t i) { return change[i] * change[i]; }));
-        return change;
+        figures.change = std::sqrt(squaredNorm(change_));
+        return std::move(change_);
       }
       report(progress, std::log(figures.residual) / std::log(options_.tolerance));
-      const double before = slope;
-      slope = chunkedSum(n, [&](std::size_t i) { return residual[i] * residual[i] / diagonal_[i]; });
-      chunkedSum(n, [&](std::size_t i) {
-        direction[i] = residual[i] / diagonal_[i] + slope / before * direction[i];
-        return 0.0;
-      });
     }
     std::ostringstream message;
     message << "weak continuity: " << options_.maxIterations << " iterations leave " << figures.residual
-            << " of the residual, more than " << options_.tolerance << "; take a larger weight than "
-            << options_.weight << ", or allow more";
+            << " of the residual, more than " << options_.tolerance << "; take a larger weight than " << options_.weight
+            << ", or allow more";
     throw Error(message.str());
   }
 
@@ -90,9 +88,34 @@ class ConjugateGradients {
  private:
   static constexpr double kRounding = 1e-13;
 
+  struct Progressed {
+    double squares;  ///< of the residual
+    double slope;    ///< the same, weighed by the preconditioner
+  };
+
+  Progressed step(double length) {
+    const auto sums = chunked<2>(change_.size(), [&](std::size_t first, std::size_t last, auto& part) {
+      for (std::size_t i = first; i < last; ++i) {
+        change_[i] += length * direction_[i];
+        residual_[i] -= length * product_[i];
+        const double square = residual_[i] * residual_[i];
+        part[0] += square;
+        part[1] += square * scale_[i];
+      }
+    });
+    return {sums[0], sums[1]};
+  }
+
+  void turnDirection(double turn) {
+    chunked<0>(change_.size(), [&](std::size_t first, std::size_t last, auto&) {
+      for (std::size_t i = first; i < last; ++i) direction_[i] = scale_[i] * residual_[i] + turn * direction_[i];
+    });
+  }
+
   FaceCoupling& coupling_;
   const WeakContinuity& options_;
-  std::vector<double> diagonal_;
+  std::vector<float> scale_;  ///< the preconditioner: any positive one will do, and half the bytes are read
+  std::vector<double> change_, residual_, direction_, product_;
 };
 
 /// Σ κ_e ‖f − f₀‖² of the cells that count towards ε, in the field's units^5.
@@ -130,8 +153,8 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   report(progress, 0);
   FaceCoupling coupling(field);
   std::vector<double> x = coupling.toUnknowns(field);
-  ConjugateGradients solver(coupling, options);
-  const std::vector<double> change = solver.solve(x, progress);
+  ConjugateGradients solver(coupling, options, x);
+  const std::vector<double> change = solver.solve(squaredNorm(x), progress);
   FieldMetadata& metadata = field.metadata;
   metadata.continuityWeight = options.weight;
   metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);

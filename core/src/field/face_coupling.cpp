@@ -6,10 +6,12 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include "basis/half_shares.h"
 #include "basis/projection.h"
+#include "field/evaluate.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -37,37 +39,109 @@ class Halving {
       }
   }
 
-  /// Onto the lower (0) or upper (1) half along the face's first (0) or second (1) axis.
-  void restrict(double* face, int degree, int along, int half) const {
-    const auto at = [&](int a, int b) -> double& { return face[along == 0 ? placeOnFace(a, b) : placeOnFace(b, a)]; };
-    for (int b = 0; b <= degree; ++b)
-      for (int a = 0; a <= degree - b; ++a) {  // upwards: the higher ones are still those of the whole
-        double sum = 0;
-        for (int i = a; i <= degree - b; ++i) sum += share_[half][i][a] * at(i, b);
-        at(a, b) = sum;
-      }
+  /// A face's polynomial onto a quarter of it; bits of `quarter`: upper half of the first, of the second axis.
+  template <typename Degree>
+  void restrict(double* face, Degree degree, int quarter) const {
+    for (int along = 0; along < 2; ++along) {
+      const auto& share = share_[quarter >> along & 1];
+      for (int b = 0; b <= degree; ++b)
+        for (int a = 0; a <= degree - b; ++a) {  // upwards: the higher ones are still those of the whole
+          double sum = 0;
+          for (int i = a; i <= degree - b; ++i) sum += share[i][a] * at(face, along, i, b);
+          at(face, along, a, b) = sum;
+        }
+    }
   }
 
-  void transposed(double* face, int degree, int along, int half) const {
-    const auto at = [&](int a, int b) -> double& { return face[along == 0 ? placeOnFace(a, b) : placeOnFace(b, a)]; };
-    for (int b = 0; b <= degree; ++b)
-      for (int i = degree - b; i >= 0; --i) {
-        double sum = 0;
-        for (int a = 0; a <= i; ++a) sum += share_[half][i][a] * at(a, b);
-        at(i, b) = sum;
-      }
+  template <typename Degree>
+  void transposed(double* face, Degree degree, int quarter) const {
+    for (int along = 0; along < 2; ++along) {
+      const auto& share = share_[quarter >> along & 1];
+      for (int b = 0; b <= degree; ++b)
+        for (int i = degree - b; i >= 0; --i) {
+          double sum = 0;
+          for (int a = 0; a <= i; ++a) sum += share[i][a] * at(face, along, a, b);
+          at(face, along, i, b) = sum;
+        }
+    }
   }
 
  private:
+  static double& at(double* face, int along, int a, int b) {
+    return face[along == 0 ? placeOnFace(a, b) : placeOnFace(b, a)];
+  }
+
   std::array<std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>, 2> share_{};
 };
 
-const Halving& halving() {
-  static const Halving instance;
-  return instance;
+const Halving halving;
+
+/// Where coefficients of a degree that is known when compiling go on a face across an axis.
+template <int P, int Axis>
+struct KnownTrace {
+  static constexpr int kCount = coefficientCount(P);
+  struct Entry {
+    std::uint8_t place;
+    std::uint8_t order;  ///< along the axis
+  };
+  static constexpr std::array<Entry, kCount> kEntries = [] {
+    std::array<Entry, kCount> entries{};
+    int index = 0;
+    for (int i = 0; i <= P; ++i)
+      for (int j = 0; j <= P - i; ++j)
+        for (int k = 0; k <= P - i - j; ++k)
+          entries[index++] =
+              Axis == 0   ? Entry{static_cast<std::uint8_t>(placeOnFace(j, k)), static_cast<std::uint8_t>(i)}
+              : Axis == 1 ? Entry{static_cast<std::uint8_t>(placeOnFace(i, k)), static_cast<std::uint8_t>(j)}
+                          : Entry{static_cast<std::uint8_t>(placeOnFace(i, j)), static_cast<std::uint8_t>(k)};
+    return entries;
+  }();
+
+  /// `ends`: the orthonormal polynomials at the end where the face lies.
+  static void take(const double* ends, const double* x, double* face) {
+    std::array<double, countOnFace(P)> sums{};
+    [&]<std::size_t... C>(std::index_sequence<C...>) {
+      ((sums[kEntries[C].place] += ends[kEntries[C].order] * x[C]), ...);
+    }(std::make_index_sequence<kCount>());
+    for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
+  }
+
+  static void give(const double* ends, double scale, const double* face, double* out) {
+    std::array<double, countOnFace(P)> scaled;
+    for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
+    [&]<std::size_t... C>(std::index_sequence<C...>) {
+      ((out[C] += ends[kEntries[C].order] * scaled[kEntries[C].place]), ...);
+    }(std::make_index_sequence<kCount>());
+  }
+};
+
+/// The orthonormal polynomials at the lower and the upper end.
+const auto ends = [] {
+  std::array<std::array<double, kMaxDegree + 1>, 2> values{};
+  for (int i = 0; i <= kMaxDegree; ++i) {
+    values[1][i] = std::sqrt(2 * i + 1.0);
+    values[0][i] = i % 2 == 0 ? values[1][i] : -values[1][i];
+  }
+  return values;
+}();
+
+template <int P>
+void takeKnown(int axis, int side, const double* x, double* face) {
+  if (axis == 0) KnownTrace<P, 0>::take(ends[side].data(), x, face);
+  if (axis == 1) KnownTrace<P, 1>::take(ends[side].data(), x, face);
+  if (axis == 2) KnownTrace<P, 2>::take(ends[side].data(), x, face);
 }
 
-int halfOf(std::uint32_t along, int level) { return static_cast<int>(along >> level & 1); }
+template <int P>
+void giveKnown(int axis, int side, double scale, const double* face, double* out) {
+  if (axis == 0) KnownTrace<P, 0>::give(ends[side].data(), scale, face, out);
+  if (axis == 1) KnownTrace<P, 1>::give(ends[side].data(), scale, face, out);
+  if (axis == 2) KnownTrace<P, 2>::give(ends[side].data(), scale, face, out);
+}
+
+int quarterOf(const std::array<std::uint32_t, 2>& along, int level) {
+  return static_cast<int>((along[0] >> level & 1) | (along[1] >> level & 1) << 1);
+}
 
 }  // namespace
 
@@ -173,57 +247,80 @@ void FaceCoupling::fromUnknowns(std::span<const double> x, FieldData& field) con
   field.coefficients = std::move(coefficients);
 }
 
+/// A leaf's polynomial on its face across a link's axis, at the lower (0) or upper (1) end.
+void FaceCoupling::take(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const {
+  x += start_[leaf];
+  switch (degree_[leaf]) {
+    case 2:
+      return takeKnown<2>(link.axis, side, x, face);
+    case 3:
+      return takeKnown<3>(link.axis, side, x, face);
+    case 4:
+      return takeKnown<4>(link.axis, side, x, face);
+    case 5:
+      return takeKnown<5>(link.axis, side, x, face);
+  }
+  std::fill_n(face, countOnFace(degree_[leaf]), 0.0);
+  const Trace& trace = traces_[degree_[leaf]][link.axis];
+  for (std::size_t c = 0; c < trace.place.size(); ++c) face[trace.place[c]] += trace.factor[side][c] * x[c];
+}
+
+/// The other way: adds what acts on the face to the leaf.
+void FaceCoupling::give(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
+                        double* out) const {
+  out += start_[leaf];
+  switch (degree_[leaf]) {
+    case 2:
+      return giveKnown<2>(link.axis, side, scale, face, out);
+    case 3:
+      return giveKnown<3>(link.axis, side, scale, face, out);
+    case 4:
+      return giveKnown<4>(link.axis, side, scale, face, out);
+    case 5:
+      return giveKnown<5>(link.axis, side, scale, face, out);
+  }
+  const Trace& trace = traces_[degree_[leaf]][link.axis];
+  for (std::size_t c = 0; c < trace.place.size(); ++c) out[c] += scale * trace.factor[side][c] * face[trace.place[c]];
+}
+
 /// The jump across a link, times √(w_F·area/|Ω|), by the small face's polynomials: the small leaf's trace less the
 /// large one's, whose unknowns carry a greater volume's root.
-void FaceCoupling::differ(std::size_t n, std::span<const double> x) {
+void FaceCoupling::differ(std::size_t n, const double* x) {
   const Link& link = links_[n];
-  std::array<double, kMostOnFace> other;
-  const std::size_t count = countOnFace(degree_[link.large]);
-  std::fill_n(other.begin(), count, 0.0);
-  const Trace& ofLarge = trace(link, link.large);
-  const double* const large = &x[start_[link.large]];
-  const auto& factorLarge = ofLarge.factor[1 - link.side];
-  for (std::size_t c = 0; c < ofLarge.place.size(); ++c) other[ofLarge.place[c]] += factorLarge[c] * large[c];
+  std::array<double, kMostOnFace> large;
+  take(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
-    for (int along = 0; along < 2; ++along)
-      halving().restrict(other.data(), degree_[link.large], along, halfOf(link.along[along], level));
-
+    withDegree(degree_[link.large], [&](auto degree) {
+      halving.restrict(large.data(), degree, quarterOf(link.along, level));
+    });
   double* const difference = &differences_[differsAt_[n]];
-  std::fill(difference, &differences_[0] + differsAt_[n + 1], 0.0);
-  const Trace& ofSmall = trace(link, link.small);
-  const double* const small = &x[start_[link.small]];
-  const auto& factorSmall = ofSmall.factor[link.side];
-  for (std::size_t c = 0; c < ofSmall.place.size(); ++c) difference[ofSmall.place[c]] += factorSmall[c] * small[c];
+  const std::size_t ofSmall = countOnFace(degree_[link.small]), ofLarge = countOnFace(degree_[link.large]);
+  take(link, link.small, link.side, x, difference);
+  for (std::size_t c = ofSmall; c < ofLarge; ++c) difference[c] = 0;
   const double scale = scale_[link.levels] / scale_[0];
-  for (std::size_t c = 0; c < count; ++c) difference[c] -= scale * other[c];
+  for (std::size_t c = 0; c < ofLarge; ++c) difference[c] -= scale * large[c];
 }
 
 /// Adds what a link does to one of its leaves.
 void FaceCoupling::pull(std::uint32_t leaf, std::size_t n, double* out) const {
   const Link& link = links_[n];
   const double* face = &differences_[differsAt_[n]];
-  const Trace& own = trace(link, leaf);
-  if (leaf == link.small) {
-    const auto& factor = own.factor[link.side];
-    for (std::size_t c = 0; c < own.place.size(); ++c) out[c] += factor[c] * face[own.place[c]];
-    return;
-  }
+  if (leaf == link.small) return give(link, leaf, link.side, 1, face, out);
   std::array<double, kMostOnFace> whole;
   if (link.levels > 0) {
-    std::copy_n(face, countOnFace(degree_[leaf]), whole.begin());
+    for (std::size_t a = 0; a < countOnFace(degree_[leaf]); ++a) whole[a] = face[a];
     for (int level = 0; level < link.levels; ++level)
-      for (int along = 0; along < 2; ++along)
-        halving().transposed(whole.data(), degree_[leaf], along, halfOf(link.along[along], level));
+      withDegree(degree_[leaf], [&](auto degree) {
+        halving.transposed(whole.data(), degree, quarterOf(link.along, level));
+      });
     face = whole.data();
   }
-  const double scale = scale_[link.levels] / scale_[0];
-  const auto& factor = own.factor[1 - link.side];
-  for (std::size_t c = 0; c < own.place.size(); ++c) out[c] -= scale * factor[c] * face[own.place[c]];
+  give(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);
 }
 
 double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vector<double>& out) {
   tbb::parallel_for(std::size_t{0}, chunks(links_.size()), [&](std::size_t chunk) {
-    for (std::size_t n = chunk * kChunk; n < std::min(links_.size(), (chunk + 1) * kChunk); ++n) differ(n, x);
+    for (std::size_t n = chunk * kChunk; n < std::min(links_.size(), (chunk + 1) * kChunk); ++n) differ(n, x.data());
   });
   std::vector<double> sums(chunks(leaves_.size()));
   tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t chunk) {
@@ -231,7 +328,7 @@ double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vec
     for (std::size_t c = start_[first]; c < start_[last]; ++c) out[c] = weight * x[c];
     for (std::size_t leaf = first; leaf < last; ++leaf)
       for (std::size_t n = aroundAt_[leaf]; n < aroundAt_[leaf + 1]; ++n)
-        pull(static_cast<std::uint32_t>(leaf), around_[n], &out[start_[leaf]]);
+        pull(static_cast<std::uint32_t>(leaf), around_[n], out.data());
     for (std::size_t c = start_[first]; c < start_[last]; ++c) sums[chunk] += x[c] * out[c];
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
@@ -242,7 +339,7 @@ std::vector<double> FaceCoupling::diagonal() const {
   for (const Link& link : links_)
     for (const std::uint32_t leaf : {link.small, link.large}) {
       const double share = leaf == link.small ? 1 : std::ldexp(1.0, -3 * link.levels);
-      const auto& factor = trace(link, leaf).factor[0];
+      const auto& factor = traces_[degree_[leaf]][link.axis].factor[0];
       for (std::size_t c = 0; c < factor.size(); ++c) result[start_[leaf] + c] += share * factor[c] * factor[c];
     }
   return result;

@@ -53,8 +53,9 @@ class FaceCoupling {
 
   void linkLeaves(const FieldData& field);
   void collectAround();
-  const Trace& trace(const Link& link, std::uint32_t leaf) const { return traces_[degree_[leaf]][link.axis]; }
-  void differ(std::size_t link, std::span<const double> x);
+  void take(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const;
+  void give(const Link& link, std::uint32_t leaf, int side, double scale, const double* face, double* out) const;
+  void differ(std::size_t link, const double* x);
   void pull(std::uint32_t leaf, std::size_t link, double* out) const;
 
   std::vector<Leaf> leaves_;
