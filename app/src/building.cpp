@@ -67,10 +67,10 @@ void warnOfCutSurface(const Console& console, const Box& surface, const Box& dom
                 << (domain.intersects(surface) ? "part of the surface" : "the whole surface") << std::endl;
 }
 
-Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments) {
+Field construct(const Console& console, const DistanceFunction& distance, const Arguments& arguments,
+                const BuildOptions& options) {
   const Box domain = domainOf(arguments, distance.source().box);
   warnOfCutSurface(console, distance.source().box, domain);
-  const BuildOptions options = buildOptions(arguments);
   return withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); });
 }
 
@@ -118,8 +118,9 @@ std::shared_ptr<const DistanceFunction> distanceTo(const PreparedSurface& surfac
 Parameter continuityWeightParameter() {
   return {.name = "continuity-weight",
           .type = ParameterType::number,
-          .help = "λ of weak continuity: what a change of the field weighs against its jumps. Small for little jump, "
-                  "great for little error.",
+          .help =
+              "λ of weak continuity: what a change of the field weighs against its jumps. Small for little jump, "
+              "great for little error.",
           .defaultText = fmt::format("{}", WeakContinuity{}.weight),
           .minimum = 0,
           .minimumExcluded = true};
@@ -284,11 +285,18 @@ BuildOptions buildOptions(const Arguments& arguments) {
 }
 
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
+  return buildField(console, surface, arguments, [](BuildOptions&) {});
+}
+
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::function<void(BuildOptions&)>& adjust) {
   try {
+    BuildOptions options = buildOptions(arguments);
+    adjust(options);
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
     auto exact = distanceTo(prepared, arguments.whole("threads"));
-    Field field = construct(console, *exact, arguments);
+    Field field = construct(console, *exact, arguments, options);
     return {std::move(field), std::move(exact), prepared.report,
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
   } catch (const Error& error) {

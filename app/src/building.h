@@ -1,6 +1,7 @@
 #pragma once
 // From a mesh file or a shape's name to a field, as `build` and `report` do it.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,8 +30,11 @@ struct BuiltField {
   double seconds = 0;                             ///< of the construction, with the hierarchy over the triangles
 };
 
-/// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`.
+/// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`. The
+/// second takes the options of the arguments as `adjust` leaves them.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments);
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::function<void(BuildOptions&)>& adjust);
 
 /// Whether it names a shape rather than a file: builtin:… or analytic:…
 bool isShape(std::string_view surface);

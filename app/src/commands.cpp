@@ -16,6 +16,7 @@ Registry makeRegistry() {
   addUiCommand(registry);
   addViewCommand(registry);
   addReportCommand(registry);
+  addStudyCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);
   return registry;

@@ -97,14 +97,13 @@ void runSmooth(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const InterruptGuard guard;  // until the file is whole
   const auto start = std::chrono::steady_clock::now();
-  const std::string name = session.current().name;
   WeaklyContinuous made = withProgress(console, [&](const Progress& progress) {
     return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
                             arguments.whole("threads"), progress);
   });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  CurrentField smoothed{std::move(made.field), saves ? arguments.text("output") : name, {}, session.current().surface};
-  session.setField(std::move(smoothed));
+  const CurrentField& before = session.current();
+  session.changeField({std::move(made.field), saves ? arguments.text("output") : before.name, {}, before.surface});
   if (saves) saveCurrent(session, arguments.text("output"));
   if (session.wantsJson(arguments)) {
     Json json = fieldJson(session.current());
@@ -114,10 +113,10 @@ void runSmooth(Session& session, const Arguments& arguments) {
     json["output"] = saves ? Json(arguments.text("output")) : Json();
     return printJson(console.out, json);
   }
+  const Field& field = session.current().field;
   console.out << fmt::format("{}: changed by {} RMS in {} iterations, {:.1f} s; estimated RMS error {}{}\n",
                              session.current().name, shortNumber(made.change), made.iterations, seconds,
-                             shortNumber(session.current().field.metadata().rmsEstimate(session.current().field.domain())),
-                             unitText(session.current().field));
+                             shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
 }
 
 Command smoothCommand() {

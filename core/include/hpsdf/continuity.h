@@ -11,7 +11,7 @@ namespace hpsdf {
 /// a length both terms have one unit, and λ has none: the same λ trades alike at every size of cell and in any unit.
 struct WeakContinuity {
   /// λ, above 0: small for little jump, great for little change. See docs/accuracy-continuity.md.
-  double weight = 0.25;
+  double weight = 2.5;
   /// Of the conjugate gradients: residual at the end over the one at the start, 0 to 1. At the default the jumps and
   /// the change are those of the solution to three digits.
   double tolerance = 1e-3;

@@ -117,10 +117,9 @@ class Construction {
     metadata.totalError = totalError / std::pow(length_ / 2, 5);
     metadata.referenceLength = length_;
     metadata.nearness = options_.nearness;
-    metadata.maxDegree = options_.strategy == Strategy::hp
-                             ? options_.maxDegree
-                             : options_.enrich ? raisedDegree(startDegree(options_))
-                                               : startDegree(options_);
+    metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree
+                         : options_.enrich                 ? raisedDegree(startDegree(options_))
+                                                           : startDegree(options_);
     metadata.maxDepth = options_.maxDepth;
     metadata.quadrature = options_.quadrature;
     metadata.strategy = options_.strategy;

@@ -77,9 +77,8 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
 
 void keepAs(CoefficientType type, FieldData& field) {
   const double rounding = rmsOfRounding(field);
-  const bool single =
-      type == CoefficientType::float32 ||
-      (type == CoefficientType::automatic && rounding < 0.01 * field.metadata.rmsEstimate(field.domain));
+  const bool single = type == CoefficientType::float32 || (type == CoefficientType::automatic &&
+                                                           rounding < 0.01 * field.metadata.rmsEstimate(field.domain));
   field.metadata.roundingRms = single ? rounding : 0;
   if (single) toFloat(field);
 }

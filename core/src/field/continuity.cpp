@@ -21,14 +21,13 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;
 
-/// Calls f(first, last, sums) for chunks of fixed size, parallel, and adds up the sums: chunk by chunk, so that rounding
-/// does not depend on the number of threads.
+/// Calls f(first, last, sums) for chunks of fixed size, parallel, and adds up the sums: chunk by chunk, so that
+/// rounding does not depend on the number of threads.
 template <std::size_t Sums, typename F>
 std::array<double, Sums> chunked(std::size_t count, const F& f) {
   std::vector<std::array<double, Sums>> parts((count + kChunk - 1) / kChunk);
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
-    f(chunk * kChunk, std::min(count, (chunk + 1) * kChunk), parts[chunk]);
-  });
+  tbb::parallel_for(std::size_t{0}, parts.size(),
+                    [&](std::size_t chunk) { f(chunk * kChunk, std::min(count, (chunk + 1) * kChunk), parts[chunk]); });
   std::array<double, Sums> total{};
   for (const auto& part : parts)
     for (std::size_t s = 0; s < Sums; ++s) total[s] += part[s];

@@ -102,7 +102,8 @@ struct KnownTrace {
     std::array<double, countOnFace(P)> sums{};
     [&]<std::size_t... C>(std::index_sequence<C...>) {
       ((sums[kEntries[C].place] += ends[kEntries[C].order] * x[C]), ...);
-    }(std::make_index_sequence<kCount>());
+    }
+    (std::make_index_sequence<kCount>());
     for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
   }
 
@@ -111,7 +112,8 @@ struct KnownTrace {
     for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
     [&]<std::size_t... C>(std::index_sequence<C...>) {
       ((out[C] += ends[kEntries[C].order] * scaled[kEntries[C].place]), ...);
-    }(std::make_index_sequence<kCount>());
+    }
+    (std::make_index_sequence<kCount>());
   }
 };
 
@@ -191,8 +193,7 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
                     .side = static_cast<std::uint8_t>(step > 0)};
           const std::array<int, 2> axes{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
           for (int a = 0; a < 2; ++a)
-            link.along[a] =
-                static_cast<std::uint32_t>(small.place[axes[a]] - (large->place[axes[a]] << link.levels));
+            link.along[a] = static_cast<std::uint32_t>(small.place[axes[a]] - (large->place[axes[a]] << link.levels));
           found[chunk].push_back(link);
         }
   });
@@ -290,9 +291,8 @@ void FaceCoupling::differ(std::size_t n, const double* x) {
   std::array<double, kMostOnFace> large;
   take(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
-    withDegree(degree_[link.large], [&](auto degree) {
-      halving.restrict(large.data(), degree, quarterOf(link.along, level));
-    });
+    withDegree(degree_[link.large],
+               [&](auto degree) { halving.restrict(large.data(), degree, quarterOf(link.along, level)); });
   double* const difference = &differences_[differsAt_[n]];
   const std::size_t ofSmall = countOnFace(degree_[link.small]), ofLarge = countOnFace(degree_[link.large]);
   take(link, link.small, link.side, x, difference);
@@ -310,9 +310,8 @@ void FaceCoupling::pull(std::uint32_t leaf, std::size_t n, double* out) const {
   if (link.levels > 0) {
     for (std::size_t a = 0; a < countOnFace(degree_[leaf]); ++a) whole[a] = face[a];
     for (int level = 0; level < link.levels; ++level)
-      withDegree(degree_[leaf], [&](auto degree) {
-        halving.transposed(whole.data(), degree, quarterOf(link.along, level));
-      });
+      withDegree(degree_[leaf],
+                 [&](auto degree) { halving.transposed(whole.data(), degree, quarterOf(link.along, level)); });
     face = whole.data();
   }
   give(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);

@@ -59,13 +59,13 @@ class FaceCoupling {
   void pull(std::uint32_t leaf, std::size_t link, double* out) const;
 
   std::vector<Leaf> leaves_;
-  std::vector<std::uint8_t> degree_;   ///< by leaf
-  std::vector<std::size_t> start_;     ///< of a leaf's unknowns; one more at the end
-  std::vector<double> scale_;          ///< √(V/|Ω|), by depth
-  std::vector<Link> links_;            ///< in the order of their small leaves
-  std::vector<std::size_t> differsAt_; ///< where the difference across a link lies; one more at the end
-  std::vector<std::uint32_t> around_;  ///< links by leaf
-  std::vector<std::size_t> aroundAt_;  ///< where a leaf's begin; one more at the end
+  std::vector<std::uint8_t> degree_;    ///< by leaf
+  std::vector<std::size_t> start_;      ///< of a leaf's unknowns; one more at the end
+  std::vector<double> scale_;           ///< √(V/|Ω|), by depth
+  std::vector<Link> links_;             ///< in the order of their small leaves
+  std::vector<std::size_t> differsAt_;  ///< where the difference across a link lies; one more at the end
+  std::vector<std::uint32_t> around_;   ///< links by leaf
+  std::vector<std::size_t> aroundAt_;   ///< where a leaf's begin; one more at the end
   std::vector<double> differences_;
   std::array<std::array<Trace, 3>, kMaxDegree + 1> traces_;  ///< of the degrees that occur
 };
