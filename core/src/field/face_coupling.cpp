@@ -154,7 +154,8 @@ FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(leavesOf(field)) {
     start_.push_back(start_.back() + coefficientCount(degree_.back()));
   }
   if (start_.back() > 0xffffffffu)
-    throw Error("the field needs " + std::to_string(start_.back()) + " coefficients, more than 2^32; raise the target error");
+    throw Error("the field needs " + std::to_string(start_.back()) +
+                " coefficients, more than 2^32; raise the target error");
   const double baseCells = double(field.grid[0]) * field.grid[1] * field.grid[2];
   for (int depth = 0; depth <= kMaxDepth; ++depth) scale_.push_back(std::sqrt(std::ldexp(1.0, -3 * depth) / baseCells));
   for (const std::uint8_t degree : degree_) {
@@ -209,7 +210,8 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
 }
 
 void FaceCoupling::collectAround() {
-  if (links_.size() > 0xffffffffu) throw Error("the field has more than 2^32 faces between its cells; raise the target error");
+  if (links_.size() > 0xffffffffu)
+    throw Error("the field has more than 2^32 faces between its cells; raise the target error");
   aroundAt_.assign(leaves_.size() + 1, 0);
   for (const Link& link : links_) {
     ++aroundAt_[link.small + 1];
