@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
@@ -84,10 +85,6 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
   throw Error(surface + ": " + message);
 }
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// A surface as a field is made from it.
 struct PreparedSurface {
   std::optional<DistanceFunction> analytic;  ///< else the mesh
@@ -145,6 +142,17 @@ bool isMadeFrom(const Source& given, const Source& source) {
 std::string nameOf(const Source& source) { return source.name.empty() ? "unknown" : source.name; }
 
 }  // namespace
+
+Parameter continuityWeightParameter() {
+  return {.name = "continuity-weight",
+          .type = ParameterType::number,
+          .help =
+              "λ of weak continuity: what a change of the field weighs against its jumps. Small for little jump, "
+              "great for little error.",
+          .defaultText = fmt::format("{}", WeakContinuity{}.weight),
+          .minimum = 0,
+          .minimumExcluded = true};
+}
 
 std::vector<Parameter> buildParameters() {
   return {
@@ -295,6 +303,18 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "0",
        .unit = "world units",
        .minimum = 0},
+      {.name = "enrich",
+       .type = ParameterType::flag,
+       .help = "Fit every cell anew at the end, one degree higher where max-degree allows: about twice the bytes, with "
+               "which weak continuity costs hardly any error.",
+       .defaultText = "false"},
+      {.name = "continuity",
+       .type = ParameterType::choice,
+       .help = "weak lets the cells' polynomials give way to each other at the end, so that the field jumps less from "
+               "cell to cell for somewhat more error ('study continuity' shows the trade); none keeps their own fits.",
+       .defaultText = "none",
+       .choices = {"none", "weak"}},
+      continuityWeightParameter(),
       {.name = "threads",
        .type = ParameterType::wholeNumber,
        .help = "Threads to use; 0 for all. The field is the same whatever their number.",
@@ -348,6 +368,11 @@ BuildOptions buildOptions(const Arguments& arguments) {
                                               : CoefficientType::automatic;
   }
   options.band = arguments.number("band");
+  options.enrich = arguments.flag("enrich");
+  if (arguments.text("continuity") == "weak")
+    options.continuityWeight = arguments.number("continuity-weight");
+  else if (arguments.given("continuity-weight"))
+    throw Error("continuity-weight belongs to continuity weak: give that too, or leave it out");
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
   options.threads = arguments.whole("threads");
   return options;

@@ -17,6 +17,9 @@ namespace hpsdf::app {
 /// The parameters of a construction, shared by `build`, `report` and others.
 std::vector<Parameter> buildParameters();
 
+/// λ of weak continuity, for `build` and `smooth`.
+Parameter continuityWeightParameter();
+
 /// The options that such arguments ask for. --paper gives way to what is written beside it.
 BuildOptions buildOptions(const Arguments& arguments);
 

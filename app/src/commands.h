@@ -7,7 +7,7 @@ namespace hpsdf::app {
 /// All commands of the program.
 Registry makeRegistry();
 
-void addFieldCommands(Registry& registry);  ///< build, load, save, info, query
+void addFieldCommands(Registry& registry);  ///< build, smooth, load, save, info, query
 void addJumpsCommand(Registry& registry);
 void addVerifyCommand(Registry& registry);
 void addPictureCommands(Registry& registry);  ///< slice, render

@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <fstream>
 
 #include "building.h"
 #include "commands.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/output_file.h"
 #include "interrupt.h"
+#include "long_work.h"
 #include "point_query.h"
 #include "session.h"
 #include "summaries.h"
@@ -87,6 +90,64 @@ void runQuery(Session& session, const Arguments& arguments) {
   session.console().err << fmt::format("{}: {} points\n", arguments.text("output"), grouped(count));
 }
 
+void runSmooth(Session& session, const Arguments& arguments) {
+  const bool saves = arguments.has("output");
+  if (saves) checkWritable(arguments.text("output"));
+  useField(session, arguments);
+  const Console& console = session.console();
+  const InterruptGuard guard;  // until the file is whole
+  const auto start = std::chrono::steady_clock::now();
+  WeaklyContinuous made = withProgress(console, [&](const Progress& progress) {
+    return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
+                            arguments.whole("threads"), progress);
+  });
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const CurrentField& before = session.current();
+  session.changeField({std::move(made.field), saves ? arguments.text("output") : before.name, {}, before.surface});
+  if (saves) saveCurrent(session, arguments.text("output"));
+  if (session.wantsJson(arguments)) {
+    Json json = fieldJson(session.current());
+    json["change"] = made.change;
+    json["iterations"] = made.iterations;
+    json["seconds"] = seconds;
+    json["output"] = saves ? Json(arguments.text("output")) : Json();
+    return printJson(console.out, json);
+  }
+  const Field& field = session.current().field;
+  console.out << fmt::format("{}: changed by {} RMS in {} iterations, {:.1f} s; estimated RMS error {}{}\n",
+                             session.current().name, shortNumber(made.change), made.iterations, seconds,
+                             shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
+}
+
+Command smoothCommand() {
+  return {.name = "smooth",
+          .summary = "Let a field jump less from cell to cell, for a little error: weak continuity.",
+          .help =
+              "Changes the cells' polynomials so that Σ w ∫ jump² dA + λ‖f − f₀‖² becomes least: the sum goes over the "
+              "faces between cells, w is the smaller cell's edge across the face, f₀ the field as it was, λ the "
+              "weight, which has no unit. Cells, degrees and bytes stay as they are. What 'build --continuity weak' "
+              "does, for a field that is there; that rounds to float once, this a second time.\n"
+              "\n"
+              "The polynomials of cells have too few coefficients to meet along whole faces, so that this trades error "
+              "for jump; 'hpsdf study continuity' shows how. Bounds are not kept. A field can be smoothed once.",
+          .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
+                       "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
+          .parameters = {fieldParameter(),
+                         {.name = "output",
+                          .type = ParameterType::outputPath,
+                          .help = "The field's file, usually *.hpsdf.",
+                          .alias = 'o',
+                          .need = Need::onCommandLine},
+                         continuityWeightParameter(),
+                         {.name = "threads",
+                          .type = ParameterType::wholeNumber,
+                          .help = "Threads to use; 0 for all. The field is the same whatever their number.",
+                          .defaultText = "0",
+                          .minimum = 0,
+                          .maximum = 1024}},
+          .action = runSmooth};
+}
+
 Command buildCommand() {
   Command command{
       .name = "build",
@@ -147,6 +208,7 @@ void useField(Session& session, const Arguments& arguments) {
 
 void addFieldCommands(Registry& registry) {
   registry.add(buildCommand());
+  registry.add(smoothCommand());
   registry.add({.name = "info",
                 .summary = "Tell what a field holds and how exact it is.",
                 .help = "Leaves, coefficients, memory, errors, settings, the mesh it came from, and how its volume is "

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+
 #include "hpsdf/error.h"
 #include "hpsdf/progress.h"
 #include "interrupt.h"
@@ -33,6 +35,10 @@ auto withProgress(const Console& console, const Work& work) {
   auto result = work(progress);
   if (progress.cancelled()) throw Cancelled();  // asked for in the very last moment
   return result;
+}
+
+inline double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace hpsdf::app

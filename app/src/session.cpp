@@ -36,6 +36,14 @@ void Session::setField(CurrentField field) {
   if (explorer_) explorer_->fieldChanged();
 }
 
+void Session::changeField(CurrentField field) {
+  auto exact = std::move(exact_);
+  auto given = std::move(given_);
+  setField(std::move(field));
+  exact_ = std::move(exact);
+  given_ = std::move(given);
+}
+
 const CurrentField& Session::current() const {
   if (!field_) throw Error("there is no field yet; 'build MESH' or 'load FIELD' comes first");
   return *field_;

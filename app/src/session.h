@@ -80,6 +80,8 @@ class Session {
   int scriptDepth = 0;
 
   void setField(CurrentField field);
+  /// The current field in another form: what is known of its surface stays.
+  void changeField(CurrentField field);
   bool hasField() const { return field_ != nullptr; }
   /// Throws `Error` when there is none, saying how to get one.
   const CurrentField& current() const;

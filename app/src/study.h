@@ -20,6 +20,7 @@ struct Study {
 
 Study convergenceStudy();
 Study tableStudy();
+Study continuityStudy();
 
 /// Parameters of `build` that a study takes too, once for all meshes or once for each: all but these.
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);

@@ -14,7 +14,7 @@ namespace {
 
 /// All kinds; what a new one adds to the verb is said here alone.
 const std::vector<Study>& studies() {
-  static const std::vector<Study> list = {convergenceStudy(), tableStudy()};
+  static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy()};
   return list;
 }
 
@@ -143,7 +143,8 @@ void addStudyCommand(Registry& registry) {
       .help = help,
       .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
                    "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error "
-                   "1e-7 --grid 6 --grid 10"},
+                   "1e-7 --grid 6 --grid 10",
+                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
       .parameters = {{.name = "kind",
                       .type = ParameterType::choice,
                       .help = "What is studied.",

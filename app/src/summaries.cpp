@@ -202,6 +202,8 @@ Json fieldJson(const CurrentField& current) {
       {"max_depth", metadata.maxDepth},
       {"quadrature", metadata.quadrature},
       {"band", metadata.band},
+      {"enriched", metadata.enriched},
+      {"continuity_weight", metadata.continuityWeight > 0 ? Json(metadata.continuityWeight) : Json()},
       {"reference_length", metadata.referenceLength},
       {"normalization",
        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -266,6 +268,9 @@ std::string fieldText(const CurrentField& current) {
   if (metadata.maxError > 0)
     text += summaryRow("greatest error, asked",
                        fmt::format("{}, {}", shortNumber(metadata.measuredError), shortNumber(metadata.maxError)));
+  if (metadata.enriched) text += summaryRow("enriched", "every cell, by one degree at the end");
+  if (metadata.continuityWeight > 0)
+    text += summaryRow("continuity", fmt::format("weak, weight {}", shortNumber(metadata.continuityWeight)));
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);

@@ -391,6 +391,66 @@ TEST_F(Cli, infoTellsWhatTheFieldHolds) {
   EXPECT_THAT(text.out, HasSubstr("▇"));
 }
 
+TEST_F(Cli, smoothIsWhatBuildDoesWithWeakContinuity) {
+  const std::vector<std::string> build = {"build", "builtin:torus",  "--target-error",
+                                          "1e-4",  "--coefficients", "double"};
+  const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  ASSERT_EQ(run({with(build, {"-o", at("plain.hpsdf")})}).status, 0);
+  ASSERT_EQ(run({with(build, {"-o", at("weak.hpsdf"), "--continuity", "weak", "--continuity-weight", "0.7"})}).status,
+            0);
+  const Outcome smoothed =
+      run({{"smooth", at("plain.hpsdf"), "-o", at("smooth.hpsdf"), "--continuity-weight", "0.7", "--json"}});
+  ASSERT_EQ(smoothed.status, 0) << smoothed.err;
+  EXPECT_EQ(readFile(at("smooth.hpsdf")), readFile(at("weak.hpsdf")));
+  const Json json = Json::parse(smoothed.out);
+  EXPECT_EQ(json.at("continuity_weight"), 0.7);
+  EXPECT_GT(json.at("change"), 0);
+  EXPECT_GT(json.at("iterations"), 1);
+  EXPECT_LT(findJumps(load(at("smooth.hpsdf"))).value.rms, 0.5 * findJumps(load(at("plain.hpsdf"))).value.rms);
+  EXPECT_THAT(run({{"info", at("smooth.hpsdf")}}).out, HasSubstr("weak, weight 0.7"));
+  EXPECT_TRUE(Json::parse(run({{"info", at("plain.hpsdf"), "--json"}}).out).at("continuity_weight").is_null());
+  expectRefused({{"smooth", at("smooth.hpsdf"), "-o", at("twice.hpsdf")}}, "weakly continuous already");
+  expectRefused({{"smooth", at("plain.hpsdf"), "-o", at("plain.hpsdf")}}, "plain.hpsdf");
+}
+
+TEST_F(Cli, continuityIsStudied) {
+  const Outcome outcome = run({{"study", "continuity", "builtin:torus", "analytic:sphere", "--target-error", "1e-5",
+                                "--points", "20000", "--weights", "10,2.5,0.4", "-o", at("study"), "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json rows = Json::parse(outcome.out);
+  ASSERT_EQ(rows.size(), 16u) << "two meshes, with and without enrichment, three weights and none";
+  const auto figure = [&](std::size_t row, const char* name) { return rows[row].at(name).get<double>(); };
+  for (std::size_t first = 0; first < 16; first += 4)
+    for (std::size_t row = first + 1; row < first + 4; ++row) {  // each weight smaller than the one before
+      EXPECT_LT(figure(row, "jump_rms"), figure(row - 1, "jump_rms")) << row;
+      EXPECT_GT(figure(row, "rms"), figure(row - 1, "rms")) << row;
+      EXPECT_EQ(figure(row, "bytes"), figure(first, "bytes")) << row;
+    }
+  EXPECT_TRUE(rows[0].at("weight").is_null());
+  EXPECT_EQ(figure(0, "jump_rms_ratio"), 1);
+  EXPECT_FALSE(rows[2].at("enriched"));
+  EXPECT_EQ(figure(2, "weight"), 2.5);
+  EXPECT_LT(figure(2, "jump_rms_ratio"), 0.5);
+  EXPECT_LT(figure(2, "rms_ratio"), 1.5);
+  EXPECT_TRUE(rows[7].at("enriched"));
+  EXPECT_EQ(figure(7, "weight"), 0.4);
+  EXPECT_LT(figure(7, "jump_rms_ratio"), 0.12);
+  EXPECT_LT(figure(7, "rms_ratio"), 1.02);
+  EXPECT_LT(figure(7, "bytes_ratio"), 1.9);
+  const std::string table = readFile(at("study/continuity.csv"));
+  EXPECT_EQ(lineCount(table), 17u);
+  EXPECT_THAT(table, StartsWith("mesh,enriched,weight,jump_rms,"));
+  EXPECT_THAT(table, HasSubstr("\"analytic:sphere\",1,0.4,"));
+  EXPECT_EQ(Json::parse(readFile(at("study/continuity.json"))), rows);
+  const Outcome text =
+      run({{"study", "continuity", "analytic:sphere", "--points", "1000", "--weights", "1", "-o", at("text")}});
+  EXPECT_THAT(text.out, AllOf(HasSubstr("enriched"), HasSubstr("RMS jump")));
+  expectRefused({{"study", "continuity", "analytic:sphere", "--enrich", "-o", at("none")}}, "enrich");
+}
+
 TEST_F(Cli, jumpsAreReportedAndListed) {
   const Outcome outcome = run({{"jumps", field(), "--json", "--worst", "3", "-o", at("jumps.csv")}});
   ASSERT_EQ(outcome.status, 0) << outcome.err;

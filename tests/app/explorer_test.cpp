@@ -299,6 +299,20 @@ TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   EXPECT_FALSE(bench.session.current().field.singlePrecision());
 }
 
+TEST(Explorer, aRebuildKeepsContinuity) {
+  Bench bench;
+  bench.run("build analytic:torus target-error=1e-3 enrich=true continuity=weak continuity-weight=0.5");
+  const FieldData before = bench.session.current().field.data();
+  bench.run("rebuild");
+  const Field& again = bench.session.current().field;
+  EXPECT_EQ(again.data().coefficients, before.coefficients);
+  EXPECT_TRUE(again.metadata().enriched);
+  EXPECT_EQ(again.metadata().continuityWeight, 0.5);
+  bench.run("settings continuity=none enrich=false ; rebuild");
+  EXPECT_FALSE(bench.session.current().field.metadata().enriched);
+  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0);
+}
+
 TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
   Bench bench;
   const support::TemporaryDirectory folder;

@@ -13,6 +13,7 @@
 #include "commands.h"
 #include "help.h"
 #include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/render/picture.h"
 #include "pictures.h"
 #include "script.h"
@@ -67,9 +68,10 @@ TEST(Registry, everyCommandExplainsItself) {
 TEST(Registry, holdsTheNamesToKeep) {
   const Registry registry = makeRegistry();
   const std::vector<std::pair<std::string, std::vector<std::string>>> fixed = {
-      {"build",
-       {"target-error", "grid", "nearness", "max-degree", "max-depth", "domain", "margin", "normalize", "strategy",
-        "coefficients", "quadrature", "cubature", "band", "threads", "max-steps", "paper", "json"}},
+      {"build", {"target-error", "grid",     "nearness",     "max-degree", "max-depth",         "domain", "margin",
+                 "normalize",    "strategy", "coefficients", "quadrature", "cubature",          "band",   "threads",
+                 "max-steps",    "paper",    "enrich",       "continuity", "continuity-weight", "json"}},
+      {"smooth", {"output", "continuity-weight", "threads", "json"}},
       {"info", {"json"}},
       {"query", {"json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
@@ -119,6 +121,8 @@ void expectEqual(const BuildOptions& a, const BuildOptions& b) {
   EXPECT_EQ(a.trialSamples, b.trialSamples);
   EXPECT_EQ(a.band, b.band);
   EXPECT_EQ(a.maxSteps, b.maxSteps);
+  EXPECT_EQ(a.enrich, b.enrich);
+  EXPECT_EQ(a.continuityWeight, b.continuityWeight);
   EXPECT_EQ(a.coefficients, b.coefficients);
   EXPECT_EQ(a.threads, b.threads);
 }
@@ -159,6 +163,16 @@ TEST(BuildArguments, allAreRead) {
   EXPECT_EQ(options.cubature, CubatureKind::product);
   EXPECT_EQ(options.threads, 3);
   EXPECT_EQ(options.maxSteps, 0u);
+}
+
+TEST(BuildArguments, continuityIsRead) {
+  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none")).continuityWeight, std::nullopt);
+  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak")).continuityWeight, WeakContinuity{}.weight);
+  const BuildOptions options =
+      buildOptions(parse("build", "m.obj -o f --continuity weak --continuity-weight 7 --enrich"));
+  EXPECT_EQ(options.continuityWeight, 7);
+  EXPECT_TRUE(options.enrich);
+  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --continuity-weight 7")), Error);
 }
 
 TEST(Arguments, bothOriginsReadTheSame) {
@@ -225,6 +239,8 @@ TEST(Arguments, mistakesSayWhatWasExpected) {
       {"build", "m -o f --max-degree 0", "found '0'"},
       {"build", "m -o f --max-depth 21", "from 0 to 20"},
       {"build", "m -o f --quadrature 9", "from 2 to 8"},
+      {"build", "m -o f --continuity week", "did you mean 'weak'"},
+      {"smooth", "f -o g --continuity-weight 0", "above 0"},
       {"build", "m -o f --domain 1,2,3", "cube, box or 6 numbers with commas between them, found '1,2,3'"},
       {"build", "m -o f --domain cub", "did you mean 'cube'?"},
       {"build", "m -o f --strategy ph", "expected hp, h1 or h2, found 'ph'"},

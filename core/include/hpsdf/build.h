@@ -66,6 +66,10 @@ struct BuildOptions {
   /// The construction ends after so many steps, each of which raises one leaf's degree or splits one, if the target has
   /// not been reached before. 0: the base cells alone; nothing: no limit.
   std::optional<std::uint64_t> maxSteps = {};
+  bool enrich = false;  ///< at the end fits every leaf anew, one degree higher where `maxDegree` allows
+  /// λ of weak continuity (`continuity.h`), by which the leaves' fits give way to each other at the end, before they
+  /// are rounded; nothing: they stay as they are.
+  std::optional<double> continuityWeight = {};
   CoefficientType coefficients = CoefficientType::automatic;
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };

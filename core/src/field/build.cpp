@@ -19,6 +19,7 @@
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
 #include "field/prune.h"
+#include "field/weak_continuity.h"
 #include "field/worst_error.h"
 #include "hpsdf/error.h"
 #include "threads.h"
@@ -77,17 +78,22 @@ class Construction {
   }
 
   /// The field as it is now. The first takes a copy of the tree, the other the tree itself.
-  FieldData frozen(const Source& source) const { return finished(BuildTree(tree_), source); }
+  FieldData frozen(const Source& source) { return finished(BuildTree(tree_), source); }
   FieldData finish(const Source& source) { return finished(std::move(tree_), source); }
 
  private:
-  FieldData finished(BuildTree&& tree, const Source& source) const {
+  FieldData finished(BuildTree&& tree, const Source& source) {
+    const std::uint64_t before = fitter_.evaluations();
     if (options_.criterion == Criterion::optimal) prune(tree, nearness_, pruneLimits());
+    if (options_.enrich) enrich(tree);
     FieldMetadata known = metadata(source, sumOfErrors(tree));
-    const CoefficientType type = options_.maxBytes && options_.coefficients == CoefficientType::automatic
-                                     ? CoefficientType::float32
-                                     : options_.coefficients;
-    return freeze(std::move(tree), type, std::move(known));
+    FieldData field = layOut(std::move(tree), std::move(known));
+    if (options_.continuityWeight) makeWeaklyContinuous(field, {.weight = *options_.continuityWeight}, progress_);
+    keepAs(options_.maxBytes && options_.coefficients == CoefficientType::automatic ? CoefficientType::float32
+                                                                                    : options_.coefficients,
+           field);
+    ofFinishing_ += fitter_.evaluations() - before;
+    return field;
   }
 
   PruneLimits pruneLimits() const {
@@ -98,6 +104,26 @@ class Construction {
     limits.mostDegree = options_.maxDegree;
     if (options_.strategy != Strategy::hp) limits.leastDegree = limits.mostDegree = startDegree(options_);
     return limits;
+  }
+
+  int raisedDegree(int degree) const { return std::max(degree, std::min(degree + 1, options_.maxDegree)); }
+
+  /// Every leaf one degree higher, all of its coefficients from samples of its own.
+  void enrich(BuildTree& tree) const {
+    const auto raised = [&](const BuildNode& node) { return raisedDegree(node.fit.degree); };
+    std::size_t coefficients = 0;
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0) coefficients += coefficientCount(raised(node));
+    checkFitsMemory(tree.nodes.size(), coefficients);
+    for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
+      report("raising every degree", double(begin) / double(tree.nodes.size()));
+      tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
+        BuildNode& node = tree.nodes[n];
+        if (node.firstChild != 0 || node.fit.degree >= raised(node)) return;
+        node.fit = fitter_.fit(tree.boxOf(node), raised(node));
+        node.fit.spare = {};
+      });
+    }
   }
 
   FieldMetadata metadata(const Source& source, const ErrorTotals& totals) const {
@@ -113,13 +139,16 @@ class Construction {
     metadata.criterion = options_.criterion;
     metadata.maxError = options_.maxError;
     metadata.measuredError = measuredError_;
-    metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
+    metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree
+                         : options_.enrich                 ? raisedDegree(startDegree(options_))
+                                                           : startDegree(options_);
     metadata.maxDepth = options_.maxDepth;
     metadata.quadrature = options_.quadrature;
     metadata.strategy = options_.strategy;
     metadata.band = options_.band;
-    metadata.exactEvaluations = fitter_.evaluations();
+    metadata.exactEvaluations = fitter_.evaluations() - ofFinishing_;
     metadata.steps = steps_;
+    metadata.enriched = options_.enrich;
     return metadata;
   }
 
@@ -133,7 +162,7 @@ class Construction {
 
   static constexpr std::size_t kRound = 32;    // few enough to stay close to the paper's order, one cell at a time
   static constexpr std::size_t kResum = 1000;  // steps between exact sums of the total error (paper, sec. 3.6)
-  static constexpr std::size_t kBaseChunk = 4096;
+  static constexpr std::size_t kChunk = 4096;
   // How far beyond its goal a construction goes that then takes back what saved least. Bunny at τ=1e-6: 0.7 takes 1.3
   // times the distances for 0.49 times the coefficients, 0.5 takes 1.7 times for 0.48.
   static constexpr double kGrowth = 0.7;
@@ -151,9 +180,9 @@ class Construction {
                               static_cast<std::uint32_t>(n / options_.grid[0] / options_.grid[1])};
     }
     const int degree = startDegree(options_);
-    for (std::size_t begin = 0; begin < count; begin += kBaseChunk) {
+    for (std::size_t begin = 0; begin < count; begin += kChunk) {
       report("fitting base cells", double(begin) / double(count));
-      tbb::parallel_for(begin, std::min(begin + kBaseChunk, count),
+      tbb::parallel_for(begin, std::min(begin + kChunk, count),
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
     }
     coefficients_ = count * std::size_t(coefficientCount(degree));
@@ -440,6 +469,7 @@ class Construction {
   bool full_ = false;                 ///< no more bytes may be taken
   std::size_t coefficients_ = 0;      ///< of all leaves
   std::uint64_t steps_ = 0;
+  std::uint64_t ofFinishing_ = 0;  ///< calls of Φ for fields that were handed out on the way
   ProgressEstimate estimate_;
 };
 

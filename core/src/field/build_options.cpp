@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 
+#include "field/weak_continuity.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -66,6 +67,8 @@ void checkEnds(const BuildOptions& options) {
       !options.maxSteps)
     refuse(
         "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
+  if (options.maxError > 0 && (options.continuityWeight || options.enrich))
+    refuse("a maximum error does not outlive weak continuity or one degree more: leave out one of them");
   if (options.criterion != Criterion::optimal) return;
   if (options.trialSamples == TrialSamples::own)
     refuse("the optimal criterion needs trials by the children's samples: leave out the paper's settings");
@@ -113,6 +116,7 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
     refuse("quadrature ", options.quadrature, ": expected an order of 2 to 8 times the degree");
   if (!(options.band >= 0) || !std::isfinite(options.band))
     refuse("band ", options.band, ": expected a width of at least 0");
+  if (options.continuityWeight) checkWeakContinuity({.weight = *options.continuityWeight});
   if (options.threads < 0) refuse("threads ", options.threads, ": expected 0 (all) or more");
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))

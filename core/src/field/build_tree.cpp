@@ -4,23 +4,10 @@
 #include <string>
 #include <utility>
 
-#include "basis/projection.h"
+#include "field/float_coefficients.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
-namespace {
-
-/// Squared L2 norm of the change that rounding to float makes to one cell, over the cell's volume.
-double squaredRounding(std::span<const double> coefficients, int degree) {
-  double sum = 0;
-  forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-    const double change = coefficients[index] - double(float(coefficients[index]));
-    sum += change * change * squaredNorm(i, j, k);
-  });
-  return sum;
-}
-
-}  // namespace
 
 Box BuildTree::boxOf(const BuildNode& node) const {
   const double scale = std::ldexp(1.0, -int(node.depth));
@@ -47,7 +34,7 @@ void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own
   }
 }
 
-FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata) {
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
   FieldData data;
   data.domain = tree.domain;
   data.grid = tree.grid;
@@ -61,7 +48,6 @@ FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata)
   coefficients.reserve(total);
 
   const std::size_t baseCells = tree.baseCells();
-  double rounding = 0;
   auto nextGroup = static_cast<std::uint32_t>(baseCells);
   struct Pair {
     std::uint32_t from, to;
@@ -75,7 +61,6 @@ FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata)
       BuildNode& node = tree.nodes[at.from];
       if (node.firstChild == 0) {
         data.nodes[at.to] = node::leaf(node.fit.degree, static_cast<std::uint32_t>(coefficients.size()));
-        rounding += squaredRounding(node.fit.coefficients, node.fit.degree) * tree.boxOf(node).sizes().prod();
         coefficients.insert(coefficients.end(), node.fit.coefficients.begin(), node.fit.coefficients.end());
         node.fit = Fit{};
         continue;
@@ -86,20 +71,17 @@ FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata)
     }
   }
 
-  const double roundingRms = std::sqrt(rounding / tree.domain.sizes().prod());
-  const bool single = type == CoefficientType::float32 ||
-                      (type == CoefficientType::automatic && roundingRms < 0.01 * metadata.rmsEstimate(tree.domain));
-  if (single) {
-    metadata.roundingRms = roundingRms;
-    std::vector<float> rounded(coefficients.size());
-    for (std::size_t i = 0; i < coefficients.size(); ++i) rounded[i] = static_cast<float>(coefficients[i]);
-    data.coefficients = std::move(rounded);
-  } else {
-    metadata.roundingRms = 0;
-    data.coefficients = std::move(coefficients);
-  }
+  data.coefficients = std::move(coefficients);
   data.metadata = std::move(metadata);
   return data;
+}
+
+void keepAs(CoefficientType type, FieldData& field) {
+  const double rounding = rmsOfRounding(field);
+  const bool single = type == CoefficientType::float32 || (type == CoefficientType::automatic &&
+                                                           rounding < 0.01 * field.metadata.rmsEstimate(field.domain));
+  field.metadata.roundingRms = single ? rounding : 0;
+  if (single) toFloat(field);
 }
 
 }  // namespace hpsdf

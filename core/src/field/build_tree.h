@@ -30,8 +30,11 @@ struct BuildTree {
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 
-/// Lays nodes and coefficients out depth first, so that neighbours in space are neighbours in memory, and rounds the
-/// coefficients as asked. Completes `metadata` (roundingRms). Takes the tree apart.
-FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata);
+/// Lays nodes and coefficients, which stay in double, out depth first, so that neighbours in space are neighbours in
+/// memory. Takes the tree apart.
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata);
+
+/// Rounds the coefficients, which are in double, as asked, and completes the metadata (roundingRms).
+void keepAs(CoefficientType type, FieldData& field);
 
 }  // namespace hpsdf

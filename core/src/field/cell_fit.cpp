@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "field/nearness.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {

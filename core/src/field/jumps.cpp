@@ -6,54 +6,17 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
-#include <optional>
 #include <span>
 #include <variant>
 
 #include "basis/legendre.h"
 #include "field/evaluate.h"
-#include "field/visit_nodes.h"
+#include "field/leaves.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
 namespace hpsdf {
 namespace {
-
-/// A leaf and its place, in cells of its depth counted from the domain's lower corner.
-struct Leaf {
-  std::uint32_t node;
-  int depth;
-  std::array<std::int64_t, 3> place;
-};
-
-std::vector<Leaf> leavesOf(const FieldData& field) {
-  std::vector<Leaf> leaves;
-  visitNodes(field, [&](const Visited& at) {
-    if (!node::isLeaf(field.nodes[at.node])) return true;
-    Leaf& leaf = leaves.emplace_back(Leaf{at.node, at.depth, {}});
-    for (int axis = 0; axis < 3; ++axis) leaf.place[axis] = (std::int64_t{at.base[axis]} << at.depth) + at.path[axis];
-    return true;
-  });
-  return leaves;
-}
-
-/// The leaf of the same size or a larger one across a leaf's face; none where smaller ones lie there, or nothing.
-std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step) {
-  auto place = leaf.place;
-  place[axis] += step;
-  if (place[axis] < 0 || place[axis] >= std::int64_t{field.grid[axis]} << leaf.depth) return {};
-  const auto base = [&](int a) { return place[a] >> leaf.depth; };
-  Leaf beside{static_cast<std::uint32_t>((base(2) * field.grid[1] + base(1)) * field.grid[0] + base(0)), 0, {}};
-  for (; !node::isLeaf(field.nodes[beside.node]); ++beside.depth) {
-    if (beside.depth == leaf.depth) return {};
-    const auto half = [&](int a) {
-      return static_cast<std::uint32_t>(place[a] >> (leaf.depth - beside.depth - 1)) & 1;
-    };
-    beside.node = node::firstChild(field.nodes[beside.node]) + half(0) + 2 * half(1) + 4 * half(2);
-  }
-  for (int a = 0; a < 3; ++a) beside.place[a] = place[a] >> (leaf.depth - beside.depth);
-  return beside;
-}
 
 /// Where a face is sampled along either of its sides, in [-1, 1]: the points of a Gauss rule and, with weight 0, the
 /// ends, so that the product of two such holds inner points, edges and corners.

@@ -1,0 +1,39 @@
+#pragma once
+// Fields that jump less where their leaves meet.
+
+#include "hpsdf/field.h"
+#include "hpsdf/progress.h"
+
+namespace hpsdf {
+
+/// Settings of weak continuity, which makes Σ_F w_F ∫_F jump² dA + λ‖f − f₀‖² least (Koschier et al. 2017): F the
+/// interfaces, w_F the smaller cell's edge across F, ‖·‖ the L2 norm over the domain, f₀ the leaves' own fits. With w_F
+/// a length both terms have one unit, and λ has none: the same λ trades alike at every size of cell and in any unit.
+struct WeakContinuity {
+  /// λ, above 0: small for little jump, great for little change. See docs/accuracy-continuity.md.
+  double weight = 2.5;
+  /// Of the conjugate gradients: residual at the end over the one at the start, 0 to 1. At the default the jumps and
+  /// the change are those of the solution to three digits.
+  double tolerance = 1e-3;
+  int maxIterations = 5000;  ///< 1 or more
+};
+
+/// A field after the post-process, and what it took.
+struct WeaklyContinuous {
+  Field field;
+  int iterations = 0;
+  double residual = 0;  ///< reached, over the one at the start
+  double change = 0;    ///< √(‖f − f₀‖²/|Ω|): f₀ being a projection, error² = error₀² + change²
+};
+
+/// The field whose jumps and whose change are least together. It has the same leaves, degrees and bytes; the result
+/// does not depend on `threads` (0: all that the machine offers). Coefficients in float are taken to double and
+/// rounded again at the end. Metadata: λ is noted, ε grows by the change as nearness weighs it, the rounding by the
+/// second one. Bounds are left out: they would have to be found anew.
+///
+/// Throws `Error` for settings out of range, for a field that is weakly continuous already (f₀ is lost), and where
+/// `maxIterations` do not reach the tolerance; `Cancelled` when asked to stop.
+WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& options = {}, int threads = 0,
+                                  const Progress& progress = {});
+
+}  // namespace hpsdf

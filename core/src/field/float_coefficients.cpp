@@ -1,0 +1,44 @@
+#include "field/float_coefficients.h"
+
+#include <cmath>
+
+#include "basis/projection.h"
+#include "field/evaluate.h"
+#include "field/visit_nodes.h"
+
+namespace hpsdf {
+namespace {
+
+template <typename To, typename From>
+void convert(FieldData& field) {
+  const auto* from = std::get_if<std::vector<From>>(&field.coefficients);
+  if (from == nullptr) return;
+  std::vector<To> to(from->size());
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] = static_cast<To>((*from)[i]);
+  field.coefficients = std::move(to);
+}
+
+}  // namespace
+
+double rmsOfRounding(const FieldData& field) {
+  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  double sum = 0;
+  visitNodes(field, [&](const Visited& at) {
+    const std::uint64_t bits = field.nodes[at.node];
+    if (!node::isLeaf(bits)) return true;
+    const double* c = &coefficients[node::offset(bits)];
+    double ofCell = 0;
+    forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
+      const double change = c[index] - double(float(c[index]));
+      ofCell += change * change * squaredNorm(i, j, k);
+    });
+    sum += ofCell * cellSize(field, at.depth).prod();
+    return true;
+  });
+  return std::sqrt(sum / field.domain.sizes().prod());
+}
+
+void toFloat(FieldData& field) { convert<float, double>(field); }
+void toDouble(FieldData& field) { convert<double, float>(field); }
+
+}  // namespace hpsdf

@@ -1,0 +1,26 @@
+#pragma once
+// The leaves of a field by their places, and who lies beside whom.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "hpsdf/field.h"
+
+namespace hpsdf {
+
+/// A leaf and its place, in cells of its depth counted from the domain's lower corner.
+struct Leaf {
+  std::uint32_t node;
+  int depth;
+  std::array<std::int64_t, 3> place;
+};
+
+/// In the order of the octree.
+std::vector<Leaf> leavesOf(const FieldData& field);
+
+/// The leaf of the same size or a larger one across a leaf's face; none where smaller ones lie there, or nothing.
+std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step);
+
+}  // namespace hpsdf
