@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 
+#include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
@@ -70,7 +71,9 @@ Field construct(const Console& console, const DistanceFunction& distance, const 
   const Box domain = domainOf(arguments, distance.source().box);
   warnOfCutSurface(console, distance.source().box, domain);
   const BuildOptions options = buildOptions(arguments);
-  return withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); });
+  return madeContinuous(
+      withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); }),
+      arguments);
 }
 
 /// Errors of the construction speak of options; the user thinks of the mesh.
@@ -209,6 +212,13 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "0",
        .unit = "world units",
        .minimum = 0},
+      {.name = "continuity",
+       .type = ParameterType::choice,
+       .help = "What is done about the jumps from cell to cell. exact: value and gradient are continuous everywhere, "
+               "neighbours being blended in a thin zone along their faces; queries take up to twice as long.",
+       .defaultText = "none",
+       .choices = {"none", "exact"}},
+      blendWidthParameter("blend-width"),
       {.name = "threads",
        .type = ParameterType::wholeNumber,
        .help = "Threads to use; 0 for all. The field is the same whatever their number.",
@@ -223,6 +233,23 @@ std::vector<Parameter> buildParameters() {
            "beside it win.",
        .defaultText = "false"},
   };
+}
+
+Parameter blendWidthParameter(std::string name) {
+  return {.name = std::move(name),
+          .type = ParameterType::number,
+          .help =
+              "How wide the blended zones are on either side of a face, as a part of a cell's edges: the wider, the "
+              "gentler the gradients, and the slower the queries.",
+          .defaultText = fmt::format("{}", kDefaultBlend),
+          .minimum = 0,
+          .maximum = kMaxBlend,
+          .minimumExcluded = true};
+}
+
+Field madeContinuous(Field field, const Arguments& arguments) {
+  if (arguments.text("continuity") == "none") return field;
+  return blended(field, arguments.number("blend-width"));
 }
 
 BuildOptions buildOptions(const Arguments& arguments) {

@@ -19,6 +19,12 @@ std::vector<Parameter> buildParameters();
 /// The options that such arguments ask for. --paper gives way to what is written beside it.
 BuildOptions buildOptions(const Arguments& arguments);
 
+/// The width of blended zones.
+Parameter blendWidthParameter(std::string name);
+
+/// A field as the construction left it, with the continuity that such arguments ask for.
+Field madeContinuous(Field field, const Arguments& arguments);
+
 struct BuiltField {
   Field field;
   std::shared_ptr<const DistanceFunction> exact;  ///< what it was made from

@@ -211,7 +211,7 @@ void runFrames(Session& session, const Registry& looks, const Arguments& argumen
     buildStages(*exact, finished.domain(), buildOptions(arguments), std::span(steps).first(steps.size() - 1),
                 [&](Field field) {
                   step(progress, film.frames(), steps.size());
-                  addStage(std::move(field));
+                  addStage(madeContinuous(std::move(field), arguments));
                 },
                 {.report = {}, .cancelled = progress.cancelled});
     rows.push_back(frameRow(finished));

@@ -182,6 +182,8 @@ Json fieldJson(const CurrentField& current) {
       {"max_depth", metadata.maxDepth},
       {"quadrature", metadata.quadrature},
       {"band", metadata.band},
+      {"continuity", field.data().blend > 0 ? "exact" : "none"},
+      {"blend", field.data().blend},
       {"reference_length", metadata.referenceLength},
       {"normalization",
        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -241,6 +243,8 @@ std::string fieldText(const CurrentField& current) {
                                  strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
                                  metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
+  if (const double width = field.data().blend; width > 0)
+    text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

@@ -122,6 +122,10 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
       {"quadrature", fmt::format("{}", made.quadrature)},
       {"band", fmt::format("{}", made.band)}};
   if (!field.singlePrecision()) settings["coefficients"] = "double";
+  if (const double width = field.data().blend; width > 0) {
+    settings["continuity"] = "exact";
+    settings["blend-width"] = fmt::format("{}", width);
+  }
   const auto mesh = settings_.find("mesh");
   if (mesh != settings_.end() && mesh->second != current.madeFrom()) return settings;
   settings["domain"] = corner(field.domain().min()) + "," + corner(field.domain().max());
