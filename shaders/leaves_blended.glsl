@@ -23,10 +23,10 @@ void candidates(ivec3 place, int depth, vec3 fraction, int level, out ivec3 firs
   if (level <= depth) {
     int up = depth - level;
     cell = place >> up;
-    within = (vec3(place - (cell << up)) + fraction) * exp2(float(-up));
+    within = (vec3(place - (cell << up)) + fraction) * ldexp(1.0, -up);
   } else {
     int down = level - depth;
-    within = fraction * exp2(float(down));
+    within = fraction * ldexp(1.0, down);
     ivec3 whole = ivec3(floor(within));
     cell = (place << down) + whole;
     within -= vec3(whole);
@@ -84,7 +84,7 @@ void rampsOf(uint reach, int depth, vec3 local, out vec3 value, out vec3 slope) 
   for (int axis = 0; axis < 3; ++axis) {
     bool upper = local[axis] > 0.0;
     uint deepest = reach >> (10 * axis + (upper ? 5 : 0)) & kWall;
-    float scale = 0.5 * exp2(float(int(deepest) - depth)) / blend;
+    float scale = 0.5 * ldexp(1.0, int(deepest) - depth) / blend;
     float t = deepest == kWall ? 1.0 : clamp((1.0 - abs(local[axis])) * scale, -1.0, 1.0);
     value[axis] = 0.5 + t * (0.75 - 0.25 * t * t);
     slope[axis] = (upper ? -0.75 : 0.75) * (1.0 - t * t) * scale;
@@ -104,8 +104,8 @@ Reaching leavesNear(Node leaf, uint depth, uvec3 place, vec3 local) {
 vec3 localIn(ivec4 other, ivec3 place, int depth, vec3 local) {
   vec3 fraction = 0.5 * local + 0.5;
   int down = other.w - depth;
-  vec3 within = down >= 0 ? fraction * exp2(float(down)) + vec3((place << down) - other.xyz)
-                          : (vec3(place - (other.xyz << -down)) + fraction) * exp2(float(down));
+  vec3 within = down >= 0 ? fraction * ldexp(1.0, down) + vec3((place << down) - other.xyz)
+                          : (vec3(place - (other.xyz << -down)) + fraction) * ldexp(1.0, down);
   return 2.0 * within - 1.0;
 }
 
@@ -137,7 +137,7 @@ vec4 fieldWithGradient(Node leaf, uint depth, uvec3 place, vec3 local) {
     ivec4 other = near.placeDepth[i];
     vec3 there = other.w == int(depth) && other.xyz == ivec3(place) ? local
                                                                      : localIn(other, ivec3(place), int(depth), local);
-    float steps = exp2(float(other.w - int(depth)));  // of the other's local coordinates a step of this leaf's
+    float steps = ldexp(1.0, other.w - int(depth));  // of the other's local coordinates a step of this leaf's
     vec3 ramps, slopes;
     rampsOf(texelFetch(zones, 2 * int(near.index[i])).x, other.w, there, ramps, slopes);
     vec4 weight = vec4(steps * slopes * ramps.yzx * ramps.zxy, ramps.x * ramps.y * ramps.z);

@@ -17,7 +17,7 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 72;
+constexpr int kWidth = 64, kHeight = 48;
 
 Field jumping(unsigned seed, double roughness = 0.3) {
   return randomField(seed, {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)),
@@ -116,7 +116,7 @@ TEST(Blended, TheOraclesSlicesAreWhatTheFieldAnswers) {
         changed += std::abs(field.value(point) - smooth.value(point)) > 1e-3;
       }
     }
-    EXPECT_GT(changed, 1000u);
+    EXPECT_GT(changed, 300u);
   }
 }
 
@@ -127,7 +127,7 @@ TEST(Blended, TheOracleFindsTheFirstCrossing) {
     std::size_t seen = 0;
     for (const SurfaceView& view : views(smooth)) {
       const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
-      for (std::size_t i = 0; i < buffers.cell.size(); i += 5) {
+      for (std::size_t i = 0; i < buffers.cell.size(); i += 11) {
         if (!buffers.hit(i)) continue;
         ++seen;
         const int x = int(i % kWidth), y = int(i / kWidth);
@@ -139,7 +139,7 @@ TEST(Blended, TheOracleFindsTheFirstCrossing) {
           ASSERT_GT(hit.gradient.normalized().dot(buffers.normal[i].cast<double>()), 0.999);
         }
         double side = 0;
-        for (double t = 0; t < buffers.distance[i] - 1e-4; t += 2e-3) {
+        for (double t = 0; t < buffers.distance[i] - 1e-4; t += 5e-3) {
           const Vector3 point = start + t * ray;
           if (!smooth.domain().contains(point)) continue;
           const double height = smooth.value(point) - view.offset;
@@ -148,13 +148,13 @@ TEST(Blended, TheOracleFindsTheFirstCrossing) {
         }
       }
     }
-    EXPECT_GT(seen, 500u);
+    EXPECT_GT(seen, 200u);
   }
 }
 
 TEST(Blended, OpenGlDrawsWhatTheOracleDoes) {
   HPSDF_REQUIRE_GL();
-  for (const unsigned seed : {8u, 9u})
+  for (const unsigned seed : {8u})
     for (const double width : {kDefaultBlend, 0.25}) {
       const Field smooth = blended(jumping(seed), width);
       const auto cpu = makeCpuRenderer(smooth), gl = makeGlRenderer(smooth, GlChoice::software);

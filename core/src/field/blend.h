@@ -93,30 +93,33 @@ struct Candidates {
   }
 };
 
-/// Calls visit(leaf) for every leaf that may reach a point of the domain, each once, in an order that depends on the
-/// point alone. Level by level: a child comes no closer to a point than its parent does, measured in their own edges,
-/// so that at each depth there are eight nodes at most to go on from.
+/// Calls visit(leaf) for every leaf that may reach a point of the domain, each once. Level by level: a child comes no
+/// closer to a point than its parent does, measured in their own edges, so that at each depth there are eight nodes at
+/// most to go on from. `ownDepth` is that of the point's own leaf: where that is larger than the directory's entries,
+/// others of its size reach farther than an entry's edge tells, and the way starts at the base cells.
 template <typename Visit>
 void visitReaching(const FieldData& field, const Directory& directory, const std::array<double, 3>& coordinates,
-                   Visit&& visit) {
-  int depth = directory.depth;
+                   int ownDepth, Visit&& visit) {
+  const bool byDirectory = ownDepth >= directory.depth;
+  int depth = byDirectory ? directory.depth : 0;
   Candidates cells(directory.frame, coordinates, depth, field.blend);
   std::array<std::uint64_t, 8> open;  // internal nodes' bits by their number among the candidates; 0: none
   bool any = false;
   cells.forEach([&](int number, const std::array<std::int64_t, 3>& place) {
-    const std::int64_t entry = place[2] * directory.slab + place[1] * directory.row + place[0];
-    const std::uint64_t bits = directory.entries[entry];
+    const std::int64_t entry = byDirectory ? place[2] * directory.slab + place[1] * directory.row + place[0]
+                                           : (place[2] * field.grid[1] + place[1]) * field.grid[0] + place[0];
+    const std::uint64_t bits = byDirectory ? directory.entries[entry] : field.nodes[entry];
     open[number] = node::isLeaf(bits) ? 0 : bits;
     any |= open[number] != 0;
     if (open[number] != 0) return;
-    const int above = depth - Directory::depthOf(bits);
+    const int above = byDirectory ? depth - Directory::depthOf(bits) : 0;
     std::array<std::int64_t, 3> ofLeaf;
     for (int axis = 0; axis < 3; ++axis) {
       ofLeaf[axis] = place[axis] >> above;
       // a leaf that covers several entries is that of the first
       if (place[axis] > cells.first[axis] && ofLeaf[axis] << above != place[axis]) return;
     }
-    visit(leafWithin(bits, depth - above, field.nodes.size() + entry, ofLeaf, coordinates));
+    visit(leafWithin(bits, depth - above, (byDirectory ? field.nodes.size() : 0) + entry, ofLeaf, coordinates));
   });
   while (any) {
     ++depth;
@@ -194,12 +197,12 @@ Answer answerOf(const FieldData& field, const GridFrame& frame, const FoundLeaf&
   return result;
 }
 
-/// At a point of the domain, in grid coordinates.
+/// At a point of the domain, in grid coordinates, of a leaf of this depth.
 template <typename Answer>
-Answer mixed(const FieldData& field, const Directory& directory, const std::array<double, 3>& coordinates) {
+Answer mixed(const FieldData& field, const Directory& directory, const std::array<double, 3>& coordinates, int depth) {
   const GridFrame& frame = directory.frame;
   Mixture<Answer> mixture;
-  visitReaching(field, directory, coordinates, [&](const FoundLeaf& leaf) {
+  visitReaching(field, directory, coordinates, depth, [&](const FoundLeaf& leaf) {
     std::array<Ramp, 3> ramps;
     for (int axis = 0; axis < 3; ++axis) {
       ramps[axis] = rampAlong(frame, leaf, axis, directory.reaches[leaf.number], field.blend);
@@ -214,7 +217,7 @@ Answer mixed(const FieldData& field, const Directory& directory, const std::arra
 template <typename Answer>
 Answer blendedWithin(const FieldData& field, const Directory& directory, const std::array<double, 3>& coordinates,
                      const FoundLeaf& leaf, unsigned near) {
-  if (!std::has_single_bit(near)) return mixed<Answer>(field, directory, coordinates);
+  if (!std::has_single_bit(near)) return mixed<Answer>(field, directory, coordinates, leaf.depth);
   const GridFrame& frame = directory.frame;
   const int axis = std::countr_zero(near);
   GridPoint across{coordinates, {}, 0};
@@ -225,7 +228,7 @@ Answer blendedWithin(const FieldData& field, const Directory& directory, const s
   }
   if (across.fixed[axis] < 0 || across.fixed[axis] > frame.last[axis]) return answerOf<Answer>(field, frame, leaf);
   const FoundLeaf other = find(field, directory, across);
-  if (!noThird(field, other.local, axis)) return mixed<Answer>(field, directory, coordinates);
+  if (!noThird(field, other.local, axis)) return mixed<Answer>(field, directory, coordinates, leaf.depth);
   const auto ramp = [&](const FoundLeaf& of) {
     return rampAlong(frame, of, axis, directory.reaches[of.number], field.blend);
   };

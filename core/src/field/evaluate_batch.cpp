@@ -296,7 +296,8 @@ void blend(const FieldData& field, const Directory& directory, const T* coeffici
   const GridFrame& frame = directory.frame;
   const auto mixAt = [&](std::size_t i) {
     out[i] =
-        mixed<Answer>(field, directory, {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]});
+        mixed<Answer>(field, directory, {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]},
+                      Directory::depthOf(batch.bits[i]));
   };
   std::uint8_t points[kBatch], near[kBatch];
   std::size_t count = 0;
