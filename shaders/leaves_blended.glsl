@@ -6,7 +6,7 @@ layout(location = 18) uniform float blend;
 const uint kWall = 31u;
 const int kDeepest = 20;
 
-// The leaves that may reach a point. Which cells are near it at each depth is told by whole numbers and the fraction
+// The leaves that reach a point. Which cells are near it at each depth is told by whole numbers and the fraction
 // within its own leaf, so that single precision is enough.
 struct Reaching {
   int count;
@@ -36,7 +36,29 @@ void candidates(ivec3 place, int depth, vec3 fraction, int level, out ivec3 firs
   more = clamp(cell + ivec3(greaterThan(within, vec3(1.0 - blend))), ivec3(0), last) - first;
 }
 
-Reaching reaching(ivec3 place, int depth, vec3 fraction) {
+// In the leaf's local coordinates, from which `steps` takes gradients to those of the point's own leaf.
+void rampsOf(uint reach, int depth, vec3 local, out vec3 value, out vec3 slope) {
+  for (int axis = 0; axis < 3; ++axis) {
+    bool upper = local[axis] > 0.0;
+    uint deepest = reach >> (10 * axis + (upper ? 5 : 0)) & kWall;
+    float scale = 0.5 * ldexp(1.0, int(deepest) - depth) / blend;
+    float t = deepest == kWall ? 1.0 : clamp((1.0 - abs(local[axis])) * scale, -1.0, 1.0);
+    value[axis] = 0.5 + t * (0.75 - 0.25 * t * t);
+    slope[axis] = (upper ? -0.75 : 0.75) * (1.0 - t * t) * scale;
+  }
+}
+
+// The point's local coordinates in another leaf.
+vec3 localIn(ivec4 other, ivec3 place, int depth, vec3 local) {
+  vec3 fraction = 0.5 * local + 0.5;
+  int down = other.w - depth;
+  vec3 within = down >= 0 ? fraction * ldexp(1.0, down) + vec3((place << down) - other.xyz)
+                          : (vec3(place - (other.xyz << -down)) + fraction) * ldexp(1.0, down);
+  return 2.0 * within - 1.0;
+}
+
+Reaching reaching(ivec3 place, int depth, vec3 local) {
+  vec3 fraction = 0.5 * local + 0.5;
   Reaching found;
   found.count = 0;
   uint open[8];  // the first children of internal nodes, by their number among the candidates
@@ -63,7 +85,11 @@ Reaching reaching(ivec3 place, int depth, vec3 fraction) {
       if (!exists) continue;
       Node node = fetchNode(index);
       if (node.leaf) {
-        if (found.count == 8) continue;
+        vec3 ramps, slopes;
+        vec3 there = localIn(ivec4(cell, level), place, depth, local);
+        rampsOf(texelFetch(zones, 2 * int(index)).x, level, there, ramps, slopes);
+        // of more than eight that are near, no more reach the point
+        if (found.count == 8 || !(ramps.x * ramps.y * ramps.z > 0.0)) continue;
         found.index[found.count] = index;
         found.placeDepth[found.count] = ivec4(cell, level);
         ++found.count;
@@ -79,34 +105,13 @@ Reaching reaching(ivec3 place, int depth, vec3 fraction) {
   return found;
 }
 
-// In the leaf's local coordinates, from which `steps` takes gradients to those of the point's own leaf.
-void rampsOf(uint reach, int depth, vec3 local, out vec3 value, out vec3 slope) {
-  for (int axis = 0; axis < 3; ++axis) {
-    bool upper = local[axis] > 0.0;
-    uint deepest = reach >> (10 * axis + (upper ? 5 : 0)) & kWall;
-    float scale = 0.5 * ldexp(1.0, int(deepest) - depth) / blend;
-    float t = deepest == kWall ? 1.0 : clamp((1.0 - abs(local[axis])) * scale, -1.0, 1.0);
-    value[axis] = 0.5 + t * (0.75 - 0.25 * t * t);
-    slope[axis] = (upper ? -0.75 : 0.75) * (1.0 - t * t) * scale;
-  }
-}
-
 Reaching leavesNear(Node leaf, uint depth, uvec3 place, vec3 local) {
-  if (isNear(local)) return reaching(ivec3(place), int(depth), 0.5 * local + 0.5);
+  if (isNear(local)) return reaching(ivec3(place), int(depth), local);
   Reaching alone;
   alone.count = 1;
   alone.index[0] = leaf.index;
   alone.placeDepth[0] = ivec4(ivec3(place), int(depth));
   return alone;
-}
-
-// The point's local coordinates in another leaf.
-vec3 localIn(ivec4 other, ivec3 place, int depth, vec3 local) {
-  vec3 fraction = 0.5 * local + 0.5;
-  int down = other.w - depth;
-  vec3 within = down >= 0 ? fraction * ldexp(1.0, down) + vec3((place << down) - other.xyz)
-                          : (vec3(place - (other.xyz << -down)) + fraction) * ldexp(1.0, down);
-  return 2.0 * within - 1.0;
 }
 
 float fieldValue(Node leaf, uint depth, uvec3 place, vec3 local) {

@@ -40,9 +40,9 @@ constexpr int evaluationLoops(int degree) {
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
 
-/// The same where eight leaves reach the point: the search for them, eight places at each depth, and for each its
-/// evaluation and the ramps along three axes.
-constexpr int blendedLoops(int evaluation) { return 10 * (kMaxDepth + 1) + 8 * (evaluation + 5) + 2; }
+/// The same where eight leaves reach the point: the search for them, eight places at each depth with ramps along three
+/// axes, and for each its evaluation and its ramps.
+constexpr int blendedLoops(int evaluation) { return 42 * (kMaxDepth + 1) + 8 * (evaluation + 5) + 2; }
 
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
