@@ -71,9 +71,15 @@ Field construct(const Console& console, const DistanceFunction& distance, const 
   const Box domain = domainOf(arguments, distance.source().box);
   warnOfCutSurface(console, distance.source().box, domain);
   const BuildOptions options = buildOptions(arguments);
-  return madeContinuous(
-      withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); }),
-      arguments);
+  Field field =
+      withProgress(console, [&](const Progress& progress) { return build(distance, domain, options, progress); });
+  if (field.metadata().measuredError > options.maxError)
+    console.err << fmt::format(
+                       "hpsdf: warning: errors of {} are left, above the maximum error {}: allow a higher degree, a "
+                       "greater depth, more steps or bytes",
+                       shortNumber(field.metadata().measuredError), shortNumber(options.maxError))
+                << std::endl;
+  return madeContinuous(std::move(field), arguments);
 }
 
 /// Errors of the construction speak of options; the user thinks of the mesh.
@@ -142,6 +148,60 @@ std::vector<Parameter> buildParameters() {
        .help = "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike.",
        .defaultText = "4",
        .minimum = 0},
+      {.name = "nearness-kind",
+       .type = ParameterType::choice,
+       .help =
+           "How an error's weight falls with the distance s, d being the domain's diagonal: polynomial, (1 − s/d)^θ, "
+           "as in the paper, or exponential, exp(−θ s/d), which falls on far away.",
+       .defaultText = "polynomial",
+       .choices = {"polynomial", "exponential"}},
+      {.name = "near-error",
+       .type = ParameterType::number,
+       .help = "RMS error to reach near the surface, with far-error, in place of target error and nearness, which then "
+               "follow. By the estimate: 'hpsdf verify' measures what came of it.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
+      {.name = "far-error",
+       .type = ParameterType::number,
+       .help = "RMS error to reach farther away than near-distance, with near-error; not below it.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
+      {.name = "near-distance",
+       .type = ParameterType::number,
+       .help = "What near-error calls near. When left out, a hundredth of the mesh's longest side.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
+      {.name = "max-error",
+       .type = ParameterType::number,
+       .help = "Error to be exceeded nowhere (within the band, if there is one): after the target, if one is given, "
+               "cells are looked at in 512 places each and refined on where one is worse. Dear; takes no target error "
+               "unless one is given.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
+      {.name = "max-bytes",
+       .type = ParameterType::number,
+       .help =
+           "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given.",
+       .unit = "bytes",
+       .minimum = 1,
+       .whole = true},
+      {.name = "estimator",
+       .type = ParameterType::choice,
+       .help = "What stands for a cell's error: embedded, what the top degree adds, as in the paper, or residual, what "
+               "the fit leaves of its samples. Neither takes distances of its own.",
+       .defaultText = "embedded",
+       .choices = {"embedded", "residual"}},
+      {.name = "criterion",
+       .type = ParameterType::choice,
+       .help = "How degrees and depths are chosen. paper: step by step, by the gain a coefficient. optimal: a little "
+               "farther than needed, then back where that saves most bytes for the error: about half of the "
+               "coefficients at equal error, for 1.3 times the distances.",
+       .defaultText = "paper",
+       .choices = {"paper", "optimal"}},
       {.name = "max-degree",
        .type = ParameterType::wholeNumber,
        .help = "Highest degree of a cell's polynomial.",
@@ -256,7 +316,19 @@ BuildOptions buildOptions(const Arguments& arguments) {
   const bool paper = arguments.flag("paper");
   BuildOptions options = paper ? paperOptions() : BuildOptions{};
   const auto decides = [&](std::string_view name) { return !paper || arguments.given(name); };
-  options.targetError = arguments.number("target-error");
+  const auto numberOr = [&](std::string_view name, double otherwise) {
+    return arguments.given(name) ? arguments.number(name) : otherwise;
+  };
+  options.nearError = numberOr("near-error", 0);
+  options.farError = numberOr("far-error", 0);
+  options.nearDistance = numberOr("near-distance", 0);
+  options.maxError = numberOr("max-error", 0);
+  if (arguments.given("max-bytes")) options.maxBytes = static_cast<std::uint64_t>(arguments.number("max-bytes"));
+  const bool endsOtherwise = options.nearError > 0 || options.farError > 0 || options.maxError > 0 || options.maxBytes;
+  options.targetError = endsOtherwise && !arguments.given("target-error") ? 0 : arguments.number("target-error");
+  if (arguments.text("nearness-kind") == "exponential") options.nearnessKind = NearnessKind::exponential;
+  if (arguments.text("estimator") == "residual") options.estimator = Estimator::residual;
+  if (arguments.text("criterion") == "optimal") options.criterion = Criterion::optimal;
   const auto grid = arguments.numbers("grid");
   for (std::size_t axis = 0; axis < 3; ++axis)
     options.grid[axis] = static_cast<std::uint32_t>(grid.size() == 1 ? grid[0] : grid[axis]);

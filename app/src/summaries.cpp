@@ -95,6 +95,12 @@ std::string shellWord(const std::string& word) {
   return quoted + "'";
 }
 
+std::string nearnessName(NearnessKind kind) { return kind == NearnessKind::polynomial ? "polynomial" : "exponential"; }
+
+std::string estimatorName(Estimator estimator) { return estimator == Estimator::embedded ? "embedded" : "residual"; }
+
+std::string criterionName(Criterion criterion) { return criterion == Criterion::paper ? "paper" : "optimal"; }
+
 std::string strategyName(Strategy strategy) {
   switch (strategy) {
     case Strategy::h1:
@@ -178,6 +184,11 @@ Json fieldJson(const CurrentField& current) {
       {"grid", field.grid()},
       {"strategy", strategyName(metadata.strategy)},
       {"nearness", metadata.nearness},
+      {"nearness_kind", nearnessName(metadata.nearnessKind)},
+      {"estimator", estimatorName(metadata.estimator)},
+      {"criterion", criterionName(metadata.criterion)},
+      {"max_error", metadata.maxError > 0 ? Json(metadata.maxError) : Json()},
+      {"measured_error", metadata.maxError > 0 ? Json(metadata.measuredError) : Json()},
       {"max_degree", metadata.maxDegree},
       {"max_depth", metadata.maxDepth},
       {"quadrature", metadata.quadrature},
@@ -242,6 +253,12 @@ std::string fieldText(const CurrentField& current) {
                      fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
                                  strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
                                  metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
+  text +=
+      summaryRow("steering", fmt::format("{} nearness, {} estimator, {} criterion", nearnessName(metadata.nearnessKind),
+                                         estimatorName(metadata.estimator), criterionName(metadata.criterion)));
+  if (metadata.maxError > 0)
+    text += summaryRow("greatest error, asked",
+                       fmt::format("{}, {}", shortNumber(metadata.measuredError), shortNumber(metadata.maxError)));
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
   if (const double width = field.data().blend; width > 0)
     text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));

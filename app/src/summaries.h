@@ -53,5 +53,8 @@ std::string shellWord(const std::string& word);
 std::string summaryRow(std::string_view label, const std::string& value);
 
 std::string strategyName(Strategy strategy);
+std::string nearnessName(NearnessKind kind);
+std::string estimatorName(Estimator estimator);
+std::string criterionName(Criterion criterion);
 
 }  // namespace hpsdf::app

@@ -125,7 +125,7 @@ std::string withChecksum(std::string bytes) {
   return bytes;
 }
 
-constexpr std::size_t kSinceVersion3 = 4 * 1 + 2 * 8 + 8;  // bytes at the header's end
+constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8;  // bytes at the header's end
 
 /// As older programs wrote them: version 2 without what came after the steps, version 1 without these too.
 TEST(FieldFile, FilesOfOlderVersionsAreRead) {
@@ -162,6 +162,8 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   data.metadata.estimator = Estimator::residual;
   data.metadata.criterion = Criterion::optimal;
   data.metadata.nearnessKind = NearnessKind::exponential;
+  data.metadata.maxError = 0.01;
+  data.metadata.measuredError = 0.0075;
   data.metadata.enriched = true;
   data.metadata.continuityWeight = 3;
   save(Field(data), file);
@@ -173,6 +175,8 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   EXPECT_EQ(again.metadata().estimator, Estimator::residual);
   EXPECT_EQ(again.metadata().criterion, Criterion::optimal);
   EXPECT_EQ(again.metadata().nearnessKind, NearnessKind::exponential);
+  EXPECT_EQ(again.metadata().maxError, 0.01);
+  EXPECT_EQ(again.metadata().measuredError, 0.0075);
   EXPECT_TRUE(again.metadata().enriched);
   EXPECT_EQ(again.metadata().continuityWeight, 3);
 }

@@ -116,11 +116,19 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
       {"target-error", fmt::format("{}", made.targetError)},
       {"grid", fmt::format("{},{},{}", field.grid()[0], field.grid()[1], field.grid()[2])},
       {"nearness", fmt::format("{}", made.nearness)},
+      {"nearness-kind", nearnessName(made.nearnessKind)},
+      {"estimator", estimatorName(made.estimator)},
+      {"criterion", criterionName(made.criterion)},
       {"max-degree", fmt::format("{}", made.maxDegree)},
       {"max-depth", fmt::format("{}", made.maxDepth)},
       {"strategy", strategyName(made.strategy)},
       {"quadrature", fmt::format("{}", made.quadrature)},
       {"band", fmt::format("{}", made.band)}};
+  if (made.maxError > 0) settings["max-error"] = fmt::format("{}", made.maxError);
+  if (made.targetError == 0) {  // it ended at something else: at what was reached then
+    settings.erase("target-error");
+    if (made.maxError == 0) settings["target-error"] = fmt::format("{}", made.totalError);
+  }
   if (!field.singlePrecision()) settings["coefficients"] = "double";
   if (const double width = field.data().blend; width > 0) {
     settings["continuity"] = "exact";

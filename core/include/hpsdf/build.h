@@ -34,11 +34,29 @@ enum class CubatureKind : std::uint8_t {
 struct BuildOptions {
   /// τ at the paper's scale, where the longest side of the mesh's box is 2. Internally τ·(L/2)^5, L that side in the
   /// mesh's own units, so that the same τ gives the same cells in any unit. Of a callable: L = longest edge/1.1.
+  /// 0: none; then another end must be given.
   double targetError = 1e-6;
   std::array<std::uint32_t, 3> grid = {6, 6, 6};  ///< base cells an axis
   double nearness = 4;                            ///< θ; 0 weighs all cells alike
-  int maxDegree = 30;                             ///< p_max, 1 to 30
-  int maxDepth = 10;                              ///< l_max, 0 to 20
+  NearnessKind nearnessKind = NearnessKind::polynomial;
+  /// RMS errors asked for in the field's own units, in place of τ and θ: over the cells that may hold points within
+  /// `nearDistance` of the surface, and over all others. The construction ends where the estimate says that both are
+  /// reached; θ follows from their ratio, by exponential nearness. Both or none; far ≥ near.
+  double nearError = 0, farError = 0;
+  double nearDistance = 0;  ///< in the field's own units; 0: a hundredth of L
+  /// |f − Φ| that is to be exceeded nowhere, in the field's own units; 0: not asked for. Once the target is reached,
+  /// every cell (within the band, if there is one) is looked at on a lattice of 512 places from corner to corner, and
+  /// refined on where the worst place and half of the greatest step between neighbours together are more. No proof:
+  /// for that see `safe_distance.h`. What is left at the limits of degree, depth, steps and bytes stands in
+  /// `FieldMetadata::measuredError`.
+  double maxError = 0;
+  /// The field as queries need it takes at most so many bytes; the best such field is built that the other settings
+  /// allow. Coefficients that are left to choose become float.
+  std::optional<std::uint64_t> maxBytes = {};
+  Estimator estimator = Estimator::embedded;
+  Criterion criterion = Criterion::paper;
+  int maxDegree = 30;  ///< p_max, 1 to 30
+  int maxDepth = 10;   ///< l_max, 0 to 20
   Strategy strategy = Strategy::hp;
   int quadrature = 3;  ///< order of the quadrature as a multiple of p, 2 to 8; the paper's is 4
   CubatureKind cubature = CubatureKind::compact;

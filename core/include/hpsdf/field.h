@@ -27,17 +27,16 @@ constexpr int coefficientCount(int degree) { return (degree + 1) * (degree + 2) 
 
 enum class Strategy : std::uint8_t { hp, h1, h2 };
 
-/// How far a cell is from its share of the target, before nearness weighs it.
+/// What stands for a cell's squared error, before nearness weighs it.
 enum class Estimator : std::uint8_t {
   embedded,  ///< ε_e: what the top degree adds (paper, eq. 6)
   residual,  ///< ∫Φ² − ∫f²: what the fit leaves of the samples that it was made from
 };
 
-/// Which of degree and depth a step raises.
+/// How degrees and depths of the leaves are chosen.
 enum class Criterion : std::uint8_t {
   paper,    ///< the gain a coefficient (paper, eqs. 7 to 9)
-  slope,    ///< the steeper fall of the error over coefficients, both in logarithms
-  optimal,  ///< refines beyond the target and takes back whatever saves most for its error
+  optimal,  ///< the paper's, somewhat beyond the target, and then back: what saves most bytes for its error is undone
 };
 
 /// κ(s) of the mean distance s, d being the domain's diagonal.
@@ -65,6 +64,8 @@ struct FieldMetadata {
   Estimator estimator = Estimator::embedded;
   Criterion criterion = Criterion::paper;
   NearnessKind nearnessKind = NearnessKind::polynomial;
+  double maxError = 0;  ///< |f − Φ| that no place looked at was to exceed, in the field's units; 0: not asked for
+  double measuredError = 0;     ///< the greatest at those places, where it was asked for
   bool enriched = false;        ///< every cell was fitted anew, one degree higher, at the end
   double continuityWeight = 0;  ///< λ of weak continuity, see `continuity.h`; 0: the cells' own fits
 
@@ -93,8 +94,8 @@ struct FieldData {
   /// Width of the zone along a leaf's faces, as a part of its edges, in which it is blended with its neighbours, so
   /// that the field and its gradient are continuous; 0 to `kMaxBlend`. 0: leaves answer alone, and the field jumps.
   double blend = 0;
-  std::vector<CellBound> bounds;  ///< by node, those of internal nodes 0; empty where they are not kept
-  FieldMetadata metadata;
+  std::vector<CellBound> bounds = {};  ///< by node, those of internal nodes 0; empty where they are not kept
+  FieldMetadata metadata = {};
 };
 
 /// A node's bits, in one place.

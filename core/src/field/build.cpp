@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <queue>
 #include <span>
@@ -17,6 +18,8 @@
 #include "field/build_options.h"
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
+#include "field/prune.h"
+#include "field/worst_error.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
@@ -57,8 +60,10 @@ class Construction {
       : options_(options),
         progress_(progress),
         length_(referenceLength(distance.source(), domain)),
-        target_(scaledTarget(options, length_)),
-        fitter_(distance, options, domain.diagonal().norm(), progress) {
+        goal_(errorGoal(options, length_)),
+        nearness_{options.nearnessKind, options.nearness, domain.diagonal().norm()},
+        fitter_(distance, options, nearness_, options.nearDistance > 0 ? options.nearDistance : 0.01 * length_,
+                progress) {
     tree_.domain = domain;
     tree_.grid = options.grid;
   }
@@ -67,30 +72,47 @@ class Construction {
   void grow(const std::function<void(std::uint64_t)>& afterStep = {}) {
     fitBaseCells();
     if (afterStep) afterStep(steps_);
-    while (!(totalError_ <= target_) && mayStep() && !queue_.empty()) {
-      refineRound(afterStep);
-      // rounding in the running total must end the construction neither early nor never
-      if (totalError_ <= target_ || totalError_ < 1e-6 * lastSum_) sumTotalError();
-    }
+    if (growsByErrors()) refineWorstCells(afterStep);
+    if (options_.maxError > 0) refineToMaxError(afterStep);
   }
 
   /// The field as it is now. The first takes a copy of the tree, the other the tree itself.
-  FieldData frozen(const Source& source) const {
-    return freeze(BuildTree(tree_), options_.coefficients, metadata(source));
-  }
-  FieldData finish(const Source& source) {
-    FieldMetadata known = metadata(source);
-    return freeze(std::move(tree_), options_.coefficients, std::move(known));
-  }
+  FieldData frozen(const Source& source) const { return finished(BuildTree(tree_), source); }
+  FieldData finish(const Source& source) { return finished(std::move(tree_), source); }
 
  private:
-  FieldMetadata metadata(const Source& source) const {
+  FieldData finished(BuildTree&& tree, const Source& source) const {
+    if (options_.criterion == Criterion::optimal) prune(tree, nearness_, pruneLimits());
+    FieldMetadata known = metadata(source, sumOfErrors(tree));
+    const CoefficientType type = options_.maxBytes && options_.coefficients == CoefficientType::automatic
+                                     ? CoefficientType::float32
+                                     : options_.coefficients;
+    return freeze(std::move(tree), type, std::move(known));
+  }
+
+  PruneLimits pruneLimits() const {
+    PruneLimits limits{.goal = goal_, .nodeBytes = kNodeBytes, .coefficientBytes = coefficientBytes(options_)};
+    // what ended early, but not for want of room, has refinements to take back all the same
+    if (!growthGoal_.reached(totals_) && !full_) limits.goal = goal_.relaxedTo(totals_, 1 / kGrowth);
+    if (options_.maxBytes) limits.mostBytes = treeBytes(*options_.maxBytes);
+    limits.mostDegree = options_.maxDegree;
+    if (options_.strategy != Strategy::hp) limits.leastDegree = limits.mostDegree = startDegree(options_);
+    return limits;
+  }
+
+  FieldMetadata metadata(const Source& source, const ErrorTotals& totals) const {
     FieldMetadata metadata;
     metadata.source = source;
-    metadata.targetError = options_.targetError;
-    metadata.totalError = sumOfErrors() / std::pow(length_ / 2, 5);
+    const double scale = std::pow(length_ / 2, 5);
+    metadata.targetError = goal_.byDistance() ? totals.weighted / scale : options_.targetError;
+    metadata.totalError = totals.weighted / scale;
     metadata.referenceLength = length_;
-    metadata.nearness = options_.nearness;
+    metadata.nearness = nearness_.exponent;
+    metadata.nearnessKind = nearness_.kind;
+    metadata.estimator = options_.estimator;
+    metadata.criterion = options_.criterion;
+    metadata.maxError = options_.maxError;
+    metadata.measuredError = measuredError_;
     metadata.maxDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
     metadata.maxDepth = options_.maxDepth;
     metadata.quadrature = options_.quadrature;
@@ -112,9 +134,16 @@ class Construction {
   static constexpr std::size_t kRound = 32;    // few enough to stay close to the paper's order, one cell at a time
   static constexpr std::size_t kResum = 1000;  // steps between exact sums of the total error (paper, sec. 3.6)
   static constexpr std::size_t kBaseChunk = 4096;
+  // How far beyond its goal a construction goes that then takes back what saved least. Bunny at τ=1e-6: 0.7 takes 1.3
+  // times the distances for 0.49 times the coefficients, 0.5 takes 1.7 times for 0.48.
+  static constexpr double kGrowth = 0.7;
+  static constexpr std::size_t kLookRound = 256;
+  static constexpr double kByteGrowth = 1.6;  // the same in bytes
+  static constexpr double kNodeBytes = sizeof(std::uint64_t);
+  static constexpr double kWithDirectory = 17.0 / 16;  // of a field's bytes, over those of nodes and coefficients
 
   void fitBaseCells() {
-    const std::size_t count = std::size_t(options_.grid[0]) * options_.grid[1] * options_.grid[2];
+    const std::size_t count = tree_.baseCells();
     tree_.nodes.resize(count);
     for (std::size_t n = 0; n < count; ++n) {
       tree_.nodes[n].place = {static_cast<std::uint32_t>(n % options_.grid[0]),
@@ -128,8 +157,70 @@ class Construction {
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
     }
     coefficients_ = count * std::size_t(coefficientCount(degree));
-    sumTotalError();
+    if (goal_.byDistance()) chooseNearness();
+    sumTotals();
+    if (bytes() > mostBytesOfGrowth())
+      throw Error("the base grid alone takes more than " + std::to_string(*options_.maxBytes) +
+                  " bytes: allow more, or take a coarser grid");
     for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
+  }
+
+  /// θ, such that a cell at the mean distance of those far away weighs as much less as its error may be greater.
+  void chooseNearness() {
+    double distance = 0, volume = 0;
+    for (const BuildNode& node : tree_.nodes) {
+      if (node.fit.error.near) continue;
+      distance += node.fit.error.volume * std::abs(node.fit.coefficients[0]);
+      volume += node.fit.error.volume;
+    }
+    nearness_.kind = NearnessKind::exponential;
+    nearness_.exponent = 0;
+    if (distance > 0)
+      nearness_.exponent = std::log(goal_.farSquare / goal_.nearSquare) * nearness_.diagonal * volume / distance;
+    for (BuildNode& node : tree_.nodes)
+      node.fit.error.weighted = nearness_.weight(node.fit.coefficients[0]) * node.fit.error.squared;
+  }
+
+  /// Whether errors of cells decide what is refined, rather than a maximum error alone.
+  bool growsByErrors() const {
+    return options_.targetError > 0 || goal_.byDistance() || options_.maxBytes || !(options_.maxError > 0);
+  }
+
+  void refineWorstCells(const std::function<void(std::uint64_t)>& afterStep) {
+    while (!reached() && mayStep() && (!queue_.empty() || takeUpAside())) {
+      refineRound(afterStep);
+      // rounding in the running total must end the construction neither early nor never
+      if (reached() || totals_.weighted < 1e-6 * lastSum_) sumTotals();
+    }
+  }
+
+  bool reached() const { return growthGoal_.reached(totals_); }
+
+  /// Whether its kind of cells, near or far, is exact enough already.
+  bool isDone(const CellError& cell) const {
+    return goal_.byDistance() && (cell.near ? growthGoal_.nearReached(totals_) : growthGoal_.farReached(totals_));
+  }
+
+  /// Back into the queue with the cells that were put aside and are not exact enough after all.
+  bool takeUpAside() {
+    std::vector<std::uint32_t> aside = std::exchange(aside_, {});
+    for (const std::uint32_t node : aside) {
+      if (isDone(tree_.nodes[node].fit.error))
+        aside_.push_back(node);
+      else
+        enqueue(node);
+    }
+    return !queue_.empty();
+  }
+
+  /// Of the field as it will be, but for its directory.
+  double bytes() const {
+    return kNodeBytes * double(tree_.nodes.size()) + coefficientBytes(options_) * double(coefficients_);
+  }
+  static double treeBytes(std::uint64_t ofField) { return double(ofField) / kWithDirectory; }
+  double mostBytesOfGrowth() const {
+    if (!options_.maxBytes) return HUGE_VAL;
+    return treeBytes(*options_.maxBytes) * (options_.criterion == Criterion::optimal ? kByteGrowth : 1);
   }
 
   /// What may be done to a leaf; nothing: empty.
@@ -144,14 +235,22 @@ class Construction {
 
   void enqueue(std::uint32_t node) {
     const BuildNode& leaf = tree_.nodes[node];
-    if (leaf.fit.error > 0 && allowed(leaf)) queue_.push({leaf.fit.error, node});
+    if (leaf.fit.error.weighted > 0 && allowed(leaf)) queue_.push({leaf.fit.error.weighted, node});
   }
 
-  bool mayStep() const { return !options_.maxSteps || steps_ < *options_.maxSteps; }
+  bool mayStep() const { return !full_ && (!options_.maxSteps || steps_ < *options_.maxSteps); }
 
   double fractionDone() {
-    const double ofError = estimate_.update(double(fitter_.evaluations()), totalError_, target_);
-    return options_.maxSteps ? std::max(ofError, double(steps_) / double(*options_.maxSteps)) : ofError;
+    double fraction = 0;
+    if (goal_.byDistance()) {
+      const double near = totals_.nearSquared / (growthGoal_.nearSquare * totals_.nearVolume);
+      const double far = totals_.farSquared / (growthGoal_.farSquare * totals_.farVolume);
+      fraction = estimate_.update(double(fitter_.evaluations()), std::fmax(near, far), 1);
+    } else if (growthGoal_.weighted > 0) {
+      fraction = estimate_.update(double(fitter_.evaluations()), totals_.weighted, growthGoal_.weighted);
+    }
+    if (options_.maxSteps) fraction = std::max(fraction, double(steps_) / double(*options_.maxSteps));
+    return options_.maxBytes ? std::max(fraction, bytes() / mostBytesOfGrowth()) : fraction;
   }
 
   void refineRound(const std::function<void(std::uint64_t)>& afterStep) {
@@ -159,18 +258,17 @@ class Construction {
     report("refining", fractionDone());
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
-      worst.push_back(queue_.top().node);
+      const std::uint32_t next = queue_.top().node;
       queue_.pop();
+      (isDone(tree_.nodes[next].fit.error) ? aside_ : worst).push_back(next);
     }
     std::vector<Trial> trials = tryAll(worst);
     for (std::size_t w = 0; w < worst.size(); ++w) {
-      if (totalError_ <= target_ || !mayStep()) {  // done, unless an exact sum says otherwise
+      if (reached() || !mayStep()) {  // done, unless an exact sum says otherwise
         enqueue(worst[w]);
         continue;
       }
-      refine(worst[w], std::move(trials[w]));
-      if (++steps_ % kResum == 0) sumTotalError();
-      if (afterStep) afterStep(steps_);
+      refine(worst[w], std::move(trials[w]), afterStep);
     }
   }
 
@@ -193,45 +291,133 @@ class Construction {
     return trials;
   }
 
-  void refine(std::uint32_t node, Trial&& trial) {
+  void refine(std::uint32_t node, Trial&& trial, const std::function<void(std::uint64_t)>& afterStep) {
+    const bool raises = allowed(tree_.nodes[node]) != Refinement::octree && trial.raised &&
+                        (!trial.children || prefersDegree(tree_.nodes[node].fit, trial));
+    take(node, std::move(trial), raises, afterStep);
+  }
+
+  /// One of the two refinements of a leaf, unless there is no room for it.
+  void take(std::uint32_t node, Trial&& trial, bool raises, const std::function<void(std::uint64_t)>& afterStep) {
     if (tree_.nodes.size() > 0xffffffffu - 8)
       throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
-    totalError_ -= tree_.nodes[node].fit.error;
     const std::size_t before = tree_.nodes[node].fit.coefficients.size();
-    if (trial.raised && (!trial.children || prefersDegree(tree_.nodes[node].fit, trial))) {
-      tree_.nodes[node].fit = std::move(*trial.raised);
-      totalError_ += tree_.nodes[node].fit.error;
-      coefficients_ += tree_.nodes[node].fit.coefficients.size() - before;
-      enqueue(node);
+    const std::size_t added = raises ? trial.raised->coefficients.size() - before : 7 * before;
+    if (bytes() + coefficientBytes(options_) * double(added) + (raises ? 0 : 8 * kNodeBytes) > mostBytesOfGrowth()) {
+      full_ = true;
       return;
     }
-    tree_.split(node, std::move(*trial.children));
-    coefficients_ += 7 * before;
-    const std::uint32_t first = tree_.nodes[node].firstChild;
-    for (std::uint32_t child = first; child < first + 8; ++child) {
-      totalError_ += tree_.nodes[child].fit.error;
-      enqueue(child);
+    coefficients_ += added;
+    totals_.add(tree_.nodes[node].fit.error, -1);
+    if (raises) {
+      tree_.nodes[node].fit = std::move(*trial.raised);
+      totals_.add(tree_.nodes[node].fit.error);
+      enqueue(node);
+    } else {
+      const bool keepsOwn = options_.criterion == Criterion::optimal;
+      tree_.split(node, std::move(*trial.children), keepsOwn ? std::move(*trial.raised) : Fit{});
+      const std::uint32_t first = tree_.nodes[node].firstChild;
+      for (std::uint32_t child = first; child < first + 8; ++child) {
+        totals_.add(tree_.nodes[child].fit.error);
+        enqueue(child);
+      }
     }
+    if (++steps_ % kResum == 0) sumTotals();
+    if (afterStep) afterStep(steps_);
   }
 
   /// The hp decision (paper, eqs. 7 to 9), every error weighted by nearness.
   static bool prefersDegree(const Fit& current, const Trial& trial) {
     double worstChild = 0;
-    for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error);
+    for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error.weighted);
     const int p = current.degree;
-    const double mu = (current.error - 8 * trial.raised->error) / (coefficientCount(p + 1) - coefficientCount(p));
-    const double nu = (current.error - 8 * worstChild) / (7 * coefficientCount(p));
+    const double error = current.error.weighted;
+    const double mu = (error - 8 * trial.raised->error.weighted) / (coefficientCount(p + 1) - coefficientCount(p));
+    const double nu = (error - 8 * worstChild) / (7 * coefficientCount(p));
     return mu > nu;
   }
 
-  double sumOfErrors() const {
-    double sum = 0;
-    for (const BuildNode& node : tree_.nodes)
-      if (node.firstChild == 0) sum += node.fit.error;
+  /// What `refineToMaxError` finds out about a leaf.
+  struct Looked {
+    double worst = 0;  ///< |f − Φ|, see `worstError`
+    std::optional<Trial> trial;
+    bool raises = false;
+  };
+
+  void refineToMaxError(const std::function<void(std::uint64_t)>& afterStep) {
+    std::vector<std::uint32_t> waiting;
+    for (std::uint32_t n = 0; n < tree_.nodes.size(); ++n)
+      if (tree_.nodes[n].firstChild == 0) waiting.push_back(n);
+    std::size_t done = 0;
+    while (done < waiting.size()) {
+      checkFitsMemory(tree_.nodes.size(), coefficients_);
+      report("looking for the maximum error", double(done) / double(waiting.size()));
+      const std::size_t count = std::min(kLookRound, waiting.size() - done);
+      std::vector<Looked> looked(count);
+      tbb::parallel_for(std::size_t{0}, count,
+                        [&](std::size_t i) { looked[i] = look(tree_.nodes[waiting[done + i]]); });
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t node = waiting[done + i];
+        if (!looked[i].trial) {
+          measuredError_ = std::max(measuredError_, looked[i].worst);
+          continue;
+        }
+        if (!mayStep()) {
+          waiting.push_back(node);  // to be measured as it is
+          continue;
+        }
+        const std::size_t before = tree_.nodes.size();
+        take(node, std::move(*looked[i].trial), looked[i].raises, afterStep);
+        if (full_ || looked[i].raises) {
+          waiting.push_back(node);
+        } else {
+          for (std::size_t child = before; child < before + 8; ++child)
+            waiting.push_back(static_cast<std::uint32_t>(child));
+        }
+      }
+      done += count;
+    }
+    sumTotals();
+  }
+
+  /// The leaf at many places; where one is too bad, a trial of its refinements. The degree is raised where that is
+  /// enough, else as the paper's criterion says.
+  Looked look(const BuildNode& leaf) const {
+    Looked looked;
+    if (leaf.fit.outsideBand) return looked;
+    const Box box = tree_.boxOf(leaf);
+    const std::optional<Refinement> may = mayStep() ? allowed(leaf) : std::nullopt;
+    const double most = options_.maxError;
+    const bool surelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;  // RMS: spares the look
+    if (may && surelyBad) {
+      looked.trial = fitter_.attempt(box, leaf.fit, *may);
+      looked.raises = looked.trial->raised && (!looked.trial->children || prefersDegree(leaf.fit, *looked.trial));
+      return looked;
+    }
+    const std::vector<double> exact = fitter_.distances(box, lookedAt());
+    // a place outside of the band speaks for its surroundings within
+    const double farthest =
+        options_.band > 0 ? options_.band + lookSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
+    looked.worst = worstError(leaf.fit, exact, farthest);
+    if (looked.worst <= most || !may) return looked;
+    looked.trial = fitter_.attempt(box, leaf.fit, *may);
+    looked.raises = looked.trial->raised &&
+                    (!looked.trial->children || worstError(*looked.trial->raised, exact, farthest) <= most ||
+                     prefersDegree(leaf.fit, *looked.trial));
+    return looked;
+  }
+
+  static ErrorTotals sumOfErrors(const BuildTree& tree) {
+    ErrorTotals sum;
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0) sum.add(node.fit.error);
     return sum;
   }
 
-  void sumTotalError() { totalError_ = lastSum_ = sumOfErrors(); }
+  void sumTotals() {
+    totals_ = sumOfErrors(tree_);
+    lastSum_ = totals_.weighted;
+  }
 
   void report(std::string_view task, double fraction) const {
     if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
@@ -241,13 +427,18 @@ class Construction {
   const BuildOptions& options_;
   const Progress& progress_;
   double length_;
-  double target_;
+  ErrorGoal goal_;
+  ErrorGoal growthGoal_ = options_.criterion == Criterion::optimal ? goal_.times(kGrowth) : goal_;
+  Nearness nearness_;
   CellFitter fitter_;
   BuildTree tree_;
   std::priority_queue<Entry> queue_;
-  double totalError_ = 0;         ///< kept up step by step
-  double lastSum_ = 0;            ///< what it was when it was last summed anew
-  std::size_t coefficients_ = 0;  ///< of all leaves
+  std::vector<std::uint32_t> aside_;  ///< leaves whose kind was exact enough when their turn came
+  ErrorTotals totals_;                ///< kept up step by step
+  double lastSum_ = 0;                ///< their weighted error when they were last summed anew
+  double measuredError_ = 0;          ///< greatest that `refineToMaxError` has left
+  bool full_ = false;                 ///< no more bytes may be taken
+  std::size_t coefficients_ = 0;      ///< of all leaves
   std::uint64_t steps_ = 0;
   ProgressEstimate estimate_;
 };

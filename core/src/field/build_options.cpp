@@ -37,7 +37,56 @@ void checkGridFitsMemory(const BuildOptions& options) {
            std::floor(std::cbrt(most)), " an axis");
 }
 
+/// τ in the field's own units^5.
+double scaledTarget(const BuildOptions& options, double referenceLength) {
+  if (options.targetError == 0) return 0;
+  const double target = options.targetError * std::pow(referenceLength / 2, 5);
+  if (!(target >= std::numeric_limits<double>::min()) || !std::isfinite(target))
+    refuse("target error ", options.targetError, " for a surface of size ", referenceLength,
+           " is beyond double precision: scale the mesh, or normalize it");
+  return target;
+}
+
+void checkNumber(const char* name, double number) {
+  if (!(number >= 0) || !std::isfinite(number)) refuse(name, " ", number, ": expected a number of at least 0");
+}
+
+/// What the construction is to end at.
+void checkEnds(const BuildOptions& options) {
+  checkNumber("target error", options.targetError);
+  checkNumber("maximum error", options.maxError);
+  checkNumber("near error", options.nearError);
+  checkNumber("far error", options.farError);
+  checkNumber("near distance", options.nearDistance);
+  if ((options.nearError > 0) != (options.farError > 0)) refuse("near error and far error belong together: give both");
+  if (options.nearError > options.farError)
+    refuse("near error ", options.nearError, " is above far error ", options.farError,
+           ": expected a field that is at least as exact near the surface");
+  if (options.targetError == 0 && options.nearError == 0 && options.maxError == 0 && !options.maxBytes &&
+      !options.maxSteps)
+    refuse(
+        "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
+  if (options.criterion != Criterion::optimal) return;
+  if (options.trialSamples == TrialSamples::own)
+    refuse("the optimal criterion needs trials by the children's samples: leave out the paper's settings");
+  if (options.maxError > 0)
+    refuse(
+        "the optimal criterion takes refinements back by mean squares, which a maximum error does not allow: take "
+        "the paper's criterion");
+  if (options.targetError == 0 && options.nearError == 0 && !options.maxBytes)
+    refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
+}
+
 }  // namespace
+
+ErrorGoal errorGoal(const BuildOptions& options, double referenceLength) {
+  return {scaledTarget(options, referenceLength), options.nearError * options.nearError,
+          options.farError * options.farError};
+}
+
+double coefficientBytes(const BuildOptions& options) {
+  return options.coefficients == CoefficientType::float64 ? sizeof(double) : sizeof(float);
+}
 
 int startDegree(const BuildOptions& options) {
   switch (options.strategy) {
@@ -52,12 +101,10 @@ int startDegree(const BuildOptions& options) {
 }
 
 void checkBuild(const Box& domain, const BuildOptions& options) {
-  if (!(options.targetError > 0) || !std::isfinite(options.targetError))
-    refuse("target error ", options.targetError, ": expected a number above 0");
+  checkEnds(options);
   if (std::ranges::find(options.grid, 0u) != options.grid.end())
     refuse("base grid 0: expected at least 1 cell an axis");
-  if (!(options.nearness >= 0) || !std::isfinite(options.nearness))
-    refuse("nearness ", options.nearness, ": expected a number of at least 0");
+  checkNumber("nearness", options.nearness);
   if (options.maxDegree < 1 || options.maxDegree > kMaxDegree)
     refuse("maximum degree ", options.maxDegree, ": expected 1 to ", kMaxDegree);
   if (options.maxDepth < 0 || options.maxDepth > kMaxDepth)
@@ -82,14 +129,6 @@ void checkFitsMemory(std::size_t nodes, std::size_t coefficients) {
   if (bytes > 0.75 * physicalMemory())
     refuse("the field has grown to ", nodes, " cells and ", std::ceil(bytes / 1e9),
            " GB, more than this machine holds: take a larger target error or a lower maximum depth");
-}
-
-double scaledTarget(const BuildOptions& options, double referenceLength) {
-  const double target = options.targetError * std::pow(referenceLength / 2, 5);
-  if (!(target >= std::numeric_limits<double>::min()) || !std::isfinite(target))
-    refuse("target error ", options.targetError, " for a surface of size ", referenceLength,
-           " is beyond double precision: scale the mesh, or normalize it");
-  return target;
 }
 
 double referenceLength(const Source& source, const Box& domain) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "field/nearness.h"
 #include "hpsdf/build.h"
 
 namespace hpsdf {
@@ -15,8 +16,11 @@ int startDegree(const BuildOptions& options);
 /// L, by which τ is scaled (see `BuildOptions::targetError`). Throws `Error` for a surface without extent.
 double referenceLength(const Source& source, const Box& domain);
 
-/// τ in the field's own units^5. Throws `Error` where that is no number that a double holds.
-double scaledTarget(const BuildOptions& options, double referenceLength);
+/// What is asked for, in the field's own units.
+ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
+
+/// Bytes of a coefficient as it will be kept, where a limit of bytes must know.
+double coefficientBytes(const BuildOptions& options);
 
 /// Throws `Error` where a tree of so many nodes and coefficients would not fit into the machine's memory.
 void checkFitsMemory(std::size_t nodes, std::size_t coefficients);

@@ -34,10 +34,10 @@ Box BuildTree::boxOf(const BuildNode& node) const {
   return Box(lo, hi);
 }
 
-void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children) {
+void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own) {
   const auto first = static_cast<std::uint32_t>(nodes.size());
   nodes[leaf].firstChild = first;
-  nodes[leaf].fit = Fit{};
+  nodes[leaf].fit = std::move(own);
   for (std::uint32_t child = 0; child < 8; ++child) {
     BuildNode node;
     node.depth = nodes[leaf].depth + 1;
@@ -54,12 +54,13 @@ FieldData freeze(BuildTree&& tree, CoefficientType type, FieldMetadata metadata)
   data.nodes.resize(tree.nodes.size());
   std::vector<double> coefficients;
   std::size_t total = 0;
-  for (const BuildNode& node : tree.nodes) total += node.fit.coefficients.size();
+  for (const BuildNode& node : tree.nodes)
+    if (node.firstChild == 0) total += node.fit.coefficients.size();
   if (total > 0xffffffffu)
     throw Error("the field needs " + std::to_string(total) + " coefficients, more than 2^32; raise the target error");
   coefficients.reserve(total);
 
-  const std::size_t baseCells = std::size_t(tree.grid[0]) * tree.grid[1] * tree.grid[2];
+  const std::size_t baseCells = tree.baseCells();
   double rounding = 0;
   auto nextGroup = static_cast<std::uint32_t>(baseCells);
   struct Pair {

@@ -14,7 +14,7 @@ struct BuildNode {
   std::uint32_t firstChild = 0;  ///< 0: a leaf
   std::uint32_t depth = 0;
   std::array<std::uint32_t, 3> place{};  ///< in cells of its depth, counted from the domain's lower corner
-  Fit fit;                               ///< of a leaf; empty for an internal node
+  Fit fit;  ///< of a leaf; of an internal node what it would be as one, where refinements may be taken back, else empty
 };
 
 /// Base cells first, x fastest, then groups of eight children.
@@ -23,10 +23,11 @@ struct BuildTree {
   std::array<std::uint32_t, 3> grid{};
   std::vector<BuildNode> nodes;
 
+  std::size_t baseCells() const { return std::size_t(grid[0]) * grid[1] * grid[2]; }
   Box boxOf(const BuildNode& node) const;
 
-  /// Replaces a leaf by its eight children, which take over their fits.
-  void split(std::uint32_t leaf, std::array<Fit, 8>&& children);
+  /// Puts eight children, which take over their fits, below a leaf, whose own fit is replaced.
+  void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 
 /// Lays nodes and coefficients out depth first, so that neighbours in space are neighbours in memory, and rounds the

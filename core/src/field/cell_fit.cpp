@@ -75,9 +75,9 @@ void checkFinite(std::span<const Vector3> points, std::span<const double> values
 
 }  // namespace
 
-CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& options, double diagonal,
-                       const Progress& progress)
-    : distance_(distance), options_(options), diagonal_(diagonal), progress_(progress) {}
+CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
+                       double nearDistance, const Progress& progress)
+    : distance_(distance), options_(options), nearness_(nearness), nearDistance_(nearDistance), progress_(progress) {}
 
 const CellFitter::Rules& CellFitter::rules(int degree) const {
   std::call_once(rulesMade_[degree], [&] {
@@ -117,6 +117,16 @@ std::vector<double> CellFitter::sample(std::span<const Box> cells, const Project
   return samples;
 }
 
+std::vector<double> CellFitter::distances(const Box& cell, std::span<const Vector3> local) const {
+  std::vector<Vector3> points(local.size());
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[i]);
+  std::vector<double> values(points.size());
+  distance_(points, values);
+  checkFinite(points, values);
+  evaluations_ += values.size();
+  return values;
+}
+
 bool CellFitter::outsideBand(const Box& cell, const Projection& projection, std::span<const double> samples) const {
   if (!(options_.band > 0)) return false;
   double clearance = 0;  // no point of the cell is closer to the surface, Φ being 1-Lipschitz
@@ -128,43 +138,49 @@ bool CellFitter::outsideBand(const Box& cell, const Projection& projection, std:
   return clearance > options_.band;
 }
 
-double CellFitter::shellError(const Fit& fit, double volume) const {
-  return nearnessWeight(fit) * topDegreeError(fit.coefficients.data(), fit.degree, volume);
-}
-
-double CellFitter::nearnessWeight(const Fit& fit) const {
-  // Mean of the cell's own fit: c_000, the others having none (paper, eq. 10).
-  const double mean = fit.coefficients[0];
-  return std::pow(std::clamp(1 - std::abs(mean) / diagonal_, 0.0, 1.0), options_.nearness);
-}
-
-Fit CellFitter::makeFit(std::vector<double> coefficients, int degree, const Box& cell, double meanSquare,
-                        bool outsideBand) const {
-  Fit fit;
-  fit.degree = degree;
-  fit.coefficients = std::move(coefficients);
-  if (outsideBand) return fit;
-  fit.error = shellError(fit, volumeOf(cell));
-  if (options_.trialSamples == TrialSamples::own) return fit;
-
-  // The estimate's blind spot: where Φ is even or odd about the cell's centre, every other shell of coefficients is
-  // empty. What the samples say is left over, ∫Φ² − Σc², then stands in; it counts only where it is far above the
-  // shell, so that everywhere else the paper's estimate decides.
+double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
   double represented = 0;
   forEachCoefficient(fit.degree, [&](int i, int j, int k, int index) {
     represented += fit.coefficients[index] * fit.coefficients[index] * squaredNorm(i, j, k);
   });
-  const double residual = meanSquare - represented;
+  const double residual = std::max(meanSquare - represented, 0.0);
+  if (options_.estimator == Estimator::residual) return residual;
+
+  // The estimate's blind spot: where Φ is even or odd about the cell's centre, every other shell of coefficients is
+  // empty. What the samples say is left over, ∫Φ² − Σc², then stands in; it counts only where it is far above the
+  // shell, so that everywhere else the paper's estimate decides.
   const double shell = topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
-  if (residual > 1000 * shell && residual > 1e-12 * meanSquare)
-    fit.error = nearnessWeight(fit) * residual * volumeOf(cell);
+  return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
+}
+
+/// From the squared error over the cell's volume.
+void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
+  const double mean = fit.coefficients[0];  // of the cell's own fit, the other polynomials having none
+  fit.error.volume = volumeOf(cell);
+  fit.error.near = std::abs(mean) - cell.sizes().norm() / 2 <= nearDistance_;
+  if (fit.outsideBand) return;
+  fit.error.squared = squared * fit.error.volume;
+  fit.error.weighted = nearness_.weight(mean) * fit.error.squared;
+}
+
+Fit CellFitter::makeFit(Projected projected, int degree, const Box& cell, bool outsideBand) const {
+  Fit fit;
+  fit.degree = degree;
+  fit.outsideBand = outsideBand;
+  fit.coefficients =
+      projected.degree == degree ? projected.coefficients : withoutTopDegree(projected.coefficients, projected.degree);
+  rate(fit,
+       options_.trialSamples == TrialSamples::own ? topDegreeError(fit.coefficients.data(), degree, 1.0)
+                                                  : squaredError(fit, projected.meanSquare),
+       cell);
+  if (keepsSpare()) fit.spare = std::move(projected);
   return fit;
 }
 
 Fit CellFitter::fit(const Box& cell, int degree) const {
   const Projection& projection = *rules(degree).projection;
   const std::vector<double> samples = sample({&cell, 1}, projection, rules(degree).orderOfOne);
-  return makeFit(withoutTopDegree(projection(samples), degree + 1), degree, cell, projection.meanSquare(samples),
+  return makeFit({projection(samples), degree + 1, projection.meanSquare(samples)}, degree, cell,
                  outsideBand(cell, projection, samples));
 }
 
@@ -172,14 +188,14 @@ Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
   Fit raised = fit(cell, current.degree + 1);
   if (options_.trialSamples == TrialSamples::own) {
     raised.coefficients = appendTopDegree(current.coefficients, raised.coefficients, raised.degree);
-    if (raised.error > 0) raised.error = shellError(raised, volumeOf(cell));
+    rate(raised, topDegreeError(raised.coefficients.data(), raised.degree, 1.0), cell);
   }
   return raised;
 }
 
 Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowed) const {
   Trial trial;
-  const bool mayRaise = allowed != Refinement::octree;
+  const bool wantsRaised = allowed != Refinement::octree || keepsSpare();
   if (allowed == Refinement::degree) {
     trial.raised = raisedByOwnSamples(cell, current);
     return trial;
@@ -199,15 +215,14 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
     const bool outside = outsideBand(boxes[child], projection, own);
     const double ownMeanSquare = projection.meanSquare(own);
     raised[child] = projection(own);
-    (*trial.children)[child] =
-        makeFit(withoutTopDegree(raised[child], degree + 1), degree, boxes[child], ownMeanSquare, outside);
+    (*trial.children)[child] = makeFit({raised[child], degree + 1, ownMeanSquare}, degree, boxes[child], outside);
     allOutside = allOutside && outside;
     meanSquare += ownMeanSquare / 8;
   }
-  if (mayRaise) {
+  if (wantsRaised) {
     trial.raised = options_.trialSamples == TrialSamples::own
                        ? raisedByOwnSamples(cell, current)
-                       : makeFit(joined(raised, degree + 1), degree + 1, cell, meanSquare, allOutside);
+                       : makeFit({joined(raised, degree + 1), degree + 1, meanSquare}, degree + 1, cell, allOutside);
   }
   return trial;
 }

@@ -11,15 +11,25 @@
 #include <vector>
 
 #include "basis/projection.h"
+#include "field/nearness.h"
 #include "hpsdf/build.h"
 
 namespace hpsdf {
+
+/// What a cell's samples carry: its projection onto the highest degree that they are exact for.
+struct Projected {
+  std::vector<double> coefficients;
+  int degree = 0;
+  double meanSquare = 0;  ///< of the samples: ∫Φ² / V
+};
 
 /// A cell's polynomial and what it counts in the queue.
 struct Fit {
   std::vector<double> coefficients;
   int degree = 0;
-  double error = 0;  ///< weighted by nearness; 0 where the cell lies outside the narrow band
+  CellError error;
+  bool outsideBand = false;
+  Projected spare;  ///< of the same samples, its degree at least the fit's; kept where refinements may be taken back
 };
 
 /// The outcome of trying both refinements of a cell.
@@ -33,12 +43,17 @@ enum class Refinement : std::uint8_t { degree, octree, either };
 /// Samples Φ and fits. Thread-safe: cells are fitted in parallel.
 class CellFitter {
  public:
-  CellFitter(const DistanceFunction& distance, const BuildOptions& options, double diagonal, const Progress& progress);
+  /// `nearness` is referred to, and may change between two fits.
+  CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
+             double nearDistance, const Progress& progress);
 
   Fit fit(const Box& cell, int degree) const;
 
   /// Tries what `allowed` names on a cell whose fit is `current`.
   Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
+
+  /// Φ at points given by local coordinates.
+  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
 
   /// Calls of Φ so far.
   std::uint64_t evaluations() const { return evaluations_; }
@@ -56,15 +71,17 @@ class CellFitter {
   std::vector<double> sample(std::span<const Box> cells, const Projection& projection,
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const Projection& projection, std::span<const double> samples) const;
-  /// `meanSquare` of the samples that the coefficients come from.
-  Fit makeFit(std::vector<double> coefficients, int degree, const Box& cell, double meanSquare, bool outsideBand) const;
-  double nearnessWeight(const Fit& fit) const;
-  double shellError(const Fit& fit, double volume) const;
+  /// Of this degree from what the samples carry.
+  Fit makeFit(Projected projected, int degree, const Box& cell, bool outsideBand) const;
+  double squaredError(const Fit& fit, double meanSquare) const;
+  void rate(Fit& fit, double squared, const Box& cell) const;
+  bool keepsSpare() const { return options_.criterion == Criterion::optimal; }
   Fit raisedByOwnSamples(const Box& cell, const Fit& current) const;
 
   const DistanceFunction& distance_;
   const BuildOptions& options_;
-  double diagonal_;
+  const Nearness& nearness_;
+  double nearDistance_;
   const Progress& progress_;
   mutable std::atomic<std::uint64_t> evaluations_ = 0;
   mutable std::array<std::once_flag, kMaxDegree + 1> rulesMade_;

@@ -214,6 +214,8 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(m.estimator);
   stream.item(m.criterion);
   stream.item(m.nearnessKind);
+  stream.item(m.maxError);
+  stream.item(m.measuredError);
   flagItem(stream, m.enriched);
   stream.item(m.continuityWeight);
   stream.item(data.blend);
