@@ -20,13 +20,15 @@ void main() {
   precise dvec3 fraction = p - dvec3(base);
   Node node = fetchNode(baseCellIndex(base));
   uint depth = 0u;
+  uvec3 place = base;
   while (!node.leaf) {
     precise dvec3 doubled = 2.0lf * fraction;
     uvec3 upper = uvec3(greaterThanEqual(doubled, dvec3(1.0)));
     fraction = doubled - dvec3(upper);
+    place = 2u * place + upper;
     node = fetchNode(childIndex(node, upper));
     ++depth;
   }
-  float value = evaluate(node.offset, node.degree, vec3(2.0lf * fraction - 1.0lf));
+  float value = fieldValue(node, depth, place, vec3(2.0lf * fraction - 1.0lf));
   cellDegreeDepthValue = uvec4(node.index, uint(node.degree), depth, floatBitsToUint(value));
 }

@@ -100,3 +100,6 @@ void descend(inout CellPoint at) {
   ++at.depth;
   at.scale *= 2.0;
 }
+
+// In nodes of its depth, counted from the domain's lower corner.
+uvec3 placeOf(CellPoint at) { return (uvec3(at.base) << at.depth) + at.path; }

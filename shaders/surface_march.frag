@@ -20,10 +20,10 @@ const float kPastFace = 4e-7;  // of the grid; as in trace.cpp
 
 const float kInfinity = 1e30;
 
-// World length from the point to where the ray has left the node's box, past a face by a little: see trace.cpp.
+// World length from the point to where the ray has left a box, past a face by a little: see trace.cpp. `ahead`: how far
+// its faces are ahead along each axis, in parts of the node.
 // `inverse`: of the absolute direction, infinite for an axis along which the ray does not move.
-float lengthToExit(CellPoint at, vec3 direction, vec3 inverse) {
-  vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(direction, vec3(0.0)));
+float lengthToExit(CellPoint at, vec3 ahead, vec3 direction, vec3 inverse) {
   vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * inverse, vec3(kInfinity), equal(direction, vec3(0.0)));
   return min(exits.x, min(exits.y, exits.z));
 }
@@ -41,6 +41,7 @@ void main() {
   vec3 direction = vec3(ray.direction);
   vec3 inverse = abs(1.0 / direction);
   float rayLength = float(ray.length);
+  bvec3 forwards = greaterThan(direction, vec3(0.0));
   float nudge = kNudge * diagonal;
 
   float t = max(0.0, float(double(start) - ray.fromEye) - 4.0 * nudge);
@@ -69,13 +70,14 @@ void main() {
     vec3 localDirection;
     // the height's linear part at t and its slope; the height at t lies between the next two, its slope within +-bend
     float middle = 0.0, slope = 0.0, lowest = 0.0, highest = 0.0, bend = 0.0;
-    float toExit = 0.0;
+    float toExit = 0.0;  // of what the bounds hold for
     bool known = false;  // the height at t
     bool stays = false;
     while (!stays && kind == kUnderWay && step < mostSteps) {
       ++step;
       at = relevantNodeAt(origin + t * direction);
-      toExit = lengthToExit(at, direction, inverse);
+      float toLeave = lengthToExit(at, mix(at.fraction, 1.0 - at.fraction, forwards), direction, inverse);
+      toExit = toLeave;
       localDirection = 2.0 * at.scale * direction;
       // of f - offset at first
       middle = 0.0;
@@ -83,6 +85,8 @@ void main() {
       lowest = at.node.lo - offset;
       highest = at.node.hi - offset;
       if (at.node.leaf) {
+        at.node = boundsNear(at.node, at.fraction);
+        toExit = lengthToExit(at, aheadNear(at.fraction, forwards), direction, inverse);
         vec4 linear = texelFetch(linearParts, int(at.node.index));
         middle = dot(linear.xyz, 2.0 * at.fraction - 1.0) + (linear.w - offset);
         slope = dot(linear.xyz, localDirection);
@@ -101,9 +105,9 @@ void main() {
       known = at.node.index == lastLeaf;
       if (side != 0.0 && highest < 0.0) {
         kind = kOnFace;
-      } else if (side != 0.0 && ((lowest > 0.0 && lowest + slope * toExit > 0.0) ||
+      } else if (side != 0.0 && ((lowest > 0.0 && lowest + slope * toLeave > 0.0) ||
                                  (known && lastHeight + (slope - bend) * toExit >= 0.0))) {
-        t += toExit + nudge;
+        t += (lowest > 0.0 && lowest + slope * toLeave > 0.0 ? toLeave : toExit) + nudge;
         lastLeaf = kNoCell;
         if (!(t <= rayLength)) kind = kMiss;
       } else {
@@ -135,7 +139,7 @@ void main() {
                                            : max(safe, min(reach, sqrt(4.0 * lastHeight / curve))));
     if (!known) stepLength = 0.0;
     vec3 localAhead = 2.0 * (at.fraction + stepLength * at.scale * direction) - 1.0;
-    float value = evaluate(at.node.offset, at.node.degree, localAhead) - offset;
+    float value = fieldValue(at.node, at.depth, placeOf(at), localAhead) - offset;
     if (!known) {
       if (side == 0.0) side = value >= 0.0 ? 1.0 : -1.0;
       lastLeaf = at.node.index;

@@ -310,11 +310,15 @@ std::vector<Parameter> buildParameters() {
        .defaultText = "false"},
       {.name = "continuity",
        .type = ParameterType::choice,
-       .help = "weak lets the cells' polynomials give way to each other at the end, so that the field jumps less from "
-               "cell to cell for somewhat more error ('study continuity' shows the trade); none keeps their own fits.",
+       .help =
+           "What is done about the jumps from cell to cell. weak lets the cells' polynomials give way to each other "
+           "at the end, so that the field jumps less for somewhat more error ('study continuity' shows the trade). "
+           "exact: value and gradient are continuous everywhere, neighbours being blended in a thin zone along their "
+           "faces; queries take up to twice as long. both: the one, then the other.",
        .defaultText = "none",
-       .choices = {"none", "weak"}},
+       .choices = {"none", "weak", "exact", "both"}},
       continuityWeightParameter(),
+      blendWidthParameter("blend-width"),
       {.name = "threads",
        .type = ParameterType::wholeNumber,
        .help = "Threads to use; 0 for all. The field is the same whatever their number.",
@@ -329,6 +333,18 @@ std::vector<Parameter> buildParameters() {
            "beside it win.",
        .defaultText = "false"},
   };
+}
+
+Parameter blendWidthParameter(std::string name) {
+  return {.name = std::move(name),
+          .type = ParameterType::number,
+          .help =
+              "How wide the blended zones are on either side of a face, as a part of a cell's edges: the wider, the "
+              "gentler the gradients, and the slower the queries.",
+          .defaultText = fmt::format("{}", kDefaultBlend),
+          .minimum = 0,
+          .maximum = kMaxBlend,
+          .minimumExcluded = true};
 }
 
 BuildOptions buildOptions(const Arguments& arguments) {
@@ -369,10 +385,12 @@ BuildOptions buildOptions(const Arguments& arguments) {
   }
   options.band = arguments.number("band");
   options.enrich = arguments.flag("enrich");
-  if (arguments.text("continuity") == "weak")
+  const std::string continuity = arguments.text("continuity");
+  if (continuity == "weak" || continuity == "both")
     options.continuityWeight = arguments.number("continuity-weight");
   else if (arguments.given("continuity-weight"))
     throw Error("continuity-weight belongs to continuity weak: give that too, or leave it out");
+  if (continuity == "exact" || continuity == "both") options.blend = arguments.number("blend-width");
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
   options.threads = arguments.whole("threads");
   return options;

@@ -23,6 +23,9 @@ Parameter continuityWeightParameter();
 /// The options that such arguments ask for. --paper gives way to what is written beside it.
 BuildOptions buildOptions(const Arguments& arguments);
 
+/// The width of blended zones.
+Parameter blendWidthParameter(std::string name);
+
 /// What a construction starts from.
 struct BuildInput {
   std::shared_ptr<const DistanceFunction> exact;

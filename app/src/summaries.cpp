@@ -110,6 +110,11 @@ std::string plainName(const std::string& source) {
   return name.empty() ? "field" : name;
 }
 
+std::string continuityName(const Field& field) {
+  const bool weak = field.metadata().continuityWeight > 0, exact = field.data().blend > 0;
+  return weak && exact ? "both" : weak ? "weak" : exact ? "exact" : "none";
+}
+
 std::string strategyName(Strategy strategy) {
   switch (strategy) {
     case Strategy::h1:
@@ -204,6 +209,8 @@ Json fieldJson(const CurrentField& current) {
       {"band", metadata.band},
       {"enriched", metadata.enriched},
       {"continuity_weight", metadata.continuityWeight > 0 ? Json(metadata.continuityWeight) : Json()},
+      {"continuity", continuityName(field)},
+      {"blend", field.data().blend},
       {"reference_length", metadata.referenceLength},
       {"normalization",
        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -272,6 +279,8 @@ std::string fieldText(const CurrentField& current) {
   if (metadata.continuityWeight > 0)
     text += summaryRow("continuity", fmt::format("weak, weight {}", shortNumber(metadata.continuityWeight)));
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
+  if (const double width = field.data().blend; width > 0)
+    text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

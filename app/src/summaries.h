@@ -59,5 +59,6 @@ std::string strategyName(Strategy strategy);
 std::string nearnessName(NearnessKind kind);
 std::string estimatorName(Estimator estimator);
 std::string criterionName(Criterion criterion);
+std::string continuityName(const Field& field);  ///< none, weak, exact or both
 
 }  // namespace hpsdf::app

@@ -25,6 +25,8 @@
 HPSDF_EMBED(font, HPSDF_FONT_FILE)
 HPSDF_EMBED(field_glsl, HPSDF_SHADER_DIR "/field.glsl")
 HPSDF_EMBED(full_screen_vert, HPSDF_SHADER_DIR "/full_screen.vert")
+HPSDF_EMBED(leaves_alone_glsl, HPSDF_SHADER_DIR "/leaves_alone.glsl")
+HPSDF_EMBED(leaves_blended_glsl, HPSDF_SHADER_DIR "/leaves_blended.glsl")
 HPSDF_EMBED(slice_frag, HPSDF_SHADER_DIR "/slice.frag")
 HPSDF_EMBED(surface_glsl, HPSDF_SHADER_DIR "/surface.glsl")
 HPSDF_EMBED(surface_vert, HPSDF_SHADER_DIR "/surface.vert")
@@ -45,6 +47,9 @@ std::span<const unsigned char> dejavuSans() { return {hpsdf_embedded_font, hpsdf
 std::string_view shaderText(std::string_view name) {
   if (name == "field.glsl") return text(hpsdf_embedded_field_glsl, hpsdf_embedded_field_glsl_end);
   if (name == "full_screen.vert") return text(hpsdf_embedded_full_screen_vert, hpsdf_embedded_full_screen_vert_end);
+  if (name == "leaves_alone.glsl") return text(hpsdf_embedded_leaves_alone_glsl, hpsdf_embedded_leaves_alone_glsl_end);
+  if (name == "leaves_blended.glsl")
+    return text(hpsdf_embedded_leaves_blended_glsl, hpsdf_embedded_leaves_blended_glsl_end);
   if (name == "slice.frag") return text(hpsdf_embedded_slice_frag, hpsdf_embedded_slice_frag_end);
   if (name == "surface.glsl") return text(hpsdf_embedded_surface_glsl, hpsdf_embedded_surface_glsl_end);
   if (name == "surface.vert") return text(hpsdf_embedded_surface_vert, hpsdf_embedded_surface_vert_end);

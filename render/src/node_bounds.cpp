@@ -58,14 +58,18 @@ NodeBounds leafBounds(const T* c, int degree) {
 
 }  // namespace
 
-std::vector<NodeBounds> nodeBounds(const FieldData& field) {
+std::vector<NodeBounds> nodeBounds(const FieldData& field, const std::vector<ZoneBounds>& zones) {
   std::vector<NodeBounds> bounds(field.nodes.size());
   std::visit(
       [&](const auto& coefficients) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
-          for (std::size_t n = range.begin(); n < range.end(); ++n)
-            if (node::isLeaf(field.nodes[n]))
-              bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
+          for (std::size_t n = range.begin(); n < range.end(); ++n) {
+            if (!node::isLeaf(field.nodes[n])) continue;
+            bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
+            if (zones.empty()) continue;
+            bounds[n].lo -= zones[n].apart;
+            bounds[n].hi += zones[n].apart;
+          }
         });
       },
       field.coefficients);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hpsdf/field.h"
+#include "zone_bounds.h"
 
 namespace hpsdf::render {
 
@@ -12,7 +13,8 @@ namespace hpsdf::render {
 /// |L_i''| ≤ (i−1)i(i+1)(i+2)/8): it lets a ray pass a node without evaluating it, and step within a leaf without ever
 /// passing a zero.
 struct NodeBounds {
-  float lo;  ///< the field's values within the node lie in [lo, hi]
+  float
+      lo;  ///< the field's values within the node lie in [lo, hi], blended or not; all else is of the polynomial alone
   float hi;
   /// Leaves: the gradient in local coordinates differs from that of the polynomial's linear part by at most this.
   /// Internal nodes: −1.
@@ -24,7 +26,8 @@ struct NodeBounds {
 };
 
 /// One for every node. A little wider than the coefficients say, by what single precision may add.
-std::vector<NodeBounds> nodeBounds(const FieldData& field);
+/// `zones` are those of a blended field.
+std::vector<NodeBounds> nodeBounds(const FieldData& field, const std::vector<ZoneBounds>& zones = {});
 
 /// The range [lo, hi] in 32 bits: the upper halves of the two floats, hi's in the high bits, lo rounded down and hi up.
 std::uint32_t packOutwards(float lo, float hi);

@@ -68,10 +68,12 @@ TEST(Registry, everyCommandExplainsItself) {
 TEST(Registry, holdsTheNamesToKeep) {
   const Registry registry = makeRegistry();
   const std::vector<std::pair<std::string, std::vector<std::string>>> fixed = {
-      {"build", {"target-error", "grid",     "nearness",     "max-degree", "max-depth",         "domain", "margin",
-                 "normalize",    "strategy", "coefficients", "quadrature", "cubature",          "band",   "threads",
-                 "max-steps",    "paper",    "enrich",       "continuity", "continuity-weight", "json"}},
+      {"build",
+       {"target-error", "grid",     "nearness",     "max-degree", "max-depth",         "domain",      "margin",
+        "normalize",    "strategy", "coefficients", "quadrature", "cubature",          "band",        "threads",
+        "max-steps",    "paper",    "enrich",       "continuity", "continuity-weight", "blend-width", "json"}},
       {"smooth", {"output", "continuity-weight", "threads", "json"}},
+      {"blend", {"output", "width", "json"}},
       {"info", {"json"}},
       {"query", {"json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
@@ -244,6 +246,9 @@ TEST(Arguments, mistakesSayWhatWasExpected) {
       {"build", "m -o f --domain 1,2,3", "cube, box or 6 numbers with commas between them, found '1,2,3'"},
       {"build", "m -o f --domain cub", "did you mean 'cube'?"},
       {"build", "m -o f --strategy ph", "expected hp, h1 or h2, found 'ph'"},
+      {"build", "m -o f --continuity exakt", "did you mean 'exact'?"},
+      {"build", "m -o f --blend-width 0", "above 0"},
+      {"blend", "f -o g --width 0.3", "0.25, found '0.3'"},
       {"build", "m -o f --targt-error 1", "unknown option '--targt-error'; did you mean '--target-error'?"},
       {"build", "m -o f --targt-error=1", "unknown option '--targt-error'; did you mean '--target-error'?"},
       {"build", "m -o f --grid 2 --grid 3", "--grid: given 2 times"},

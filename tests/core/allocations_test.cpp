@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
 
@@ -48,7 +49,7 @@ TEST(Allocations, AreCounted) {
 TEST(Allocations, QueriesMakeNone) {
   const TriangleMesh mesh = shapes::mesh("builtin:torus,segments=32,sides=16");
   const ExactDistance distance(mesh);
-  const Field field = build(distance, domainAround(mesh), {.targetError = 1e-5});
+  const Field field = build(distance, domainAround(mesh), {.targetError = 1e-5}), smooth = blended(field, 0.2);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> coordinate(-1.5, 1.5);  // some outside
   std::vector<Vector3> points(1000);
@@ -60,8 +61,11 @@ TEST(Allocations, QueriesMakeNone) {
               for (const Vector3& x : points) {
                 sum += field.value(x) + field.valueAndGradient(x).gradient.x() + field.cellAt(x).error + distance(x);
               }
-              field.values(points, values);
-              field.valuesAndGradients(points, both);
+              for (const Vector3& x : points) sum += smooth.value(x) + smooth.valueAndGradient(x).gradient.x();
+              for (const Field* f : {&field, &smooth}) {
+                f->values(points, values);
+                f->valuesAndGradients(points, both);
+              }
               distance(points, values);
             }),
             0u);

@@ -131,10 +131,10 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   }
   if (!field.singlePrecision()) settings["coefficients"] = "double";
   if (made.enriched) settings["enrich"] = "true";
-  if (made.continuityWeight > 0) {
-    settings["continuity"] = "weak";
-    settings["continuity-weight"] = fmt::format("{}", made.continuityWeight);
-  }
+  const double width = field.data().blend;
+  settings["continuity"] = continuityName(field);
+  if (made.continuityWeight > 0) settings["continuity-weight"] = fmt::format("{}", made.continuityWeight);
+  if (width > 0) settings["blend-width"] = fmt::format("{}", width);
   const auto mesh = settings_.find("mesh");
   if (mesh != settings_.end() && mesh->second != current.madeFrom()) return settings;
   settings["domain"] = corner(field.domain().min()) + "," + corner(field.domain().max());
@@ -146,7 +146,8 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
   const auto continuity = settings_.find("continuity");
-  if (continuity != settings_.end() && continuity->second == "none") settings.erase("continuity-weight");
+  if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
+    settings.erase("continuity-weight");
   for (const auto& [name, value] : settings_) settings[name] = value;
   if (maxSteps) settings["max-steps"] = fmt::format("{}", *maxSteps);
   const auto mesh = settings_.find("mesh");

@@ -19,6 +19,7 @@ namespace hpsdf {
 constexpr int kMaxDegree = 30;
 constexpr int kMaxDepth = 20;  ///< so that a cell's local coordinate keeps 32 bits of a double's 52
 
+/// Of `FieldData::blend`: with more the zones at opposite faces of a cell could meet.
 constexpr double kMaxBlend = 0.25;
 
 /// n(p) = (p+1)(p+2)(p+3)/6: coefficients of a polynomial of total degree p (paper, sec. 3.3).
@@ -113,6 +114,19 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
+/// How far a leaf of a blended field goes beyond its sides, and as far within them its say grows to the whole: by so
+/// much of an edge of a cell of a certain depth as `FieldData::blend` says. The depth is that of the deepest leaf that
+/// touches the side, itself included, or `kWall` where the domain ends; 5 bits each.
+namespace reach {
+constexpr int kWall = 31;
+constexpr std::uint32_t packed(int axis, bool upper, int depth) {
+  return std::uint32_t(depth) << (10 * axis + (upper ? 5 : 0));
+}
+constexpr int depth(std::uint32_t reach, int axis, bool upper) {
+  return static_cast<int>(reach >> (10 * axis + (upper ? 5 : 0)) & 31);
+}
+}  // namespace reach
+
 /// A leaf of the octree.
 struct Cell {
   std::uint32_t id;  ///< its node's index: names the cell within its field
@@ -142,6 +156,9 @@ struct Directory {
   std::int64_t row = 0, slab = 0;  ///< entries along x, along x and y
   /// x fastest. A node's bits, bits 40 to 47 its depth: below `depth` for a leaf that covers several entries.
   std::vector<std::uint64_t> entries;
+  /// How far the leaves of a blended field reach (`namespace reach`): by node, then by entry; 0 where that is no leaf.
+  /// Empty without blending.
+  std::vector<std::uint32_t> reaches;
 
   static constexpr std::uint64_t entry(std::uint64_t node, int depth) { return node | std::uint64_t(depth) << 40; }
   static constexpr int depthOf(std::uint64_t entry) { return static_cast<int>(entry >> 40 & 0xff); }
@@ -150,10 +167,16 @@ struct Directory {
 /// A hierarchical hp-adaptive signed distance field: immutable; every query is const, thread-safe and allocation-free.
 ///
 /// Inside the domain the value is the polynomial of the leaf that holds the point; leaves are half-open, so that every
-/// point has exactly one. The field jumps slightly from leaf to leaf. Outside the domain it is f(q) + |x - q| with q
-/// the closest point of the domain, with the matching gradient: continuous across the domain's boundary, though jumps
-/// between two leaves there go on outwards. It is an upper bound of a 1-Lipschitz field, so that outside a value is no
-/// safe length for a step of sphere tracing. Of infinite points the value is infinite and the gradient NaN.
+/// point has exactly one. The field jumps slightly from leaf to leaf, unless it is blended (`FieldData::blend`): then
+/// f = Σ wₙ fₙ / Σ wₙ over the leaves n that reach a point, fₙ being their polynomials continued beyond their boxes and
+/// wₙ products of smooth steps across their sides, so that value and gradient are continuous throughout the domain;
+/// away from the faces the leaf answers alone, as before, to the bit.
+///
+/// Outside the domain it is f(q) + |x - q| with q the closest point of the domain, with the matching gradient: the
+/// value is continuous across the domain's boundary. Jumps between two leaves there go on outwards; a blended field has
+/// none outside either, and its gradient jumps at the boundary alone. It is an upper bound of a 1-Lipschitz field, so
+/// that outside a value is no safe length for a step of sphere tracing. Of infinite points the value is infinite and
+/// the gradient NaN.
 class Field {
  public:
   /// Takes finished arrays; throws `Error` when they do not make a field (see `FieldData`).
@@ -179,6 +202,9 @@ class Field {
 
   /// The arrays themselves: for files, uploads and tests.
   const FieldData& data() const { return data_; }
+
+  /// Where queries start: for uploads and tests too.
+  const Directory& directory() const { return directory_; }
 
   /// Bytes that queries need: nodes, coefficients, directory, and bounds where they are kept.
   std::size_t bytes() const;

@@ -12,9 +12,10 @@
 
 namespace hpsdf {
 
-/// How far two polynomials are apart on a face.
+/// How far the limits from two leaves are apart on their face: those of their polynomials or, of a blended field, of
+/// what queries answer just within either.
 struct Jump {
-  double rms = 0;  ///< √(∫ jump² dA / area), by a quadrature that is exact
+  double rms = 0;  ///< √(∫ jump² dA / area), by a quadrature that is exact for polynomials
   double max = 0;  ///< greatest at the quadrature's points, along the face's edges and at its corners
 };
 

@@ -21,8 +21,8 @@ struct Piece {
 /// since rounding decides on them. Throws `Error` where the points are equal or not finite.
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to);
 
-/// By the polynomial of this leaf of the field, wherever x is: on a face, the limits from within the leaf. The same as
-/// `Field::valueAndGradient` for a point of the leaf.
+/// As `Field::valueAndGradient` answers for a point of this leaf; on its faces, the limits from within. Without
+/// blending it is the leaf's polynomial wherever x is.
 ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x);
 
 struct LineSample {
@@ -45,8 +45,8 @@ struct Line {
   double slopeAlong(const LineSample& sample) const { return sample.gradient.dot(to - from) / length(); }
 };
 
-/// `count` ≥ 2 evenly spaced samples, the two ends among them, and both ends of every piece; within the domain by the
-/// piece's own leaf, outside of it by the field's continuation. Throws as `piecesAlong` does.
+/// `count` ≥ 2 evenly spaced samples, the two ends among them, and both ends of every piece; within the domain from
+/// within the piece's own leaf, outside of it by the field's continuation. Throws as `piecesAlong` does.
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count);
 
 /// A border between two leaves on a segment.

@@ -92,12 +92,13 @@ class Construction {
     keepAs(options_.maxBytes && options_.coefficients == CoefficientType::automatic ? CoefficientType::float32
                                                                                     : options_.coefficients,
            field);
+    field.blend = options_.blend;
     ofFinishing_ += fitter_.evaluations() - before;
     return field;
   }
 
   PruneLimits pruneLimits() const {
-    PruneLimits limits{.goal = goal_, .nodeBytes = kNodeBytes, .coefficientBytes = coefficientBytes(options_)};
+    PruneLimits limits{.goal = goal_, .nodeBytes = nodeBytes(), .coefficientBytes = coefficientBytes(options_)};
     // what ended early, but not for want of room, has refinements to take back all the same
     if (!growthGoal_.reached(totals_) && !full_) limits.goal = goal_.relaxedTo(totals_, 1 / kGrowth);
     if (options_.maxBytes) limits.mostBytes = treeBytes(*options_.maxBytes);
@@ -168,8 +169,6 @@ class Construction {
   static constexpr double kGrowth = 0.7;
   static constexpr std::size_t kLookRound = 256;
   static constexpr double kByteGrowth = 1.6;  // the same in bytes
-  static constexpr double kNodeBytes = sizeof(std::uint64_t);
-  static constexpr double kWithDirectory = 17.0 / 16;  // of a field's bytes, over those of nodes and coefficients
 
   void fitBaseCells() {
     const std::size_t count = tree_.baseCells();
@@ -244,9 +243,12 @@ class Construction {
 
   /// Of the field as it will be, but for its directory.
   double bytes() const {
-    return kNodeBytes * double(tree_.nodes.size()) + coefficientBytes(options_) * double(coefficients_);
+    return nodeBytes() * double(tree_.nodes.size()) + coefficientBytes(options_) * double(coefficients_);
   }
-  static double treeBytes(std::uint64_t ofField) { return double(ofField) / kWithDirectory; }
+  /// Of its node and, where leaves are blended, of its reach.
+  double nodeBytes() const { return options_.blend > 0 ? 12 : 8; }
+  /// Without the directory, which takes a sixteenth of the rest at most, and half as much again for reaches.
+  double treeBytes(std::uint64_t ofField) const { return double(ofField) / (1 + nodeBytes() / 8 / 16); }
   double mostBytesOfGrowth() const {
     if (!options_.maxBytes) return HUGE_VAL;
     return treeBytes(*options_.maxBytes) * (options_.criterion == Criterion::optimal ? kByteGrowth : 1);
@@ -332,7 +334,7 @@ class Construction {
       throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
     const std::size_t before = tree_.nodes[node].fit.coefficients.size();
     const std::size_t added = raises ? trial.raised->coefficients.size() - before : 7 * before;
-    if (bytes() + coefficientBytes(options_) * double(added) + (raises ? 0 : 8 * kNodeBytes) > mostBytesOfGrowth()) {
+    if (bytes() + coefficientBytes(options_) * double(added) + (raises ? 0 : 8 * nodeBytes()) > mostBytesOfGrowth()) {
       full_ = true;
       return;
     }

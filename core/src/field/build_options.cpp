@@ -117,6 +117,8 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
   if (!(options.band >= 0) || !std::isfinite(options.band))
     refuse("band ", options.band, ": expected a width of at least 0");
   if (options.continuityWeight) checkWeakContinuity({.weight = *options.continuityWeight});
+  if (!(options.blend >= 0 && options.blend <= kMaxBlend))
+    refuse("blend ", options.blend, ": expected a part of a cell's edges, 0 to ", kMaxBlend);
   if (options.threads < 0) refuse("threads ", options.threads, ": expected 0 (all) or more");
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))

@@ -41,6 +41,11 @@ inline GridFrame gridFrame(const FieldData& field) {
   return frame;
 }
 
+/// `GridPoint::way` of these numbers along one axis.
+inline std::uint64_t wayAlong(int axis, std::int64_t fixed) {
+  return static_cast<std::uint64_t>(fixed & ((std::int64_t{1} << kMaxDepth) - 1)) << (21 * axis);
+}
+
 /// Coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain then
 /// lands exactly on the face between two base cells.
 inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
@@ -50,7 +55,7 @@ inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
   for (int axis = 0; axis < 3; ++axis) {
     at.coordinates[axis] = ((x[axis] - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
     at.fixed[axis] = std::min(static_cast<std::int64_t>(at.coordinates[axis] * kOne), frame.last[axis]);
-    at.way |= static_cast<std::uint64_t>(at.fixed[axis] & (kOne - 1)) << (21 * axis);
+    at.way |= wayAlong(axis, at.fixed[axis]);
   }
   return at;
 }
@@ -73,23 +78,34 @@ inline Location locate(const FieldData& field, const GridPoint& x) {
 struct FoundLeaf {
   std::uint64_t bits;  ///< of its node
   int depth;
-  std::array<double, 3> local;  ///< in [-1, 1]
+  std::array<double, 3> local;        ///< in [-1, 1]
+  std::array<std::int64_t, 3> place;  ///< in cells of its depth, counted from the domain's lower corner
+  std::size_t number;                 ///< its node's or, where the directory names it, that of all nodes + its entry's
 };
 
-/// The same leaf as `locate` finds, by the directory. x lies in the domain.
-inline FoundLeaf find(const FieldData& field, const Directory& directory, const Vector3& x) {
-  const GridPoint at = gridPoint(directory.frame, x);
-  const int top = directory.depth;
-  FoundLeaf found;
-  found.bits = directory.entries[at.cell(2, top) * directory.slab + at.cell(1, top) * directory.row + at.cell(0, top)];
-  found.depth = Directory::depthOf(found.bits);
-  while (!node::isLeaf(found.bits))
-    found.bits = field.nodes[node::firstChild(found.bits) + childOnWay(at.way, ++found.depth)];
+/// A leaf for a point in grid coordinates.
+inline FoundLeaf leafWithin(std::uint64_t bits, int depth, std::size_t number, const std::array<std::int64_t, 3>& place,
+                            const std::array<double, 3>& coordinates) {
+  FoundLeaf leaf{bits, depth, {}, place, number};
   // scaling by a power of two and taking off the whole part are exact
-  const double scale = 1 << found.depth;
+  const double scale = std::uint32_t{1} << depth;
   for (int axis = 0; axis < 3; ++axis)
-    found.local[axis] = 2 * (at.coordinates[axis] * scale - static_cast<double>(at.cell(axis, found.depth))) - 1;
-  return found;
+    leaf.local[axis] = 2 * (coordinates[axis] * scale - static_cast<double>(place[axis])) - 1;
+  return leaf;
+}
+
+/// The same leaf as `locate` finds, by the directory.
+inline FoundLeaf find(const FieldData& field, const Directory& directory, const GridPoint& at) {
+  const int top = directory.depth;
+  const std::int64_t entry = at.cell(2, top) * directory.slab + at.cell(1, top) * directory.row + at.cell(0, top);
+  std::uint64_t bits = directory.entries[entry];
+  int depth = Directory::depthOf(bits);
+  std::size_t number = field.nodes.size() + entry;
+  while (!node::isLeaf(bits)) {
+    number = node::firstChild(bits) + childOnWay(at.way, ++depth);
+    bits = field.nodes[number];
+  }
+  return leafWithin(bits, depth, number, {at.cell(0, depth), at.cell(1, depth), at.cell(2, depth)}, at.coordinates);
 }
 
 /// Edge lengths of a cell of the given depth.

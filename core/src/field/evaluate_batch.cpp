@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "field/blend.h"
 #include "field/evaluate.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -69,6 +71,7 @@ struct Batch {
   HWY_ALIGN double fixed[3][kBatch];           ///< as in GridPoint; whole numbers
   HWY_ALIGN std::uint64_t way[kBatch];         ///< as in GridPoint
   HWY_ALIGN std::uint64_t entry[kBatch];       ///< of the directory
+  std::uint64_t numbers[kBatch];               ///< of the leaves, as in FoundLeaf; without blending unknown
   HWY_ALIGN std::uint64_t bits[kBatch];        ///< of the nodes, with their depth as the directory has it
   HWY_ALIGN Place places[kBatch];              ///< when the leaves are found
   std::uint8_t list[kLists][kBatch + kLanes];  ///< points in leaves of each common degree, then all others
@@ -126,21 +129,24 @@ void enterGrid(const Directory& directory, Batch& batch) {
 
 /// Level by level, so that the points' nodes are fetched all at once. A point is put on the list of those that go on
 /// whether it does or not, and then counted or not: a branch would be mispredicted.
+template <bool WithNumbers>
 void descend(const FieldData& field, const Directory& directory, Batch& batch) {
   std::uint8_t waiting[kBatch];
   std::size_t count = 0;
-  const auto reach = [&](std::size_t i, std::uint64_t bits) {
+  const auto reach = [&](std::size_t i, std::size_t number, std::uint64_t bits) {
+    if constexpr (WithNumbers) batch.numbers[i] = number;
     batch.bits[i] = bits;
     waiting[count] = static_cast<std::uint8_t>(i);
     count += !node::isLeaf(bits);
   };
-  for (std::size_t i = 0; i < batch.count; ++i) reach(i, directory.entries[batch.entry[i]]);
+  for (std::size_t i = 0; i < batch.count; ++i)
+    reach(i, field.nodes.size() + batch.entry[i], directory.entries[batch.entry[i]]);
   for (int depth = directory.depth + 1; count > 0; ++depth) {
     const std::size_t before = std::exchange(count, 0);
     for (std::size_t n = 0; n < before; ++n) {
       const std::size_t i = waiting[n];
       const std::uint32_t child = node::firstChild(batch.bits[i]) + childOnWay(batch.way[i], depth);
-      reach(i, Directory::entry(field.nodes[child], depth));
+      reach(i, child, Directory::entry(field.nodes[child], depth));
     }
   }
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
@@ -263,9 +269,95 @@ void answerLeaves(const T* coefficients, const GridFrame& frame, const Batch& ba
   for (std::size_t n = 0; n < batch.listed[kLists - 1]; ++n) {
     const std::size_t i = batch.list[kLists - 1][n];
     const auto& local = batch.places[i].local;
-    const FoundLeaf leaf{batch.bits[i], Directory::depthOf(batch.bits[i]), {local[0], local[1], local[2]}};
+    const FoundLeaf leaf{batch.bits[i], Directory::depthOf(batch.bits[i]), {local[0], local[1], local[2]}, {}, 0};
     answer(coefficients, frame, leaf, out[i]);
   }
+}
+
+HWY_INLINE FoundLeaf leafOf(const Batch& batch, std::size_t i) {
+  const auto& local = batch.places[i].local;
+  const int depth = Directory::depthOf(batch.bits[i]);
+  FoundLeaf leaf{batch.bits[i], depth, {local[0], local[1], local[2]}, {}, batch.numbers[i]};
+  for (int axis = 0; axis < 3; ++axis)
+    leaf.place[axis] = static_cast<std::int64_t>(batch.fixed[axis][i]) >> (kMaxDepth - depth);
+  return leaf;
+}
+
+/// The points near one face of their leaves, each on the way to the leaf across.
+struct Across {
+  Batch batch;
+  std::uint8_t point[kBatch];
+  std::uint8_t axis[kBatch];
+};
+
+/// As `blendedWithin`, for all points that others' leaves may reach, whose own leaves have answered already.
+template <typename T, typename Answer>
+void blend(const FieldData& field, const Directory& directory, const T* coefficients, const Batch& batch, Answer* out) {
+  const GridFrame& frame = directory.frame;
+  const auto mixAt = [&](std::size_t i) {
+    out[i] =
+        mixed<Answer>(field, directory, {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]},
+                      Directory::depthOf(batch.bits[i]));
+  };
+  std::uint8_t points[kBatch], near[kBatch];
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const double* local = batch.places[i].local;
+    points[count] = static_cast<std::uint8_t>(i);
+    near[count] = static_cast<std::uint8_t>(nearAxes(field, {local[0], local[1], local[2]}));
+    count += near[count] != 0;
+  }
+  Across across;
+  Batch& others = across.batch;
+  others.count = 0;
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = points[n];
+    if (!std::has_single_bit(near[n])) {
+      mixAt(i);
+      continue;
+    }
+    const int axis = std::countr_zero(near[n]);
+    const int depth = Directory::depthOf(batch.bits[i]);
+    const auto place = static_cast<std::int64_t>(batch.fixed[axis][i]) >> (kMaxDepth - depth);
+    const std::int64_t fixed = fixedAcross(place, depth, batch.places[i].local[axis] > 0);
+    if (fixed < 0 || fixed > frame.last[axis]) continue;
+    const std::size_t other = others.count++;
+    across.point[other] = points[n];
+    across.axis[other] = static_cast<std::uint8_t>(axis);
+    const int shift = kMaxDepth - directory.depth;
+    const std::int64_t step = axis == 0 ? 1 : axis == 1 ? directory.row : directory.slab;
+    const auto before = static_cast<std::int64_t>(batch.fixed[axis][i]);
+    for (int a = 0; a < 3; ++a) {
+      others.coordinates[a][other] = batch.coordinates[a][i];
+      others.fixed[a][other] = batch.fixed[a][i];
+    }
+    others.fixed[axis][other] = static_cast<double>(fixed);
+    others.way[other] = batch.way[i] ^ wayAlong(axis, before) ^ wayAlong(axis, fixed);
+    others.entry[other] = batch.entry[i] + ((fixed >> shift) - (before >> shift)) * step;
+  }
+  if (others.count == 0) return;
+  descend<true>(field, directory, others);
+  sortByDegree(coefficients, others);
+  enterLeaves(others);
+  Answer answers[kBatch];
+  answerLeaves(coefficients, frame, others, answers);
+  for (std::size_t other = 0; other < others.count; ++other) {
+    const std::size_t i = across.point[other];
+    const int axis = across.axis[other];
+    const FoundLeaf one = leafOf(batch, i), two = leafOf(others, other);
+    if (!noThird(field, two.local, axis)) {
+      mixAt(i);
+      continue;
+    }
+    const auto ramp = [&](const FoundLeaf& of) {
+      return rampAlong(frame, of, axis, directory.reaches[of.number], field.blend);
+    };
+    out[i] = between(out[i], ramp(one), answers[other], ramp(two), axis);
+  }
+}
+
+template <typename Answer>
+void continueOutside(const GridFrame& frame, const Batch& batch, Answer* out) {
   if (batch.within) return;
   for (std::size_t i = 0; i < batch.count; ++i)
     if (!contains(frame, batch.points[i])) extend(batch.points[i] - closestWithin(frame, batch.points[i]), out[i]);
@@ -279,12 +371,17 @@ void answerAll(const FieldData& field, const Directory& directory, std::span<con
     batch.points = points.data() + first;
     batch.count = std::min(kBatch, points.size() - first);
     enterGrid(directory, batch);
-    descend(field, directory, batch);
+    if (field.blend > 0)
+      descend<true>(field, directory, batch);
+    else
+      descend<false>(field, directory, batch);
     std::visit(
         [&](const auto& c) {
           sortByDegree(c.data(), batch);
           enterLeaves(batch);
           answerLeaves(c.data(), directory.frame, batch, out.data() + first);
+          if (field.blend > 0) blend(field, directory, c.data(), batch, out.data() + first);
+          continueOutside(directory.frame, batch, out.data() + first);
         },
         field.coefficients);
   }

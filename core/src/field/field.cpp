@@ -7,8 +7,10 @@
 #include <string>
 
 #include "basis/projection.h"
+#include "field/blend.h"
 #include "field/evaluate.h"
 #include "field/evaluate_batch.h"
+#include "field/reach.h"
 #include "field/visit_nodes.h"
 #include "hpsdf/error.h"
 
@@ -68,16 +70,14 @@ void checkBlendAndBounds(const FieldData& data) {
 
 template <typename Answer>
 Answer answerOne(const FieldData& field, const Directory& directory, const Vector3& x) {
-  Answer result;
   if (!contains(directory.frame, x)) [[unlikely]] {
     const Vector3 closest = closestWithin(directory.frame, x);
-    result = answerOne<Answer>(field, directory, closest);
+    Answer result = answerOne<Answer>(field, directory, closest);
     extend(x - closest, result);
     return result;
   }
-  const FoundLeaf leaf = find(field, directory, x);
-  std::visit([&](const auto& c) { answer(c.data(), directory.frame, leaf, result); }, field.coefficients);
-  return result;
+  const GridPoint at = gridPoint(directory.frame, x);
+  return answerWithin<Answer>(field, directory, at.coordinates, find(field, directory, at));
 }
 
 /// As deep as a sixteenth of the field's own size allows.
@@ -89,6 +89,10 @@ Directory makeDirectory(const FieldData& field) {
   const std::size_t most = bytes / 16 / sizeof(directory.entries[0]);
   while (directory.depth < kMaxDepth && base << (3 * (directory.depth + 1)) <= most) ++directory.depth;
   directory.entries.resize(base << (3 * directory.depth));
+  if (field.blend > 0) {
+    directory.reaches = findReaches(field);
+    directory.reaches.resize(field.nodes.size() + directory.entries.size());
+  }
   directory.frame = gridFrame(field);
   directory.row = std::int64_t{field.grid[0]} << directory.depth;
   directory.slab = directory.row * (std::int64_t{field.grid[1]} << directory.depth);
@@ -98,9 +102,12 @@ Directory makeDirectory(const FieldData& field) {
     std::array<std::size_t, 3> first;  // of the entries that the node covers
     for (int axis = 0; axis < 3; ++axis) first[axis] = ((at.base[axis] << at.depth) + at.path[axis]) * width;
     for (std::size_t z = first[2]; z < first[2] + width; ++z)
-      for (std::size_t y = first[1]; y < first[1] + width; ++y)
-        std::fill_n(&directory.entries[z * directory.slab + y * directory.row + first[0]], width,
-                    Directory::entry(field.nodes[at.node], at.depth));
+      for (std::size_t y = first[1]; y < first[1] + width; ++y) {
+        const std::size_t row = z * directory.slab + y * directory.row + first[0];
+        std::fill_n(&directory.entries[row], width, Directory::entry(field.nodes[at.node], at.depth));
+        if (field.blend > 0)
+          std::fill_n(&directory.reaches[field.nodes.size() + row], width, directory.reaches[at.node]);
+      }
     return false;
   });
   return directory;
@@ -151,7 +158,7 @@ Field::Field(FieldData data) : data_(std::move(data)) {
 
 std::size_t Field::bytes() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
-  return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(directory_.entries) +
+  return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(directory_.entries) + sizeOf(directory_.reaches) +
          std::visit(sizeOf, data_.coefficients);
 }
 

@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "basis/legendre.h"
+#include "field/blend.h"
 #include "field/evaluate.h"
 #include "field/leaves.h"
 #include "hpsdf/error.h"
@@ -39,11 +40,20 @@ class Sheet {
   const double* value() const { return out_[0].data(); }
   const double* derivative(int axis) const { return out_[1 + axis].data(); }
 
+  /// Room for so many numbers of each kind, to be filled by `set`.
+  void resize(std::size_t size) {
+    for (auto& out : out_) out.resize(size);
+  }
+  void set(std::size_t at, const ValueAndGradient& result) {
+    out_[0][at] = result.value;
+    for (int axis = 0; axis < 3; ++axis) out_[1 + axis][at] = result.gradient[axis];
+  }
+
   /// The plane lies across `axis` at the local coordinate t; `along` are local coordinates along the axes that follow
-  /// it cyclically, the second fastest. Derivatives are by local coordinates.
+  /// it cyclically, the second fastest. Derivatives by local coordinates times `toWorld` are by the world's.
   template <typename T>
-  void evaluate(const T* coefficients, int degree, int axis, double t,
-                const std::array<std::vector<double>, 2>& along) {
+  void evaluate(const T* coefficients, int degree, int axis, double t, const std::array<std::vector<double>, 2>& along,
+                const Vector3& toWorld) {
     const int n = degree + 1;
     const std::size_t size[2] = {along[0].size(), along[1].size()};
     double across[kMaxDegree + 1], acrossSlope[kMaxDegree + 1];
@@ -67,7 +77,7 @@ class Sheet {
           at[1] += c * acrossSlope[index[axis]];
         }
 
-    for (auto& out : out_) out.resize(size[0] * size[1]);
+    resize(size[0] * size[1]);
     for (std::size_t s1 = 0; s1 < size[1]; ++s1) {
       struct Line {
         double value = 0, across = 0, along = 0;
@@ -93,9 +103,10 @@ class Sheet {
         }
         const std::size_t at = s0 * size[1] + s1;
         out_[0][at] = value;
-        out_[1 + axis][at] = dAcross;
-        out_[1 + (axis + 1) % 3][at] = d0;
-        out_[1 + (axis + 2) % 3][at] = d1;
+        const auto derivative = [&](int a, double d) { out_[1 + a % 3][at] = d * toWorld[a % 3]; };
+        derivative(axis, dAcross);
+        derivative(axis + 1, d0);
+        derivative(axis + 2, d1);
       }
     }
   }
@@ -109,7 +120,8 @@ class Sheet {
 /// One thread's measure of faces.
 class FaceMeter {
  public:
-  FaceMeter(const FieldData& field, std::span<const Samples> samples) : field_(field), samples_(samples) {}
+  FaceMeter(const Field& field, std::span<const Samples> samples)
+      : whole_(field), field_(field.data()), samples_(samples) {}
 
   /// The face of `small` across `axis` towards `step`, shared with `large`.
   Interface measure(const Leaf& small, const Leaf& large, int axis, int step) {
@@ -122,13 +134,16 @@ class FaceMeter {
       face.depths[side] = static_cast<std::uint8_t>(sides[side]->depth);
     }
     const Samples& samples = samples_[std::max(face.degrees[0], face.degrees[1])];
-    for (int side = 0; side < 2; ++side) sample(sheets_[side], *sides[side], small, axis, side == 0 ? 1 : -1, samples);
+    for (int side = 0; side < 2; ++side) {
+      if (field_.blend > 0)
+        sampleBlended(sheets_[side], *sides[side], small, axis, step, samples);
+      else
+        sample(sheets_[side], *sides[side], small, axis, side == 0 ? 1 : -1, samples);
+    }
 
     const Vector3 size = cellSize(field_, small.depth);
     const int axis0 = (axis + 1) % 3, axis1 = (axis + 2) % 3;
     face.area = size[axis0] * size[axis1];
-    std::array<Vector3, 2> toWorld;
-    for (int side = 0; side < 2; ++side) toWorld[side] = 2 * cellSize(field_, sides[side]->depth).cwiseInverse();
     const std::size_t n = samples.points.size();
     std::size_t worst = 0;
     double valueSquares = 0, gradientSquares = 0, greatestGradientSquare = 0;
@@ -136,8 +151,7 @@ class FaceMeter {
       const double jump = std::abs(sheets_[1].value()[at] - sheets_[0].value()[at]);
       double gradientSquare = 0;
       for (int a = 0; a < 3; ++a) {
-        const double difference =
-            sheets_[1].derivative(a)[at] * toWorld[1][a] - sheets_[0].derivative(a)[at] * toWorld[0][a];
+        const double difference = sheets_[1].derivative(a)[at] - sheets_[0].derivative(a)[at];
         gradientSquare += difference * difference;
       }
       const double weight = samples.weights[at / n] * samples.weights[at % n] / 4;
@@ -176,21 +190,47 @@ class FaceMeter {
         for (double& u : along_[side]) u = (2 * offset + u + 1) * scale - 1;
     }
     const std::uint64_t bits = field_.nodes[leaf.node];
+    const Vector3 toWorld = 2 * cellSize(field_, leaf.depth).cwiseInverse();
     std::visit(
-        [&](const auto& c) { sheet.evaluate(c.data() + node::offset(bits), node::degree(bits), axis, t, along_); },
+        [&](const auto& c) {
+          sheet.evaluate(c.data() + node::offset(bits), node::degree(bits), axis, t, along_, toWorld);
+        },
         field_.coefficients);
   }
 
+  /// The limits from within `leaf` at the samples on `small`'s face across `axis` towards `step`.
+  void sampleBlended(Sheet& sheet, const Leaf& leaf, const Leaf& small, int axis, int step, const Samples& samples) {
+    const std::size_t n = samples.points.size();
+    sheet.resize(n * n);
+    std::array<double, 3> local{};
+    local[axis] = step;
+    for (std::size_t at = 0; at < n * n; ++at) {
+      local[(axis + 1) % 3] = samples.points[at / n];
+      local[(axis + 2) % 3] = samples.points[at % n];
+      const std::array<double, 3> coordinates = gridAt(small, local);
+      const FoundLeaf found = leafWithin(field_.nodes[leaf.node], leaf.depth, leaf.node, leaf.place, coordinates);
+      sheet.set(at, answerWithin<ValueAndGradient>(field_, whole_.directory(), coordinates, found));
+    }
+  }
+
+  static std::array<double, 3> gridAt(const Leaf& leaf, const std::array<double, 3>& local) {
+    std::array<double, 3> coordinates;
+    for (int axis = 0; axis < 3; ++axis)
+      coordinates[axis] = std::ldexp(static_cast<double>(leaf.place[axis]) + (local[axis] + 1) / 2, -leaf.depth);
+    return coordinates;
+  }
+
   Vector3 worldAt(const Leaf& leaf, const std::array<double, 3>& local) const {
+    const std::array<double, 3> coordinates = gridAt(leaf, local);
     Vector3 x;
     for (int axis = 0; axis < 3; ++axis) {
       const double lower = field_.domain.min()[axis], size = field_.domain.max()[axis] - lower;
-      const double place = std::ldexp(static_cast<double>(leaf.place[axis]) + (local[axis] + 1) / 2, -leaf.depth);
-      x[axis] = lower + place / field_.grid[axis] * size;
+      x[axis] = lower + coordinates[axis] / field_.grid[axis] * size;
     }
     return x;
   }
 
+  const Field& whole_;
   const FieldData& field_;
   std::span<const Samples> samples_;
   std::array<Sheet, 2> sheets_;
@@ -230,7 +270,7 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   withThreads(threads, [&] {
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
       if (progress.cancelled && progress.cancelled()) throw Cancelled();
-      FaceMeter meter(data, samples);
+      FaceMeter meter(field, samples);
       for (std::size_t n = chunk * kChunk; n < std::min(leaves.size(), (chunk + 1) * kChunk); ++n)
         for (int axis = 0; axis < 3; ++axis)
           for (const int step : {-1, 1})

@@ -5,8 +5,8 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <variant>
 
+#include "field/blend.h"
 #include "field/evaluate.h"
 #include "hpsdf/error.h"
 
@@ -72,8 +72,7 @@ std::optional<Span> spanWithin(const Axes& axes) {
 GridPoint pointIn(const Place& place) {
   GridPoint point{};
   point.fixed = place;
-  for (int a = 0; a < 3; ++a)
-    point.way |= static_cast<std::uint64_t>(place[a] & ((std::int64_t{1} << kMaxDepth) - 1)) << (21 * a);
+  for (int a = 0; a < 3; ++a) point.way |= wayAlong(a, place[a]);
   return point;
 }
 
@@ -135,7 +134,7 @@ ValueAndGradient continued(const Field& field, const Line& line, const Piece& pi
 
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to) {
   if (from == to) throw Error("a segment's ends are one and the same point: give two");
-  const GridFrame frame = gridFrame(field.data());
+  const GridFrame& frame = field.directory().frame;
   const Axes axes = axesOf(frame, from, to);
   const std::optional<Span> span = spanWithin(axes);
   std::vector<Piece> pieces;
@@ -155,16 +154,15 @@ std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Ve
 }
 
 ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x) {
-  const GridFrame frame = gridFrame(field.data());
-  FoundLeaf leaf{field.data().nodes[cell.id], cell.depth, {}};
-  const double scale = std::ldexp(1.0, cell.depth);
+  const GridFrame& frame = field.directory().frame;
+  std::array<double, 3> coordinates;
+  std::array<std::int64_t, 3> place;
   for (int axis = 0; axis < 3; ++axis) {
-    const double place = std::round(gridCoordinate(frame, axis, cell.box.min()[axis]) * scale);
-    leaf.local[axis] = 2 * (gridCoordinate(frame, axis, x[axis]) * scale - place) - 1;
+    coordinates[axis] = gridCoordinate(frame, axis, x[axis]);
+    place[axis] = std::llround(std::ldexp(gridCoordinate(frame, axis, cell.box.min()[axis]), cell.depth));
   }
-  ValueAndGradient result;
-  std::visit([&](const auto& c) { answer(c.data(), frame, leaf, result); }, field.data().coefficients);
-  return result;
+  const FoundLeaf leaf = leafWithin(field.data().nodes[cell.id], cell.depth, cell.id, place, coordinates);
+  return answerWithin<ValueAndGradient>(field.data(), field.directory(), coordinates, leaf);
 }
 
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count) {

@@ -41,7 +41,7 @@ std::optional<Entry> enter(const RayGeometry& rays, const Vector3& eye, const Ve
 
 class CpuRenderer final : public Renderer {
  public:
-  explicit CpuRenderer(const Field& field) : field_(field.data()) {}
+  explicit CpuRenderer(const Field& field) : field_(field) {}
 
   ViewBuffers slice(const SliceView& view, int width, int height) override {
     const SliceGeometry geometry(field_.space(), view, width, height);
@@ -71,7 +71,7 @@ class CpuRenderer final : public Renderer {
     const CellPoint at = field_.leafAt(p);
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
     setCell(at, pixel, buffers);
-    buffers.value[pixel] = static_cast<float>(field_.value(at.node, 2 * at.fraction - Vector3::Ones()));
+    buffers.value[pixel] = static_cast<float>(field_.value(at, 2 * at.fraction - Vector3::Ones()));
   }
 
   void surfacePixel(const RayGeometry& geometry, double offset, int x, int y, ViewBuffers& buffers) const {
@@ -82,7 +82,7 @@ class CpuRenderer final : public Renderer {
     if (!hit) return;
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
     setCell(hit->cell, pixel, buffers);
-    const Sample sample = field_.sample(hit->cell.node, hit->local);
+    const Sample sample = field_.sample(hit->cell, hit->local);
     const Vector3 gradient = field_.worldGradient(sample.gradient, hit->cell.depth);
     const double length = gradient.norm();
     // a cell of degree 0 has no gradient: face the eye

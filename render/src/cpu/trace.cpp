@@ -70,11 +70,14 @@ Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vecto
 
 /// World length from the point to where the ray has left the node's box: past a face by a little, because a ray that
 /// runs along a face, on it up to rounding, would otherwise leave it again at every step.
-double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid) {
+/// `endOf(fraction)` is where it ends, both in parts of the node along the ray's way.
+template <typename EndOf>
+double lengthTo(const EndOf& endOf, const CellPoint& at, const Vector3& direction, const Vector3& grid) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
     if (direction[axis] == 0) continue;
-    const double ahead = direction[axis] > 0 ? 1 - at.fraction[axis] : at.fraction[axis];
+    const double along = direction[axis] > 0 ? at.fraction[axis] : 1 - at.fraction[axis];
+    const double ahead = endOf(along) - along;
     exit = std::min(exit, (std::ldexp(ahead, -at.depth) + kPastFace * grid[axis]) / std::abs(direction[axis]));
   }
   return exit;
@@ -82,7 +85,87 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
 
 }  // namespace
 
-TraceField::TraceField(const FieldData& field) : field_(field), space_(field), bounds_(nodeBounds(field)) {}
+TraceField::TraceField(const Field& field)
+    : field_(field.data()),
+      reaches_(field.directory().reaches),
+      space_(field_),
+      zones_(zoneBounds(field)),
+      bounds_(nodeBounds(field_, zones_)) {}
+
+TraceField::Part TraceField::partAt(const CellPoint& at, const Vector3& direction) const {
+  const NodeBounds& bounds = bounds_[at.node];
+  Part part{0, bounds.bend, bounds.curve};
+  const double blend = field_.blend;
+  part.toExit = lengthTo([&](double along) { return along < blend       ? blend
+                                                    : along < 1 - blend ? 1 - blend
+                                                                        : 1.0; }, at,
+                         direction, space_.grid);
+  const auto near = ((at.fraction.array() < blend) || (at.fraction.array() > 1 - blend)).count();
+  if (blend > 0 && near > 0) {
+    part.bend += zones_[at.node].bend[near - 1];
+    part.curve += zones_[at.node].curve[near - 1];
+  }
+  return part;
+}
+
+/// Calls use(leaf, local, weight, its gradient) for each, `p` in grid coordinates, which gradients refer to.
+template <typename Use>
+void TraceField::forEachReaching(const Vector3& p, const Use& use) const {
+  const auto visit = [&](const auto& self, std::uint32_t index, int depth, const Vector3& corner) -> void {
+    const double edge = std::ldexp(1.0, -depth), reach = field_.blend * edge;
+    const Vector3 within = p - corner;
+    if ((within.array() < -reach).any() || (within.array() > edge + reach).any()) return;
+    if (!node::isLeaf(field_.nodes[index])) {
+      for (std::uint32_t child = 0; child < 8; ++child)
+        self(self, node::firstChild(field_.nodes[index]) + child, depth + 1,
+             corner + 0.5 * edge * Vector3(child & 1, child >> 1 & 1, child >> 2));
+      return;
+    }
+    std::array<double, 3> step = {1, 1, 1}, slope = {0, 0, 0};
+    for (int axis = 0; axis < 3; ++axis)
+      for (const bool upper : {false, true}) {
+        const int deepest = reach::depth(reaches_[index], axis, upper);
+        if (deepest == reach::kWall) continue;
+        const double delta = field_.blend * std::ldexp(1.0, -deepest);
+        const double t = (upper ? edge - within[axis] : within[axis]) / delta;
+        const double s = t < -1 ? 0 : t > 1 ? 1 : 0.25 * (2 + 3 * t - t * t * t);
+        const double ds = std::abs(t) > 1 ? 0 : (upper ? -0.75 : 0.75) * (1 - t * t) / delta;
+        slope[axis] = slope[axis] * s + step[axis] * ds;
+        step[axis] *= s;
+      }
+    const double weight = step[0] * step[1] * step[2];
+    if (!(weight > 0)) return;
+    use(index, depth, localFromFraction(within / edge), weight,
+        Vector3(slope[0] * step[1] * step[2], step[0] * slope[1] * step[2], step[0] * step[1] * slope[2]));
+  };
+  std::array<std::uint32_t, 3> first, last;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double most = space_.grid[axis] - 1;
+    first[axis] = static_cast<std::uint32_t>(std::clamp(std::floor(p[axis] - field_.blend), 0.0, most));
+    last[axis] = static_cast<std::uint32_t>(std::clamp(std::floor(p[axis] + field_.blend), 0.0, most));
+  }
+  for (std::uint32_t z = first[2]; z <= last[2]; ++z)
+    for (std::uint32_t y = first[1]; y <= last[1]; ++y)
+      for (std::uint32_t x = first[0]; x <= last[0]; ++x)
+        visit(visit, (z * field_.grid[1] + y) * field_.grid[0] + x, 0, Vector3(x, y, z));
+}
+
+Sample TraceField::sampleBlended(const CellPoint& leaf, const Vector3& local) const {
+  const double edge = std::ldexp(1.0, -leaf.depth);
+  const Vector3 p = leaf.base + edge * (leaf.path + 0.5 * (local + Vector3::Ones()));
+  double weights = 0, sum = 0;
+  Vector3 weightsGradient = Vector3::Zero(), sumGradient = Vector3::Zero();
+  forEachReaching(
+      p, [&](std::uint32_t index, int depth, const Vector3& localThere, double weight, const Vector3& weightGradient) {
+        const Sample sample = samplePolynomial(index, localThere);
+        weights += weight;
+        sum += weight * sample.value;
+        weightsGradient += weightGradient;
+        sumGradient += weightGradient * sample.value + weight * std::ldexp(2.0, depth) * sample.gradient;
+      });
+  const double value = sum / weights;
+  return {value, 0.5 * edge * (sumGradient - value * weightsGradient) / weights};
+}
 
 CellPoint TraceField::baseCellAt(const Vector3& p) const {
   CellPoint at;
@@ -138,12 +221,17 @@ CellPoint TraceField::relevantNodeAt(const Vector3& p, double offset) const {
   return at;
 }
 
-Sample TraceField::sample(std::uint32_t leaf, const Vector3& local) const {
+Sample TraceField::samplePolynomial(std::uint32_t leaf, const Vector3& local) const {
   return withCoefficients(field_, leaf, [&](const auto* c) { return evaluateWithGradient(c, degree(leaf), local); });
 }
 
-double TraceField::value(std::uint32_t leaf, const Vector3& local) const {
-  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluate(c, degree(leaf), local); });
+Sample TraceField::sample(const CellPoint& leaf, const Vector3& local) const {
+  return field_.blend > 0 ? sampleBlended(leaf, local) : samplePolynomial(leaf.node, local);
+}
+
+double TraceField::value(const CellPoint& leaf, const Vector3& local) const {
+  if (field_.blend > 0) return sampleBlended(leaf, local).value;
+  return withCoefficients(field_, leaf.node, [&](const auto* c) { return evaluate(c, degree(leaf.node), local); });
 }
 
 Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
@@ -159,7 +247,7 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
   // positive on the side of the surface on which the ray starts
   double side = 0;
   const auto heightAt = [&](const CellPoint& cell, double t) {
-    return side * (value(cell.node, localAt(cell, t)) - offset);
+    return side * (value(cell, localAt(cell, t)) - offset);
   };
 
   // The only root of a cell between a (height > 0) and b (height ≤ 0): regula falsi, Illinois variant.
@@ -195,27 +283,28 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
   for (int step = 0; step < kMostSteps && t <= ray.length; ++step) {
     const CellPoint at = relevantNodeAt(ray.origin + t * ray.direction, offset);
     const NodeBounds& bounds = bounds_[at.node];
-    const double toExit = lengthToExit(at, ray.direction, space_.grid);
     if (excludes(at.node, offset)) {
       const double sideHere = bounds.lo > offset ? 1 : -1;
       if (side == 0) side = sideHere;
       if (side != sideHere) return hitOnFace(t);
-      t += toExit + nudge;
+      t += lengthTo([](double) { return 1.0; }, at, ray.direction, space_.grid) + nudge;
       continue;
     }
     if (at.node != lastLeaf) {
-      const double here = value(at.node, localFromFraction(at.fraction)) - offset;
+      const double here = value(at, localFromFraction(at.fraction)) - offset;
       if (side == 0) side = here >= 0 ? 1 : -1;
       lastLeaf = at.node;
       lastHeight = side * here;
       reach = std::numeric_limits<double>::infinity();
       if (lastHeight < 0) return hitOnFace(t);
     }
-    // within this leaf the height's slope along the ray lies between these two, its second derivative in ±curve
+    const auto [toExit, bendThere, curveThere] = partAt(at, ray.direction);
+    // within this part of the leaf the height's slope along the ray lies between these two, its second derivative in
+    // ±curve
     const Vector3 localDirection = std::ldexp(2.0, at.depth) * ray.direction;
     const double slope = side * linearSlope(at.node, localDirection);
-    const double bend = bounds.bend * localDirection.norm();
-    const double curve = bounds.curve * localDirection.squaredNorm();
+    const double bend = bendThere * localDirection.norm();
+    const double curve = curveThere * localDirection.squaredNorm();
     const double steepest = slope - bend;
     const double shallowest = slope + bend;
     if (lastHeight + steepest * toExit >= 0) {

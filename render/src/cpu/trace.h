@@ -10,6 +10,7 @@
 #include "grid_space.h"
 #include "hpsdf/field.h"
 #include "node_bounds.h"
+#include "zone_bounds.h"
 
 namespace hpsdf::render {
 
@@ -50,15 +51,16 @@ constexpr double kCrack = 4e-6;
 /// A field made ready for tracing. Keeps a reference to the field.
 class TraceField {
  public:
-  explicit TraceField(const FieldData& field);
+  explicit TraceField(const Field& field);
 
   const GridSpace& space() const { return space_; }
 
   /// The leaf that holds a point given in grid coordinates.
   CellPoint leafAt(const Vector3& p) const;
 
-  Sample sample(std::uint32_t leaf, const Vector3& local) const;
-  double value(std::uint32_t leaf, const Vector3& local) const;
+  /// At local coordinates of a leaf, which may lie a little outside of it.
+  Sample sample(const CellPoint& leaf, const Vector3& local) const;
+  double value(const CellPoint& leaf, const Vector3& local) const;
 
   int degree(std::uint32_t leaf) const { return node::degree(field_.nodes[leaf]); }
 
@@ -69,6 +71,20 @@ class TraceField {
   std::optional<Hit> trace(const Ray& ray, double offset) const;
 
  private:
+  /// What the bounds hold for that a ray's next steps are taken by: of a blended field a leaf's middle, or a part of it
+  /// near a face, an edge or a corner.
+  struct Part {
+    double toExit;  ///< world length until the ray has left it
+    double bend, curve;
+  };
+  Part partAt(const CellPoint& at, const Vector3& direction) const;
+
+  Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
+  /// The definition, by all leaves that reach the point.
+  Sample sampleBlended(const CellPoint& leaf, const Vector3& local) const;
+  template <typename Use>
+  void forEachReaching(const Vector3& p, const Use& use) const;
+
   CellPoint baseCellAt(const Vector3& p) const;
   void descend(CellPoint& at) const;
   /// Down to a leaf, or to a node in whose box the field cannot reach `offset`.
@@ -78,7 +94,9 @@ class TraceField {
   bool excludes(std::uint32_t node, double offset) const;
 
   const FieldData& field_;
+  const std::vector<std::uint32_t>& reaches_;
   GridSpace space_;
+  std::vector<ZoneBounds> zones_;
   std::vector<NodeBounds> bounds_;
 };
 

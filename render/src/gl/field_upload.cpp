@@ -82,6 +82,17 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Node
   return texels;
 }
 
+std::vector<NodeTexel> zoneTexels(const std::vector<ZoneBounds>& zones, const std::vector<std::uint32_t>& reaches) {
+  std::vector<NodeTexel> texels;
+  const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x); };
+  for (std::size_t n = 0; n < zones.size(); ++n) {
+    const ZoneBounds& zone = zones[n];
+    texels.push_back({reaches[n], bits(zone.apart), bits(zone.bend[0]), bits(zone.curve[0])});
+    texels.push_back({bits(zone.bend[1]), bits(zone.curve[1]), bits(zone.bend[2]), bits(zone.curve[2])});
+  }
+  return texels;
+}
+
 void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum format, const void* data,
             std::size_t bytes) {
   while (glGetError() != GL_NO_ERROR) {
@@ -95,20 +106,26 @@ void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum forma
 
 }  // namespace
 
-FieldUpload::FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds) {
+FieldUpload::FieldUpload(const Field& whole, const std::vector<NodeBounds>& bounds,
+                         const std::vector<ZoneBounds>& zones) {
+  const FieldData& field = whole.data();
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &largest);
   checkFits(field.nodes.size(), largest, "nodes");
+  checkFits(2 * zones.size(), largest, "halves of nodes' blended zones");
   checkFits(uploadedCount(field), std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "coefficients");
 
-  const std::vector<NodeTexel> texels = nodeTexels(field, bounds);
-  upload(nodeBuffer_, nodes_, GL_RGBA32UI, texels.data(), texels.size() * sizeof(NodeTexel));
+  const std::vector<NodeTexel> ofNodes = nodeTexels(field, bounds);
+  upload(nodeBuffer_, nodes_, GL_RGBA32UI, ofNodes.data(), ofNodes.size() * sizeof(NodeTexel));
   std::vector<std::array<float, 4>> linearParts;
   for (const NodeBounds& node : bounds) linearParts.push_back(node.linear);
   upload(linearPartBuffer_, linearParts_, GL_RGBA32F, linearParts.data(), linearParts.size() * sizeof linearParts[0]);
   const std::vector<float> coefficients = uploadedCoefficients(field);
   upload(coefficientBuffer_, coefficients_, GL_R32F, coefficients.data(), coefficients.size() * sizeof(float));
   glTextureBuffer(coefficientQuads_.name(), GL_RGBA32F, coefficientBuffer_.name());
+  if (zones.empty()) return;
+  const std::vector<NodeTexel> ofZones = zoneTexels(zones, whole.directory().reaches);
+  upload(zoneBuffer_, zones_, GL_RGBA32UI, ofZones.data(), ofZones.size() * sizeof(NodeTexel));
 }
 
 void FieldUpload::bind() const {
@@ -116,6 +133,7 @@ void FieldUpload::bind() const {
   glBindTextureUnit(1, coefficients_.name());
   glBindTextureUnit(4, linearParts_.name());
   glBindTextureUnit(5, coefficientQuads_.name());
+  glBindTextureUnit(6, zones_.name());
 }
 
 }  // namespace hpsdf::render

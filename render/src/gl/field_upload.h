@@ -14,17 +14,19 @@ namespace hpsdf::render {
 /// coefficients, R32F: as in FieldData, but those of leaves up to degree 4 in the order of field.glsl's straight code,
 /// and all leaves padded to a multiple of four; coefficientQuads: the same by four, RGBA32F.
 /// linearParts, RGBA32F: `NodeBounds::linear`.
+/// zones, RGBA32UI, two texels a node, none without blending: reach, apart, bend[0], curve[0] and bend[1], curve[1],
+/// bend[2], curve[2] of `Directory::reaches` and `ZoneBounds`, floats by their bits.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
-  FieldUpload(const FieldData& field, const std::vector<NodeBounds>& bounds);
+  FieldUpload(const Field& field, const std::vector<NodeBounds>& bounds, const std::vector<ZoneBounds>& zones);
 
-  /// To texture units 0 (nodes), 1 (coefficients), 4 (linear parts) and 5 (coefficients by four).
+  /// To texture units 0 (nodes), 1 (coefficients), 4 (linear parts), 5 (coefficients by four) and 6 (zones).
   void bind() const;
 
  private:
-  GlBuffer nodeBuffer_, coefficientBuffer_, linearPartBuffer_;
-  GlBufferTexture nodes_, coefficients_, coefficientQuads_, linearParts_;
+  GlBuffer nodeBuffer_, coefficientBuffer_, linearPartBuffer_, zoneBuffer_;
+  GlBufferTexture nodes_, coefficients_, coefficientQuads_, linearParts_, zones_;
 };
 
 }  // namespace hpsdf::render

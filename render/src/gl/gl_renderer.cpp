@@ -24,7 +24,7 @@ static_assert(kTile % kBlock == 0);
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
-enum : GLint { kShownLo = 15, kShownHi, kParallel };
+enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
@@ -39,6 +39,10 @@ constexpr int evaluationLoops(int degree) {
   const int rows = (degree + 1) * (degree + 2) / 2;
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
+
+/// The same where eight leaves reach the point: the search for them, eight places at each depth with ramps along three
+/// axes, and for each its evaluation and its ramps.
+constexpr int blendedLoops(int evaluation) { return 42 * (kMaxDepth + 1) + 8 * (evaluation + 5) + 2; }
 
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
@@ -120,7 +124,13 @@ Tile partWith(const std::vector<Block>& blocks, int width, int height) {
 
 /// The octree alone.
 FieldData withoutCoefficients(const FieldData& field) {
-  return {.domain = field.domain, .grid = field.grid, .nodes = field.nodes, .coefficients = {}, .metadata = {}};
+  return {.domain = field.domain,
+          .grid = field.grid,
+          .nodes = field.nodes,
+          .coefficients = {},
+          .blend = 0,
+          .bounds = {},
+          .metadata = {}};
 }
 
 int highestDegree(const FieldData& field) {
@@ -139,16 +149,23 @@ void checkGl(const char* what) {
 
 /// Everything on the device. Made and destroyed with the context current.
 struct Resources {
-  Resources(const FieldData& data, const std::vector<NodeBounds>& bounds)
-      : field(data, bounds),
-        slice(linkedProgram({"full_screen.vert"}, {"field.glsl", "slice.frag"})),
-        march(linkedProgram({"surface.vert"}, {"field.glsl", "surface.glsl", "surface_march.frag"})),
-        hit(linkedProgram({"surface.vert"}, {"field.glsl", "surface.glsl", "surface_hit.frag"})) {
-    for (const GlProgram* program : {&slice, &march, &hit})
+  Resources(const Field& whole, const std::vector<NodeBounds>& bounds, const std::vector<ZoneBounds>& zones)
+      : field(whole, bounds, zones),
+        slice(linkedProgram({"full_screen.vert"}, {"field.glsl", leaves(whole), "slice.frag"})),
+        march(linkedProgram({"surface.vert"}, {"field.glsl", leaves(whole), "surface.glsl", "surface_march.frag"})),
+        hit(linkedProgram({"surface.vert"}, {"field.glsl", leaves(whole), "surface.glsl", "surface_hit.frag"})) {
+    const FieldData& data = whole.data();
+    for (const GlProgram* program : {&slice, &march, &hit}) {
       glProgramUniform3ui(program->name(), kGrid, data.grid[0], data.grid[1], data.grid[2]);
+      if (data.blend > 0) glProgramUniform1f(program->name(), kBlend, static_cast<float>(data.blend));
+    }
     glEnableVertexArrayAttrib(blocks.name(), 0);
     glVertexArrayAttribFormat(blocks.name(), 0, 3, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(blocks.name(), 0, 0);
+  }
+
+  static std::string_view leaves(const Field& field) {
+    return field.data().blend > 0 ? "leaves_blended.glsl" : "leaves_alone.glsl";
   }
 
   FieldUpload field;
@@ -183,15 +200,15 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
 class GlRenderer final : public Renderer {
  public:
   GlRenderer(const Field& field, GlChoice choice)
-      : context_(choice),
-        space_(field.data()),
-        octree_(withoutCoefficients(field.data())),
-        bounds_(nodeBounds(field.data())) {
-    const int evaluation = evaluationLoops(highestDegree(field.data()));
-    stepsInPass_ = kLoopBudget / (evaluation + kMaxDepth + 4);
-    refinements_ = std::min(kRefinementsInAll, (kLoopBudget - kMaxDepth) / (evaluation + 1) - 1);
+      : context_(choice), space_(field.data()), octree_(withoutCoefficients(field.data())) {
+    const std::vector<ZoneBounds> zones = zoneBounds(field);
+    bounds_ = nodeBounds(field.data(), zones);
+    const int alone = evaluationLoops(highestDegree(field.data()));
+    const int evaluation = zones.empty() ? alone : blendedLoops(alone);
+    stepsInPass_ = std::max(1, kLoopBudget / (evaluation + kMaxDepth + 4));
+    refinements_ = std::clamp((kLoopBudget - kMaxDepth) / (evaluation + 1) - 1, 1, kRefinementsInAll);
     const EglContext::Current current(context_);
-    resources_ = std::make_unique<Resources>(field.data(), bounds_);
+    resources_ = std::make_unique<Resources>(field, bounds_, zones);
   }
 
   ~GlRenderer() override {

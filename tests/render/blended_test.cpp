@@ -1,0 +1,218 @@
+// Blended fields are drawn as they are: bounds, oracle and OpenGL.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "compare_buffers.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/render/renderer.h"
+#include "hpsdf/render/view.h"
+#include "node_bounds.h"
+#include "support/random_field.h"
+#include "support/require_gl.h"
+#include "zone_bounds.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr int kWidth = 64, kHeight = 48;
+
+Field jumping(unsigned seed, double roughness = 0.3) {
+  return randomField(seed, {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)),
+                            .grid = {2, 3, 2},
+                            .roughness = roughness,
+                            .maxDepth = 3,
+                            .maxDegree = 5});
+}
+
+std::vector<SurfaceView> views(const Field& field) {
+  std::vector<SurfaceView> result;
+  for (const double azimuth : {20.0, 140.0})
+    for (const Projection projection : {Projection::perspective, Projection::orthographic})
+      result.push_back({cameraOf({.azimuthDegrees = azimuth, .elevationDegrees = azimuth / 6, .projection = projection},
+                                 field.domain(), kWidth, kHeight),
+                        0.02});
+  return result;
+}
+
+std::vector<SliceView> slices(const Field& field) {
+  return {axisSlice(field.domain(), 2, 0.13, kWidth, kHeight), axisSlice(field.domain(), 0, 0.0, kWidth, kHeight),
+          planeSlice(field.domain(), field.domain().center(), Vector3(1, -2, 0.5), kWidth, kHeight)};
+}
+
+/// What holds within a leaf, in its local coordinates: of the field, and of the polynomial alone.
+struct Both {
+  ValueAndGradient field, polynomial;
+};
+
+Both bothAt(const Field& smooth, const Field& plain, const Cell& cell, const Vector3& local) {
+  const Vector3 half = cell.box.sizes() / 2, x = cell.box.center() + half.cwiseProduct(local);
+  Both both{smooth.valueAndGradient(x), plain.valueAndGradient(x)};
+  for (ValueAndGradient* of : {&both.field, &both.polynomial}) of->gradient = of->gradient.cwiseProduct(half);
+  return both;
+}
+
+TEST(ZoneBounds, HoldWithinTheWholeLeaf) {
+  constexpr double kStep = 1e-4;
+  for (const unsigned seed : {1u, 2u, 3u})
+    for (const double width : {0.05, 0.25}) {
+      const Field plain = jumping(seed, 1), smooth = blended(plain, width);
+      const std::vector<ZoneBounds> zones = zoneBounds(smooth);
+      ASSERT_EQ(zones.size(), smooth.data().nodes.size());
+      const std::vector<NodeBounds> bounds = nodeBounds(smooth.data(), zones);
+      std::mt19937 random(seed);
+      std::uniform_real_distribution<double> unit(-1, 1);
+      double closest = 0;
+      smooth.forEachCell([&](const Cell& cell) {
+        const ZoneBounds& zone = zones[cell.id];
+        for (int n = 0; n < 100; ++n) {
+          Vector3 local;
+          int near = 0;
+          for (int axis = 0; axis < 3; ++axis) {
+            const double t = unit(random);
+            local[axis] = n % 2 == 0 ? t : std::copysign(1 - 2 * width * std::abs(t), unit(random));
+            near += std::abs(local[axis]) > 1 - 2 * width;
+          }
+          const Both here = bothAt(smooth, plain, cell, local);
+          const double apart = std::abs(here.field.value - here.polynomial.value);
+          ASSERT_LE(apart, zone.apart);
+          ASSERT_LE(here.field.value, bounds[cell.id].hi);
+          ASSERT_GE(here.field.value, bounds[cell.id].lo);
+          closest = std::max(closest, apart / zone.apart);
+          const Vector3 bent = here.field.gradient - here.polynomial.gradient;
+          if (near == 0) {
+            ASSERT_EQ(apart, 0);
+            continue;
+          }
+          ASSERT_LE(bent.norm(), zone.bend[near - 1]);
+          const Vector3 step = kStep * Vector3(unit(random), unit(random), unit(random)).normalized();
+          if ((local + step).cwiseAbs().maxCoeff() > 1) continue;
+          const Both there = bothAt(smooth, plain, cell, local + step);
+          const double turned = (there.field.gradient - there.polynomial.gradient - bent).norm();
+          const int most = std::min(3, near + 1);  // the step may lead nearer
+          ASSERT_LE(turned, zone.curve[most - 1] * kStep * 1.001 + 1e-9);
+        }
+      });
+      EXPECT_GT(closest, 0.2) << "bounds so wide tell nothing";
+    }
+  EXPECT_TRUE(zoneBounds(jumping(1)).empty());
+}
+
+TEST(Blended, TheOraclesSlicesAreWhatTheFieldAnswers) {
+  for (const unsigned seed : {4u, 5u}) {
+    const Field field = jumping(seed), smooth = blended(field, 0.1);
+    std::size_t changed = 0;
+    for (SliceView view : slices(field)) {
+      view.origin += 0.00137 * view.right + 0.00211 * view.up;  // no row of samples along a face
+      const ViewBuffers buffers = makeCpuRenderer(smooth)->slice(view, kWidth, kHeight);
+      for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+        if (!buffers.hit(i)) continue;
+        const double x = double(i % kWidth), y = double(i / kWidth);
+        const Vector3 point =
+            view.origin + view.right * ((x + 0.5) / kWidth - 0.5) + view.up * (0.5 - (y + 0.5) / kHeight);
+        ASSERT_NEAR(buffers.value[i], smooth.value(point), 1e-6);
+        changed += std::abs(field.value(point) - smooth.value(point)) > 1e-3;
+      }
+    }
+    EXPECT_GT(changed, 300u);
+  }
+}
+
+TEST(Blended, TheOracleFindsTheFirstCrossing) {
+  for (const unsigned seed : {6u, 7u}) {
+    const Field smooth = blended(jumping(seed, 0.1), 0.1);
+    const auto renderer = makeCpuRenderer(smooth);
+    std::size_t seen = 0;
+    for (const SurfaceView& view : views(smooth)) {
+      const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);
+      for (std::size_t i = 0; i < buffers.cell.size(); i += 11) {
+        if (!buffers.hit(i)) continue;
+        ++seen;
+        const int x = int(i % kWidth), y = int(i / kWidth);
+        const Vector3 start = rayStart(view.camera, kWidth, kHeight, x, y);
+        const Vector3 ray = rayDirection(view.camera, kWidth, kHeight, x, y);
+        const ValueAndGradient hit = smooth.valueAndGradient(start + double(buffers.distance[i]) * ray);
+        if (buffers.value[i] - view.offset < 1e-4) {  // else the ray enters the domain within the solid
+          ASSERT_NEAR(hit.value, view.offset, 2e-4);
+          ASSERT_GT(hit.gradient.normalized().dot(buffers.normal[i].cast<double>()), 0.999);
+        }
+        double side = 0;
+        for (double t = 0; t < buffers.distance[i] - 1e-4; t += 5e-3) {
+          const Vector3 point = start + t * ray;
+          if (!smooth.domain().contains(point)) continue;
+          const double height = smooth.value(point) - view.offset;
+          if (side == 0) side = height;
+          ASSERT_GE(height * side, 0) << "at " << t << " of " << buffers.distance[i];
+        }
+      }
+    }
+    EXPECT_GT(seen, 200u);
+  }
+}
+
+TEST(Blended, OpenGlDrawsWhatTheOracleDoes) {
+  HPSDF_REQUIRE_GL();
+  for (const unsigned seed : {8u})
+    for (const double width : {kDefaultBlend, 0.25}) {
+      const Field smooth = blended(jumping(seed, 0.15), width);
+      const auto cpu = makeCpuRenderer(smooth), gl = makeGlRenderer(smooth, GlChoice::software);
+      for (const SliceView& view : slices(smooth))
+        EXPECT_TRUE(agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight), {.value = 4e-6}));
+      const double diagonal = smooth.domain().sizes().norm();
+      for (const SurfaceView& view : views(smooth))
+        EXPECT_TRUE(agree(cpu->surface(view, kWidth, kHeight), gl->surface(view, kWidth, kHeight),
+                          {.value = 1e-4, .position = 1e-5 * diagonal, .normalAngle = 1e-2}, &view.camera));
+    }
+}
+
+/// The same check on a field that is blended otherwise, and on one that is not.
+TEST(Blended, OpenGlNegativeControl) {
+  HPSDF_REQUIRE_GL();
+  const Field field = jumping(10);
+  const SliceView view = slices(field).front();
+  const ViewBuffers expected = makeCpuRenderer(blended(field, 0.1))->slice(view, kWidth, kHeight);
+  for (const double width : {0.0, 0.0999})
+    EXPECT_FALSE(agree(expected,
+                       makeGlRenderer(blended(field, width), GlChoice::software)->slice(view, kWidth, kHeight),
+                       {.value = 4e-6}))
+        << width;
+}
+
+/// Where leaves of depths far apart meet, single precision tells the weights of the smallest less exactly.
+TEST(Blended, DeepOctreesInOpenGl) {
+  HPSDF_REQUIRE_GL();
+  const Field smooth = blended(
+      randomField(4, {.grid = {3, 3, 3}, .refinement = 0.1, .maxDepth = 12, .deepAt = Vector3(0.1, 0.2, 0.3)}), 0.2);
+  Box deepest;
+  int depth = 0;
+  smooth.forEachCell([&](const Cell& cell) {
+    if (cell.depth > depth) deepest = cell.box;
+    depth = std::max(depth, cell.depth);
+  });
+  ASSERT_EQ(depth, 12);
+  const SliceView close{deepest.center(), 40 * deepest.sizes().x() * Vector3::UnitX(),
+                        30 * deepest.sizes().y() * Vector3::UnitY()};
+  EXPECT_TRUE(agree(makeCpuRenderer(smooth)->slice(close, kWidth, kHeight),
+                    makeGlRenderer(smooth, GlChoice::software)->slice(close, kWidth, kHeight), {.value = 5e-5}));
+}
+
+TEST(Blended, HasNoCracks) {
+  const auto count = [](const Field& field, bool gl) {
+    std::size_t cracks = 0;
+    const auto renderer = gl ? makeGlRenderer(field, GlChoice::software) : makeCpuRenderer(field);
+    for (const SurfaceView& view : views(field))
+      for (const std::uint8_t crack : renderer->surface(view, kWidth, kHeight).crack) cracks += crack;
+    return cracks;
+  };
+  const Field field = jumping(11);
+  for (const bool gl : {false, true}) {
+    if (gl && !support::glProblem().empty()) continue;
+    EXPECT_GT(count(field, gl), 100u);
+    EXPECT_EQ(count(blended(field), gl), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace hpsdf::render
