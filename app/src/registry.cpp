@@ -40,6 +40,8 @@ bool inRange(const Parameter& parameter, double value) {
 }
 
 std::string rangeText(const Parameter& parameter) {
+  if (parameter.minimum && parameter.maximum && parameter.minimumExcluded)
+    return fmt::format(" above {}, up to {}", *parameter.minimum, *parameter.maximum);
   if (parameter.minimum && parameter.maximum)
     return fmt::format(" from {} to {}", *parameter.minimum, *parameter.maximum);
   if (parameter.minimum)
