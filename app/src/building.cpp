@@ -109,6 +109,12 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
   return prepared;
 }
 
+void warnOfBounds(const Console& console, const BuildInput& input) {
+  if (input.options.bounds && input.mesh && !input.mesh->closed())
+    console.err << "hpsdf: warning: bounds hold for closed surfaces alone: beside this mesh's holes they do not"
+                << std::endl;
+}
+
 std::shared_ptr<const DistanceFunction> distanceOf(const std::shared_ptr<const ExactDistance>& exact,
                                                    const Normalization& normalization) {
   Source source = exact->source();
@@ -319,6 +325,12 @@ std::vector<Parameter> buildParameters() {
        .choices = {"none", "weak", "exact", "both"}},
       continuityWeightParameter(),
       blendWidthParameter("blend-width"),
+      {.name = "bounds",
+       .type = ParameterType::flag,
+       .help =
+           "Keep for each cell what is certain: how wrong the field may be anywhere in it, and how steep. With it rays "
+           "and collisions miss nothing. Holds for closed meshes that do not intersect themselves.",
+       .defaultText = "false"},
       {.name = "threads",
        .type = ParameterType::wholeNumber,
        .help = "Threads to use; 0 for all. The field is the same whatever their number.",
@@ -385,6 +397,7 @@ BuildOptions buildOptions(const Arguments& arguments) {
   }
   options.band = arguments.number("band");
   options.enrich = arguments.flag("enrich");
+  options.bounds = arguments.flag("bounds");
   const std::string continuity = arguments.text("continuity");
   if (continuity == "weak" || continuity == "both")
     options.continuityWeight = arguments.number("continuity-weight");
@@ -418,6 +431,7 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     Field field = withProgress(
         console, [&](const Progress& progress) { return build(*input.exact, input.domain, input.options, progress); });
     warnOfErrorLeft(console, field.metadata());
+    warnOfBounds(console, input);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   } catch (const Error& error) {
     rethrowNaming(surface, error);

@@ -177,6 +177,22 @@ std::string meshWarning(const std::string& name, const MeshReport& report) {
       name, faultyEdges(report));
 }
 
+/// Of the leaves' errors, in ascending order; empty where none are kept.
+std::vector<double> leafBounds(const Field& field) {
+  std::vector<double> bounds;
+  const FieldData& data = field.data();
+  for (std::size_t n = 0; n < data.bounds.size(); ++n)
+    if (node::isLeaf(data.nodes[n])) bounds.push_back(data.bounds[n].error);
+  std::ranges::sort(bounds);
+  return bounds;
+}
+
+Json boundsJson(const Field& field) {
+  const std::vector<double> bounds = leafBounds(field);
+  if (bounds.empty()) return {};
+  return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
+}
+
 Json fieldJson(const CurrentField& current) {
   const Field& field = current.field;
   const FieldMetadata& metadata = field.metadata();
@@ -211,6 +227,7 @@ Json fieldJson(const CurrentField& current) {
       {"continuity_weight", metadata.continuityWeight > 0 ? Json(metadata.continuityWeight) : Json()},
       {"continuity", continuityName(field)},
       {"blend", field.data().blend},
+      {"bounds", boundsJson(field)},
       {"reference_length", metadata.referenceLength},
       {"normalization",
        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -281,6 +298,10 @@ std::string fieldText(const CurrentField& current) {
   if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
   if (const double width = field.data().blend; width > 0)
     text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
+  if (const auto bounds = leafBounds(field); !bounds.empty())
+    text += summaryRow("bounds of the error",
+                       fmt::format("{} in the median, {} at most", shortNumber(bounds[bounds.size() / 2]),
+                                   shortNumber(bounds.back())));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

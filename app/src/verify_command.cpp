@@ -43,6 +43,13 @@ const std::vector<Threshold>& thresholds() {
        [](const Verified& v) { return v.figures.nearSurface.error.rms; }},
       {"max-error", "the greatest error", "Greatest error of all points.", false,
        [](const Verified& v) { return std::max(v.figures.uniform.error.max, v.figures.nearSurface.error.max); }},
+      {"max-violations", "the number of points beyond their cell's bound",
+       "Number of points at which the error or the slope is beyond the bound that the field keeps for their cell.",
+       true,
+       [](const Verified& v) {
+         if (!v.figures.bounds) throw Error("max-violations: the field keeps no bounds: build it with --bounds");
+         return double(v.figures.bounds->violations);
+       }},
       {"max-mismatches", "the number of wrong signs beyond the sign bound",
        "Number of points farther from the surface than the sign bound at which the field has the wrong sign.", true,
        [](const Verified& v) {
@@ -115,6 +122,14 @@ Json sampleJson(const SampleFigures& figures) {
             {"max_pair_slope", gradient.maxPairSlope}}}};
 }
 
+Json boundsJson(const std::optional<BoundFigures>& bounds) {
+  if (!bounds) return {};
+  return {{"violations", bounds->violations},
+          {"cells", bounds->cells},
+          {"median_bound", bounds->medianBound},
+          {"median_worst", bounds->medianWorst}};
+}
+
 Json worstJson(const WorstPoint& at) {
   return {{"position", vectorJson(at.point)},
           {"exact", at.exact},
@@ -145,6 +160,7 @@ Json verifiedJson(const Verified& verified, const std::vector<Judgement>& judgem
             {"value_max", verified.jumps.value.max},
             {"gradient_rms", verified.jumps.gradient.rms},
             {"gradient_max", verified.jumps.gradient.max}}},
+          {"bounds", boundsJson(verified.figures.bounds)},
           {"worst", worst},
           {"thresholds", limits}};
 }
@@ -213,6 +229,11 @@ std::string verifiedText(const Verified& verified) {
     text += fmt::format(
         "  a sign must be wrong between the surface and the field's own zero; farther away than {} it is a defect\n",
         shortNumber(figures.uniform.signs.beyond));
+  if (const auto& bounds = figures.bounds)
+    text += fmt::format("bounds: {} in the median of {} cells, where the worst point's error is {}; {}\n",
+                        shortNumber(bounds->medianBound), grouped(bounds->cells), shortNumber(bounds->medianWorst),
+                        bounds->violations == 0 ? std::string("no point is beyond its bound")
+                                                : fmt::format("{} points are BEYOND", grouped(bounds->violations)));
   return text + worstText(figures.worst);
 }
 

@@ -131,6 +131,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   }
   if (!field.singlePrecision()) settings["coefficients"] = "double";
   if (made.enriched) settings["enrich"] = "true";
+  if (!field.data().bounds.empty()) settings["bounds"] = "true";
   const double width = field.data().blend;
   settings["continuity"] = continuityName(field);
   if (made.continuityWeight > 0) settings["continuity-weight"] = fmt::format("{}", made.continuityWeight);

@@ -70,7 +70,8 @@ struct BuildOptions {
   /// λ of weak continuity (`continuity.h`), by which the leaves' fits give way to each other at the end, before they
   /// are rounded; nothing: they stay as they are.
   std::optional<double> continuityWeight = {};
-  double blend = 0;  ///< exact continuity: `FieldData::blend` of the finished field, 0 to `kMaxBlend`
+  double blend = 0;     ///< exact continuity: `FieldData::blend` of the finished field, 0 to `kMaxBlend`
+  bool bounds = false;  ///< for each leaf keeps what is certain of its error, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };

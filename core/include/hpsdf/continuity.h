@@ -42,7 +42,8 @@ constexpr double kDefaultBlend = 0.04;
 
 /// The same leaves, blended (`FieldData::blend`): value and gradient are continuous throughout the domain. `width` is
 /// that of the blended zones as a part of a leaf's edges, up to `kMaxBlend`: the wider, the gentler they lead from leaf
-/// to leaf, and the more queries ask several. 0 takes the blending off. Throws `Error` for a width out of range.
+/// to leaf, and the more queries ask several. 0 takes the blending off. Bounds are
+/// left out. Throws `Error` for a width out of range.
 Field blended(const Field& field, double width = kDefaultBlend);
 
 }  // namespace hpsdf

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "hpsdf/distance_function.h"
@@ -74,6 +75,14 @@ struct SampleFigures {
   GradientFigures gradient;
 };
 
+/// What a field says for certain (`CellBound`), held against samples. Cells without a sample do not count.
+struct BoundFigures {
+  std::size_t violations = 0;  ///< samples with a greater error than their cell's bound, or a steeper gradient
+  std::size_t cells = 0;
+  double medianBound = 0;  ///< over cells
+  double medianWorst = 0;  ///< over cells, of the greatest error among a cell's samples
+};
+
 /// A bad point, and its cell.
 struct WorstPoint {
   Vector3 point;
@@ -101,7 +110,8 @@ struct Verification {
   double near = 0;        ///< as used
   SampleFigures uniform;  ///< over points that are uniform in the domain (or the band)
   SampleFigures nearSurface;
-  std::vector<WorstPoint> worst;  ///< by |f − Φ|, of both kinds of points, worst first
+  std::optional<BoundFigures> bounds;  ///< over both kinds of points; nothing where the field keeps none
+  std::vector<WorstPoint> worst;       ///< by |f − Φ|, of both kinds of points, worst first
 };
 
 /// What a field is measured against. What is referred to must live as long.

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "field/bounds.h"
 #include "field/build_options.h"
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
@@ -58,7 +59,8 @@ class Construction {
  public:
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                const Progress& progress)
-      : options_(options),
+      : distance_(distance),
+        options_(options),
         progress_(progress),
         length_(referenceLength(distance.source(), domain)),
         goal_(errorGoal(options, length_)),
@@ -93,6 +95,7 @@ class Construction {
                                                                                     : options_.coefficients,
            field);
     field.blend = options_.blend;
+    if (options_.bounds) field.metadata.exactEvaluations += findBounds(field, distance_, progress_);
     ofFinishing_ += fitter_.evaluations() - before;
     return field;
   }
@@ -245,10 +248,13 @@ class Construction {
   double bytes() const {
     return nodeBytes() * double(tree_.nodes.size()) + coefficientBytes(options_) * double(coefficients_);
   }
-  /// Of its node and, where leaves are blended, of its reach.
-  double nodeBytes() const { return options_.blend > 0 ? 12 : 8; }
-  /// Without the directory, which takes a sixteenth of the rest at most, and half as much again for reaches.
-  double treeBytes(std::uint64_t ofField) const { return double(ofField) / (1 + nodeBytes() / 8 / 16); }
+  /// Of its node, its reach where leaves are blended, its bound.
+  double nodeBytes() const {
+    return 8 + (options_.blend > 0 ? 4 : 0) + (options_.bounds ? double(sizeof(CellBound)) : 0);
+  }
+  /// Without the directory, which takes a sixteenth of nodes and coefficients at most, and half as much again for
+  /// reaches.
+  double treeBytes(std::uint64_t ofField) const { return double(ofField) / (1 + (options_.blend > 0 ? 1.5 : 1) / 16); }
   double mostBytesOfGrowth() const {
     if (!options_.maxBytes) return HUGE_VAL;
     return treeBytes(*options_.maxBytes) * (options_.criterion == Criterion::optimal ? kByteGrowth : 1);
@@ -455,6 +461,7 @@ class Construction {
     if (progress_.report) progress_.report(task, fraction);
   }
 
+  const DistanceFunction& distance_;
   const BuildOptions& options_;
   const Progress& progress_;
   double length_;

@@ -15,10 +15,12 @@ std::vector<Leaf> leavesOf(const FieldData& field) {
   return leaves;
 }
 
-std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step) {
+std::optional<Leaf> notSmallerAt(const FieldData& field, const Leaf& leaf, const std::array<int, 3>& steps) {
   auto place = leaf.place;
-  place[axis] += step;
-  if (place[axis] < 0 || place[axis] >= std::int64_t{field.grid[axis]} << leaf.depth) return {};
+  for (int axis = 0; axis < 3; ++axis) {
+    place[axis] += steps[axis];
+    if (place[axis] < 0 || place[axis] >= std::int64_t{field.grid[axis]} << leaf.depth) return {};
+  }
   const auto base = [&](int a) { return place[a] >> leaf.depth; };
   Leaf beside{static_cast<std::uint32_t>((base(2) * field.grid[1] + base(1)) * field.grid[0] + base(0)), 0, {}};
   for (; !node::isLeaf(field.nodes[beside.node]); ++beside.depth) {
@@ -30,6 +32,12 @@ std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, i
   }
   for (int a = 0; a < 3; ++a) beside.place[a] = place[a] >> (leaf.depth - beside.depth);
   return beside;
+}
+
+std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step) {
+  std::array<int, 3> steps{};
+  steps[axis] = step;
+  return notSmallerAt(field, leaf, steps);
 }
 
 }  // namespace hpsdf

@@ -20,6 +20,10 @@ struct Leaf {
 /// In the order of the octree.
 std::vector<Leaf> leavesOf(const FieldData& field);
 
+/// The leaf of the same size or a larger one that holds the cell so many steps of a leaf's size away; none where
+/// smaller ones lie there, or nothing.
+std::optional<Leaf> notSmallerAt(const FieldData& field, const Leaf& leaf, const std::array<int, 3>& steps);
+
 /// The leaf of the same size or a larger one across a leaf's face; none where smaller ones lie there, or nothing.
 std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step);
 

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <set>
 
+#include "field/evaluate.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
@@ -178,6 +179,35 @@ std::vector<WorstPoint> worstPoints(const Field& field, std::span<const ExactSam
   return worst;
 }
 
+/// Samples beyond their cell's bound, and the greatest error by cell: -1 for those without a sample.
+struct HeldAgainst {
+  std::size_t violations = 0;
+  std::vector<double> worst;
+};
+
+void holdAgainst(const FieldData& field, const ExactSamples& samples, std::span<const ValueAndGradient> found,
+                 HeldAgainst& held) {
+  const GridFrame frame = gridFrame(field);
+  for (std::size_t n = 0; n < found.size(); ++n) {
+    const std::uint32_t cell = locate(field, gridPoint(frame, samples.points[n])).node;
+    const double error = std::abs(found[n].value - samples.distances[n]);
+    held.worst[cell] = std::max(held.worst[cell], error);
+    held.violations += error > field.bounds[cell].error || found[n].gradient.norm() > field.bounds[cell].slope;
+  }
+}
+
+BoundFigures boundFigures(const FieldData& field, const HeldAgainst& held) {
+  std::vector<double> bounds, worst;
+  for (std::size_t cell = 0; cell < held.worst.size(); ++cell) {
+    if (held.worst[cell] < 0) continue;
+    bounds.push_back(field.bounds[cell].error);
+    worst.push_back(held.worst[cell]);
+  }
+  tbb::parallel_sort(bounds.begin(), bounds.end());
+  tbb::parallel_sort(worst.begin(), worst.end());
+  return {held.violations, bounds.size(), percentile(bounds, 50), percentile(worst, 50)};
+}
+
 void checkOptions(const VerifyOptions& options) {
   if (options.points < 2) throw Error("verify: too few points; give 2 or more");
   for (const double length : {options.near, options.band, options.signBound})
@@ -234,6 +264,12 @@ Verification verify(const Field& field, const VerifiedSurface& surface, const Ve
         gradientFigures(uniform, atUniform, anglesAt(surface, uniform, atUniform, anglesOfEach, progress));
     result.nearSurface.gradient =
         gradientFigures(near, atNear, anglesAt(surface, near, atNear, anglesOfEach, progress));
+    if (!field.data().bounds.empty()) {
+      HeldAgainst held{.worst = std::vector<double>(field.data().nodes.size(), -1.0)};
+      holdAgainst(field.data(), uniform, atUniform, held);
+      holdAgainst(field.data(), near, atNear, held);
+      result.bounds = boundFigures(field.data(), held);
+    }
     result.worst = worstPoints(field, std::array{&uniform, &near}, std::array{&atUniform, &atNear}, options.worst);
     return result;
   });

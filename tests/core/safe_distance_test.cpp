@@ -1,0 +1,166 @@
+// What is certain about a field's error: bounds, and what goes by them.
+#include "hpsdf/safe_distance.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/shapes.h"
+
+namespace hpsdf {
+namespace {
+
+using Phi = std::function<double(const Vector3&)>;
+
+/// With a kink between them.
+double spheres(const Vector3& x) {
+  return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
+}
+double box(const Vector3& x) { return shapes::boxDistance(x, {0.7, 0.4, 0.9}); }
+Box cube() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
+
+struct Held {
+  int violations = 0;
+  double medianBound = 0, medianWorst = 0;  ///< over leaves
+};
+
+/// A lattice of 5³ places of every leaf, its corners among them, and uniform points.
+Held held(const Field& field, const Phi& phi) {
+  Held held;
+  std::vector<double> bounds, worst;
+  field.forEachCell([&](const Cell& cell) {
+    const CellBound bound = field.data().bounds[cell.id];
+    double greatest = 0;
+    for (int n = 0; n < 125; ++n) {
+      const Vector3 share(n % 5 / 4.0, n / 5 % 5 / 4.0, n / 25 / 4.0);
+      // off the faces, where rounding decides on the cell
+      const Vector3 inner = Vector3::Constant(1e-9) + share * (1 - 2e-9);
+      const Vector3 x = cell.box.min() + inner.cwiseProduct(cell.box.sizes());
+      const auto [value, gradient] = field.valueAndGradient(x);
+      greatest = std::max(greatest, std::abs(value - phi(x)));
+      held.violations += gradient.norm() > bound.slope;
+    }
+    held.violations += greatest > bound.error;
+    bounds.push_back(bound.error);
+    worst.push_back(greatest);
+  });
+  const auto median = [](std::vector<double>& numbers) {
+    std::ranges::nth_element(numbers, numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2));
+    return numbers[numbers.size() / 2];
+  };
+  held.medianBound = median(bounds);
+  held.medianWorst = median(worst);
+  return held;
+}
+
+TEST(SafeDistance, BoundsHoldAndAreNotFarOff) {
+  const ExactDistance gear(shapes::mesh("gear"));
+  for (const Phi& phi : {Phi(spheres), Phi(box)})
+    for (const double target : {1e-5, 1e-7}) {
+      const Field field = build(phi, cube(), {.targetError = target, .bounds = true});
+      EXPECT_EQ(held(field, phi).violations, 0);
+    }
+  const Field field = build(gear, domainAround(gear.source().box), {.targetError = 1e-5, .bounds = true});
+  const Held found = held(field, [&](const Vector3& x) { return gear(x); });
+  EXPECT_EQ(found.violations, 0);
+  EXPECT_LT(found.medianBound, 20 * found.medianWorst);
+}
+
+TEST(SafeDistance, TheCheckFindsBoundsThatAreTooLow) {
+  FieldData data = build(spheres, cube(), {.targetError = 1e-5, .bounds = true}).data();
+  for (CellBound& bound : data.bounds) bound.error /= 100;
+  EXPECT_GT(held(Field(data), spheres).violations, 100);
+  data = build(spheres, cube(), {.targetError = 1e-5, .bounds = true}).data();
+  for (CellBound& bound : data.bounds) bound.slope *= 0.9f;
+  EXPECT_GT(held(Field(data), spheres).violations, 100);
+}
+
+TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
+  const Field weak = build(spheres, cube(), {.targetError = 1e-5, .continuityWeight = 0.5, .bounds = true});
+  EXPECT_EQ(held(weak, spheres).violations, 0);
+  for (const double blend : {0.04, 0.25}) {
+    const Field exact =
+        build(spheres, cube(), {.targetError = 1e-5, .grid = {16, 16, 16}, .blend = blend, .bounds = true});
+    const Held found = held(exact, spheres);
+    EXPECT_EQ(found.violations, 0);
+    EXPECT_LT(found.medianBound, 4 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
+  }
+  EXPECT_TRUE(blended(weak).data().bounds.empty()) << "they are not those of the blended field";
+}
+
+TEST(SafeDistance, BoundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
+  const BuildOptions plain{.targetError = 1e-6};
+  BuildOptions bounded = plain;
+  bounded.bounds = true;
+  const Field before = build(spheres, cube(), plain), after = build(spheres, cube(), bounded);
+  EXPECT_LT(double(after.metadata().exactEvaluations), 1.5 * double(before.metadata().exactEvaluations));
+  EXPECT_EQ(before.data().nodes, after.data().nodes);
+  const auto same = [&](const Field& other) {
+    return std::ranges::equal(after.data().bounds, other.data().bounds, [](const CellBound& a, const CellBound& b) {
+      return a.error == b.error && a.slope == b.slope;
+    });
+  };
+  bounded.threads = 1;
+  EXPECT_TRUE(same(build(spheres, cube(), bounded)));
+  EXPECT_TRUE(same(withBounds(before, spheres, 3)));
+  EXPECT_EQ(withBounds(before, spheres).metadata().exactEvaluations, after.metadata().exactEvaluations);
+  EXPECT_FALSE(same(withBounds(before, box))) << "another surface has other bounds";
+}
+
+TEST(SafeDistance, NoBallOfSafeDistanceHoldsTheSurface) {
+  const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> coordinate(-1.5, 1.5);
+  int useful = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const Vector3 x(coordinate(random), coordinate(random), coordinate(random));
+    const double safe = safeDistance(field, x);
+    ASSERT_LE(safe, std::abs(spheres(x)));
+    useful += safe > 0.8 * std::abs(spheres(x));
+  }
+  EXPECT_GT(useful, 8000);
+}
+
+TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
+  const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] { return Vector3(normal(random), normal(random), normal(random)).normalized(); };
+  int touches = 0, leaves = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const Vector3 origin = 2.5 * direction();
+    const Vector3 along = (0.6 * direction() - origin).normalized();
+    const SafeTrace trace = safeTrace(field, origin, along, 1e-3);
+    for (int step = 0; step <= 200; ++step) ASSERT_GT(spheres(origin + step / 200.0 * trace.length * along), 0) << n;
+    (trace.mayTouch ? touches : leaves) += 1;
+    if (trace.mayTouch) {
+      EXPECT_LT(spheres(origin + trace.length * along), 0.1) << "it stops near the surface";
+    }
+  }
+  EXPECT_GT(touches, 100);
+  EXPECT_GT(leaves, 100);
+  EXPECT_FALSE(safeTrace(field, {3, 3, 3}, {1, 0, 0}, 1e-3).mayTouch) << "past the domain";
+}
+
+TEST(SafeDistance, WithoutBoundsNothingIsSafe) {
+  const Field field = build(spheres, cube(), {.targetError = 1e-4});
+  EXPECT_FALSE(boundAt(field, {0, 0, 0}));
+  EXPECT_THROW(safeDistance(field, {0, 0, 0}), Error);
+  EXPECT_THROW(safeTrace(field, {0, 0, 0}, {1, 0, 0}, 1e-3), Error);
+  const Field bounded = withBounds(field, spheres);
+  EXPECT_TRUE(boundAt(bounded, {0, 0, 0}));
+  EXPECT_THROW(safeTrace(bounded, {0, 0, 0}, {0, 0, 0}, 1e-3), Error);
+  EXPECT_THROW(safeTrace(bounded, {0, 0, 0}, {1, 0, 0}, 0), Error);
+  EXPECT_THROW(withBounds(field, [](const Vector3&) { return std::nan(""); }), Error);
+}
+
+}  // namespace
+}  // namespace hpsdf
