@@ -91,7 +91,7 @@ TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
         build(spheres, cube(), {.targetError = 1e-5, .grid = {16, 16, 16}, .blend = blend, .bounds = true});
     const Held found = held(exact, spheres);
     EXPECT_EQ(found.violations, 0);
-    EXPECT_LT(found.medianBound, 4 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
+    EXPECT_LT(found.medianBound, 12 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
   }
   EXPECT_TRUE(blended(weak).data().bounds.empty()) << "they are not those of the blended field";
 }
