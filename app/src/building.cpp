@@ -160,6 +160,15 @@ Parameter continuityWeightParameter() {
           .minimumExcluded = true};
 }
 
+Parameter threadsParameter(const std::string& result) {
+  return {.name = "threads",
+          .type = ParameterType::wholeNumber,
+          .help = fmt::format("Threads to use; 0 for all. {} the same whatever their number.", result),
+          .defaultText = "0",
+          .minimum = 0,
+          .maximum = 1024};
+}
+
 std::vector<Parameter> buildParameters() {
   return {
       {.name = "target-error",
@@ -331,12 +340,7 @@ std::vector<Parameter> buildParameters() {
            "Keep for each cell what is certain: how wrong the field may be anywhere in it, and how steep. With it rays "
            "and collisions miss nothing. Holds for closed meshes that do not intersect themselves.",
        .defaultText = "false"},
-      {.name = "threads",
-       .type = ParameterType::wholeNumber,
-       .help = "Threads to use; 0 for all. The field is the same whatever their number.",
-       .defaultText = "0",
-       .minimum = 0,
-       .maximum = 1024},
+      threadsParameter("The field is"),
       {.name = "paper",
        .type = ParameterType::flag,
        .help =

@@ -17,6 +17,9 @@ namespace hpsdf::app {
 /// The parameters of a construction, shared by `build`, `report` and others.
 std::vector<Parameter> buildParameters();
 
+/// How many threads; `result`, such as "The field is", does not depend on them.
+Parameter threadsParameter(const std::string& result);
+
 /// λ of weak continuity, for `build` and `smooth`.
 Parameter continuityWeightParameter();
 

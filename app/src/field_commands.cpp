@@ -101,7 +101,7 @@ void runSmooth(Session& session, const Arguments& arguments) {
     return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
                             arguments.whole("threads"), progress);
   });
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = secondsSince(start);
   const CurrentField& before = session.current();
   session.changeField({std::move(made.field), saves ? arguments.text("output") : before.name, {}, before.surface});
   if (saves) saveCurrent(session, arguments.text("output"));
@@ -139,12 +139,7 @@ Command smoothCommand() {
                           .alias = 'o',
                           .need = Need::onCommandLine},
                          continuityWeightParameter(),
-                         {.name = "threads",
-                          .type = ParameterType::wholeNumber,
-                          .help = "Threads to use; 0 for all. The field is the same whatever their number.",
-                          .defaultText = "0",
-                          .minimum = 0,
-                          .maximum = 1024}},
+                         threadsParameter("The field is")},
           .action = runSmooth};
 }
 

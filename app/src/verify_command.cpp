@@ -387,12 +387,7 @@ void addVerifyCommand(Registry& registry) {
                       .type = ParameterType::flag,
                       .help = "Compare with a mesh that the field was not made from.",
                       .defaultText = "false"},
-                     {.name = "threads",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Threads to use; 0 for all. The figures are the same whatever their number.",
-                      .defaultText = "0",
-                      .minimum = 0,
-                      .maximum = 1024}},
+                     threadsParameter("The figures are")},
       .action = runVerify};
   for (const Threshold& threshold : thresholds())
     command.parameters.push_back({.name = threshold.option,

@@ -217,7 +217,7 @@ TEST(WeakContinuity, LeavesAContinuousFieldAlone) {
       samples.push_back(x.x() * x.x() * x.x() - x.x() * x.y() + x.z());
     }
     std::vector<double> polynomial = (*projection)(samples);
-    for (int degree = 5; degree > cell.degree; --degree) polynomial = withoutTopDegree(polynomial, degree);
+    for (int degree = 5; degree > cell.degree; --degree) polynomial = truncated(polynomial, degree, degree - 1);
     std::ranges::copy(polynomial, c.begin() + node::offset(data.nodes[cell.id]));
   });
   const Field field{std::move(data)};

@@ -167,11 +167,11 @@ std::vector<double> appendTopDegree(std::span<const double> lower, std::span<con
   return result;
 }
 
-std::vector<double> withoutTopDegree(std::span<const double> coefficients, int degree) {
+std::vector<double> truncated(std::span<const double> coefficients, int degree, int to) {
   std::vector<double> result;
-  result.reserve(coefficientCount(degree - 1));
+  result.reserve(coefficientCount(to));
   forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-    if (i + j + k < degree) result.push_back(coefficients[index]);
+    if (i + j + k <= to) result.push_back(coefficients[index]);
   });
   return result;
 }

@@ -73,8 +73,8 @@ std::unique_ptr<const Projection> plainProjection(const Cubature& cubature, int 
 /// The coefficients of degree p as the first of degree p+1, the new shell filled from `raised` (paper, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
 
-/// The coefficients of degree below `degree`: without the top shell.
-std::vector<double> withoutTopDegree(std::span<const double> coefficients, int degree);
+/// Those of the coefficients of `degree` that are of degree `to` at most.
+std::vector<double> truncated(std::span<const double> coefficients, int degree, int to);
 
 /// The cell's projection from those of its eight children (number x + 2y + 4z), all of one degree: exactly what the
 /// children's samples together would give.

@@ -168,8 +168,7 @@ Fit CellFitter::makeFit(Projected projected, int degree, const Box& cell, bool o
   Fit fit;
   fit.degree = degree;
   fit.outsideBand = outsideBand;
-  fit.coefficients =
-      projected.degree == degree ? projected.coefficients : withoutTopDegree(projected.coefficients, projected.degree);
+  fit.coefficients = truncated(projected.coefficients, projected.degree, degree);
   rate(fit,
        options_.trialSamples == TrialSamples::own ? topDegreeError(fit.coefficients.data(), degree, 1.0)
                                                   : squaredError(fit, projected.meanSquare),

@@ -31,15 +31,6 @@ std::vector<double> squaredErrors(const Fit& fit) {
   return left;
 }
 
-std::vector<double> truncated(const std::vector<double>& coefficients, int degree, int to) {
-  std::vector<double> kept;
-  kept.reserve(coefficientCount(to));
-  forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-    if (i + j + k <= to) kept.push_back(coefficients[index]);
-  });
-  return kept;
-}
-
 class Pruning {
  public:
   Pruning(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits)
