@@ -355,6 +355,24 @@ TEST(Blend, OfVeryDeepCells) {
   for (const Vector3& x : points) ASSERT_TRUE(smooth.valueAndGradient(x).gradient.allFinite());
 }
 
+/// So narrow that at the domain's far end the width is lost in rounding.
+TEST(Blend, OfZonesWithoutWidth) {
+  const Field field = rude(20);
+  for (const double width : {1e-300, 1e-17, 1e-16, 1e-15, 1e-12}) {
+    const Field smooth = blended(field, width);
+    std::vector<Vector3> points;
+    for (const Cell& cell : cellsOf(field))
+      for (int corner = 0; corner < 8; ++corner)
+        points.push_back(cell.box.corner(static_cast<Box::CornerType>(corner)));
+    std::vector<ValueAndGradient> results(points.size());
+    smooth.valuesAndGradients(points, results);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_TRUE(std::isfinite(results[i].value)) << width << " at " << points[i].transpose();
+      ASSERT_EQ(smooth.value(points[i]), results[i].value);
+    }
+  }
+}
+
 TEST(Blend, IsKeptInFiles) {
   const support::TemporaryDirectory folder;
   const std::string file = (folder.path() / "blended.hpsdf").string();

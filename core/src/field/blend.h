@@ -77,8 +77,9 @@ struct Candidates {
     const double scale = std::uint32_t{1} << depth;
     for (int axis = 0; axis < 3; ++axis) {
       const double at = coordinates[axis] * scale;
-      first[axis] = static_cast<std::int64_t>(at - blend);  // of what is below 0 it makes 0
       const std::int64_t last = frame.last[axis] >> (kMaxDepth - depth);
+      // of what is below 0 the cast makes 0; at the domain's end a tiny width is lost in rounding
+      first[axis] = std::min(static_cast<std::int64_t>(at - blend), last);
       more[axis] = std::min(static_cast<std::int64_t>(at + blend), last) > first[axis];
     }
   }
