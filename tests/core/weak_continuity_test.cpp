@@ -294,6 +294,21 @@ TEST(WeakContinuity, KeepsFloatsAsFloats) {
   EXPECT_EQ(rounded.coefficients, made.data().coefficients);
 }
 
+TEST(WeakContinuity, GreatWeightsChangeNothing) {
+  const Field field = randomField(5);
+  for (const double weight : {1e30, 1e50, 1e300}) {
+    const WeaklyContinuous made = weaklyContinuous(field, {.weight = weight});
+    EXPECT_LE(made.residual, 1e-3) << weight;
+    EXPECT_LT(made.change, 1e-20) << weight;
+  }
+}
+
+TEST(WeakContinuity, DropsTheMeasuredMaximum) {
+  const Field made = weaklyContinuous(sphereField({.targetError = 0, .maxError = 0.1})).field;
+  EXPECT_EQ(made.metadata().maxError, 0);
+  EXPECT_EQ(made.metadata().measuredError, 0);
+}
+
 TEST(WeakContinuity, DropsBounds) {
   FieldData data = randomField(2).data();
   data.bounds.resize(data.nodes.size());

@@ -65,7 +65,9 @@ struct FieldMetadata {
   Criterion criterion = Criterion::paper;
   NearnessKind nearnessKind = NearnessKind::polynomial;
   double maxError = 0;  ///< |f − Φ| that no place looked at was to exceed, in the field's units; 0: not asked for
-  double measuredError = 0;     ///< the greatest at those places, where it was asked for
+  /// The greatest at those places, of the leaves' own polynomials, where it was asked for, and what rounding
+  /// may add where that is more than a hundredth of `maxError`.
+  double measuredError = 0;
   bool enriched = false;        ///< every cell was fitted anew, one degree higher, at the end
   double continuityWeight = 0;  ///< λ of weak continuity, see `continuity.h`; 0: the cells' own fits
 

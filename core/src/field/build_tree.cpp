@@ -77,11 +77,15 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
 }
 
 void keepAs(CoefficientType type, FieldData& field) {
-  const double rounding = rmsOfRounding(field);
-  const bool single = type == CoefficientType::float32 || (type == CoefficientType::automatic &&
-                                                           rounding < 0.01 * field.metadata.rmsEstimate(field.domain));
-  field.metadata.roundingRms = single ? rounding : 0;
-  if (single) toFloat(field);
+  constexpr double kLittle = 0.01;
+  const Rounding rounding = roundingOf(field);
+  FieldMetadata& made = field.metadata;
+  const bool spoilsMaximum = made.maxError > 0 && rounding.most > kLittle * made.maxError;
+  const bool isLittle = rounding.rms < kLittle * made.rmsEstimate(field.domain) && !spoilsMaximum;
+  if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isLittle)) return;
+  toFloat(field);
+  made.roundingRms = rounding.rms;
+  if (spoilsMaximum) made.measuredError += rounding.most;
 }
 
 }  // namespace hpsdf

@@ -34,7 +34,7 @@ struct BuildTree {
 /// memory. Takes the tree apart.
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata);
 
-/// Rounds the coefficients, which are in double, as asked, and completes the metadata (roundingRms).
+/// Rounds the coefficients, which are in double, as asked, and completes the metadata (roundingRms, measuredError).
 void keepAs(CoefficientType type, FieldData& field);
 
 }  // namespace hpsdf

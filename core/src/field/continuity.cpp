@@ -50,7 +50,9 @@ class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
       : coupling_(coupling), options_(options), change_(x0.size(), 0.0), residual_(x0.size()) {
-    for (const double entry : coupling.diagonal()) scale_.push_back(static_cast<float>(1 / (entry + options.weight)));
+    // about 1 for every weight, so that a great one stays in the range of floats
+    for (const double entry : coupling.diagonal())
+      scale_.push_back(static_cast<float>((1 + options.weight) / (entry + options.weight)));
     coupling_.apply(0, x0, residual_);
     for (double& r : residual_) r = -r;
   }
@@ -157,6 +159,7 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   const std::vector<double> change = solver.solve(squaredNorm(x), progress);
   FieldMetadata& metadata = field.metadata;
   metadata.continuityWeight = options.weight;
+  metadata.maxError = metadata.measuredError = 0;  // was found of other polynomials
   metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);
   field.bounds.clear();
   if (solver.figures.change > 0) {
@@ -176,7 +179,7 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
   const WeakContinuityFigures figures =
       withThreads(threads, [&] { return makeWeaklyContinuous(data, options, progress); });
   if (field.singlePrecision()) {
-    data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, rmsOfRounding(data));
+    data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, roundingOf(data).rms);
     toFloat(data);
   }
   return {Field(std::move(data)), figures.iterations, figures.residual, figures.change};

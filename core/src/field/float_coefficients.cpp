@@ -1,5 +1,6 @@
 #include "field/float_coefficients.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "basis/projection.h"
@@ -20,22 +21,26 @@ void convert(FieldData& field) {
 
 }  // namespace
 
-double rmsOfRounding(const FieldData& field) {
+Rounding roundingOf(const FieldData& field) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  Rounding rounding;
   double sum = 0;
   visitNodes(field, [&](const Visited& at) {
     const std::uint64_t bits = field.nodes[at.node];
     if (!node::isLeaf(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
-    double ofCell = 0;
+    double ofCell = 0, most = 0;
     forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
       const double change = c[index] - double(float(c[index]));
       ofCell += change * change * squaredNorm(i, j, k);
+      most += std::abs(change);
     });
+    rounding.most = std::max(rounding.most, most);
     sum += ofCell * cellSize(field, at.depth).prod();
     return true;
   });
-  return std::sqrt(sum / field.domain.sizes().prod());
+  rounding.rms = std::sqrt(sum / field.domain.sizes().prod());
+  return rounding;
 }
 
 void toFloat(FieldData& field) { convert<float, double>(field); }

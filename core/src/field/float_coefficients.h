@@ -5,8 +5,12 @@
 
 namespace hpsdf {
 
-/// RMS change of the field by keeping its coefficients, which are in double, as float.
-double rmsOfRounding(const FieldData& field);
+/// The field's change by keeping its coefficients, which are in double, as float.
+struct Rounding {
+  double rms = 0;
+  double most = 0;  ///< nowhere more
+};
+Rounding roundingOf(const FieldData& field);
 
 /// Without effect on coefficients that are of that type already.
 void toFloat(FieldData& field);
