@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -218,6 +219,19 @@ TEST(Verify, WhatCannotBeSampledIsRefused) {
               verifyAgainstPlane(twoPlanes({0, 0}, {0, 0, 1}), {.points = 10, .near = -1});
             }).find("below 0"),
             std::string::npos);
+}
+
+/// Rather than after a thousand candidates for each point that is wanted.
+TEST(Verify, WhatCannotBeSampledIsRefusedSoon) {
+  std::atomic<std::size_t> calls = 0;
+  const auto counting = [&](const Vector3& x) {
+    ++calls;
+    return x.z();
+  };
+  const Box domain(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+  EXPECT_NE(errorOf([&] { sampleUniform(counting, domain, 1e-8, {.count = 100'000}); }).find("within the band"),
+            std::string::npos);
+  EXPECT_LT(calls, 500'000u);
 }
 
 TEST(Verify, CanBeCancelled) {

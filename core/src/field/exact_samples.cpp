@@ -19,7 +19,7 @@ namespace hpsdf {
 namespace {
 
 constexpr std::size_t kBatch = 512;  // points handed to Φ at once
-/// After so many candidates for each point that is wanted, the rest is not to be had.
+/// Where a point takes more candidates than this, the rest is not to be had.
 constexpr std::size_t kMostCandidates = 1000;
 
 /// Every third bit of a 64-bit number.
@@ -92,7 +92,7 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
   if (options.count >= std::size_t{1} << 32) throw Error("too many points; give fewer than 4,294,967,296");
   ExactSamples samples;
   for (std::size_t drawn = 0; samples.points.size() < options.count;) {
-    if (drawn > kMostCandidates * options.count) throw Error(noneMessage);
+    if (drawn > kMostCandidates * (samples.points.size() + 1)) throw Error(noneMessage);
     const std::size_t missing = options.count - samples.points.size();
     std::vector<Vector3> round(drawn == 0 ? missing : 2 * missing);
     tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t n) { round[n] = draw(drawn + n); });
@@ -160,7 +160,7 @@ class SurfacePoints {
 
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band,
                            const SampleOptions& options, const Progress& progress) {
-  const std::string none = "no point of the domain was found within the band; give a wider one";
+  const std::string none = "hardly any point of the domain was found within the band; give a wider one";
   return withThreads(options.threads, [&] {
     if (!(band > 0))
       return drawSamples(distance, domain, band, options, progress, none,
