@@ -156,6 +156,35 @@ TEST(Steering, BytesAreALimitThatIsMadeUseOf) {
   EXPECT_NE(refusal({.targetError = 0, .maxBytes = 1000}).find("base grid alone"), std::string::npos);
 }
 
+/// With whatever is done to the cells or kept beside them at the end, and for hardly more than the base cells.
+TEST(Steering, BytesAreNeverExceeded) {
+  std::vector<BuildOptions> ways(1);
+  const auto both = [&](const auto& change) {
+    const std::vector<BuildOptions> before = ways;
+    ways.insert(ways.end(), before.begin(), before.end());
+    for (std::size_t n = before.size(); n < ways.size(); ++n) change(ways[n]);
+  };
+  both([](BuildOptions& o) { o.criterion = Criterion::optimal; });
+  both([](BuildOptions& o) { o.strategy = Strategy::h2; });
+  both([](BuildOptions& o) { o.enrich = true; });
+  both([](BuildOptions& o) { o.blend = 0.1, o.bounds = true; });
+  int built = 0, refused = 0;
+  for (BuildOptions& options : ways)
+    for (const std::uint64_t bytes : {6000u, 8000u, 11000u, 13000u, 16000u, 24000u, 100000u}) {
+      options.targetError = 0;
+      options.maxBytes = bytes;
+      try {
+        EXPECT_LE(build(spheres, cube(), options).bytes(), bytes);
+        ++built;
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("base grid alone"), std::string::npos);
+        ++refused;
+      }
+    }
+  EXPECT_GT(built, 40);
+  EXPECT_GT(refused, 40);
+}
+
 TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
   const Field field = build(spheres, cube(), {.targetError = 0, .maxError = 0.01});
   const Measured m = measure(field);
@@ -206,6 +235,38 @@ TEST(Steering, NearAndFarErrorsAreReached) {
     EXPECT_LT(measure(even).far, 1.2 * 3e-4);
     EXPECT_GT(even.bytes(), field.bytes());
   }
+}
+
+/// What lies outside of it neither counts as exact nor as wrong.
+TEST(Steering, NearAndFarErrorsLookAtTheBandAlone) {
+  const auto made = [](Criterion criterion) {
+    return build(spheres, cube(),
+                 {.targetError = 0, .nearError = 3e-4, .farError = 3e-3, .criterion = criterion, .band = kBand});
+  };
+  const Field paper = made(Criterion::paper), optimal = made(Criterion::optimal);
+  EXPECT_LT(double(optimal.bytes()), 0.8 * double(paper.bytes()));
+  EXPECT_LT(measure(optimal).near, 1.2 * 3e-4);
+  EXPECT_LT(measure(paper).near, 1.2 * 3e-4);
+}
+
+TEST(Steering, RoundingCountsForTheMaximumError) {
+  const auto far = [](const Vector3& x) { return x.norm() + 10000; };
+  const Box domain(Vector3::Constant(1), Vector3::Constant(2));
+  const auto made = [&](CoefficientType type, double maxError) {
+    return build(far, domain, {.targetError = 0, .grid = {2, 2, 2}, .maxError = maxError, .coefficients = type});
+  };
+  EXPECT_FALSE(made(CoefficientType::automatic, 1e-3).singlePrecision());
+  EXPECT_TRUE(build(spheres, cube(), {.targetError = 0, .maxError = 0.05}).singlePrecision());
+  const Field field = made(CoefficientType::float32, 1e-4);
+  double worst = 0;
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> coordinate(1, 2);
+  for (int n = 0; n < 20000; ++n) {
+    const Vector3 x(coordinate(random), coordinate(random), coordinate(random));
+    worst = std::max(worst, std::abs(field.value(x) - far(x)));
+  }
+  EXPECT_GT(worst, 1e-4);
+  EXPECT_GE(field.metadata().measuredError, worst);
 }
 
 TEST(Steering, ResidualIsTheErrorItself) {

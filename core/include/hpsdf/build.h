@@ -13,7 +13,8 @@
 
 namespace hpsdf {
 
-/// How coefficients are kept. `automatic`: float32 where rounding adds less than 1 % to the estimated RMS error.
+/// How coefficients are kept. `automatic`: float32 where rounding is less than 1 % of the estimated RMS error and of a
+/// maximum error that is asked for.
 enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
 
 /// Where the p-trial takes its samples.
@@ -47,8 +48,8 @@ struct BuildOptions {
   /// |f − Φ| that is to be exceeded nowhere, in the field's own units; 0: not asked for. Once the target is reached,
   /// every cell (within the band, if there is one) is looked at on a lattice of 512 places from corner to corner, and
   /// refined on where the worst place and half of the greatest step between neighbours together are more. No proof:
-  /// for that see `safe_distance.h`. What is left at the limits of degree, depth, steps and bytes stands in
-  /// `FieldMetadata::measuredError`.
+  /// for that see `safe_distance.h`; zones of blended leaves are not looked at as such. What is left at the limits of
+  /// degree, depth, steps and bytes, and by rounding, stands in `FieldMetadata::measuredError`.
   double maxError = 0;
   /// The field as queries need it takes at most so many bytes; the best such field is built that the other settings
   /// allow. Coefficients that are left to choose become float.

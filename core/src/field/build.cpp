@@ -84,31 +84,42 @@ class Construction {
   FieldData finish(const Source& source) { return finished(std::move(tree_), source); }
 
  private:
+  /// The tree as a field: first its cells become final, then its coefficients, then what is said about them.
   FieldData finished(BuildTree&& tree, const Source& source) {
     const std::uint64_t before = fitter_.evaluations();
     if (options_.criterion == Criterion::optimal) prune(tree, nearness_, pruneLimits());
     if (options_.enrich) enrich(tree);
     FieldMetadata known = metadata(source, sumOfErrors(tree));
     FieldData field = layOut(std::move(tree), std::move(known));
+    // each goes by what the one before has left: jumps are closed in double, and bounds are those of the very
+    // coefficients that are kept, blended as they will be
     if (options_.continuityWeight) makeWeaklyContinuous(field, {.weight = *options_.continuityWeight}, progress_);
-    keepAs(options_.maxBytes && options_.coefficients == CoefficientType::automatic ? CoefficientType::float32
-                                                                                    : options_.coefficients,
-           field);
+    keepAs(coefficientType(), field);
     field.blend = options_.blend;
     if (options_.bounds) field.metadata.exactEvaluations += findBounds(field, distance_, progress_);
     ofFinishing_ += fitter_.evaluations() - before;
     return field;
   }
 
+  /// Float where bytes are short.
+  CoefficientType coefficientType() const {
+    const bool chosenByBytes = options_.maxBytes && options_.coefficients == CoefficientType::automatic;
+    return chosenByBytes ? CoefficientType::float32 : options_.coefficients;
+  }
+
   PruneLimits pruneLimits() const {
-    PruneLimits limits{.goal = goal_, .nodeBytes = nodeBytes(), .coefficientBytes = coefficientBytes(options_)};
+    PruneLimits limits{.goal = goal_, .nodeBytes = nodeBytes()};
+    for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = leafBytes(degree);
     // what ended early, but not for want of room, has refinements to take back all the same
     if (!growthGoal_.reached(totals_) && !full_) limits.goal = goal_.relaxedTo(totals_, 1 / kGrowth);
     if (options_.maxBytes) limits.mostBytes = treeBytes(*options_.maxBytes);
-    limits.mostDegree = options_.maxDegree;
-    if (options_.strategy != Strategy::hp) limits.leastDegree = limits.mostDegree = startDegree(options_);
+    limits.leastDegree = leastDegree();
+    limits.mostDegree = options_.strategy == Strategy::hp ? options_.maxDegree : startDegree(options_);
     return limits;
   }
+
+  /// The lowest to which the optimal criterion may take a leaf back.
+  int leastDegree() const { return options_.strategy == Strategy::hp ? 1 : startDegree(options_); }
 
   int raisedDegree(int degree) const { return std::max(degree, std::min(degree + 1, options_.maxDegree)); }
 
@@ -187,13 +198,23 @@ class Construction {
       tbb::parallel_for(begin, std::min(begin + kChunk, count),
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
     }
-    coefficients_ = count * std::size_t(coefficientCount(degree));
+    coefficients_ = count * keptCoefficients(degree);
     if (goal_.byDistance()) chooseNearness();
     sumTotals();
-    if (bytes() > mostBytesOfGrowth())
+    checkBaseGridsBytes();
+    for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
+  }
+
+  void checkBaseGridsBytes() const {
+    if (!options_.maxBytes) return;
+    double least = 0;  // that can come of the base cells
+    for (const BuildNode& node : tree_.nodes) {
+      const bool mayLower = options_.criterion == Criterion::optimal && !node.fit.outsideBand;
+      least += leafBytes(mayLower ? leastDegree() : node.fit.degree);
+    }
+    if (least > treeBytes(*options_.maxBytes) || bytes() > mostBytesOfGrowth())
       throw Error("the base grid alone takes more than " + std::to_string(*options_.maxBytes) +
                   " bytes: allow more, or take a coarser grid");
-    for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
   }
 
   /// θ, such that a cell at the mean distance of those far away weighs as much less as its error may be greater.
@@ -252,9 +273,19 @@ class Construction {
   double nodeBytes() const {
     return 8 + (options_.blend > 0 ? 4 : 0) + (options_.bounds ? double(sizeof(CellBound)) : 0);
   }
-  /// Without the directory, which takes a sixteenth of nodes and coefficients at most, and half as much again for
-  /// reaches.
-  double treeBytes(std::uint64_t ofField) const { return double(ofField) / (1 + (options_.blend > 0 ? 1.5 : 1) / 16); }
+  /// As many as the field will keep of a cell of this degree.
+  std::size_t keptCoefficients(int degree) const {
+    return std::size_t(coefficientCount(options_.enrich ? raisedDegree(degree) : degree));
+  }
+  double leafBytes(int degree) const {
+    return nodeBytes() + coefficientBytes(options_) * double(keptCoefficients(degree));
+  }
+  /// Without the directory, which takes an entry for each base cell or, if that is more, a sixteenth of nodes and
+  /// coefficients at most, and half as much again for reaches.
+  double treeBytes(std::uint64_t ofField) const {
+    const double ofEntries = options_.blend > 0 ? 1.5 : 1, baseEntries = 8.0 * double(tree_.baseCells());
+    return std::min(double(ofField) / (1 + ofEntries / 16), double(ofField) - ofEntries * baseEntries);
+  }
   double mostBytesOfGrowth() const {
     if (!options_.maxBytes) return HUGE_VAL;
     return treeBytes(*options_.maxBytes) * (options_.criterion == Criterion::optimal ? kByteGrowth : 1);
@@ -338,8 +369,8 @@ class Construction {
   void take(std::uint32_t node, Trial&& trial, bool raises, const std::function<void(std::uint64_t)>& afterStep) {
     if (tree_.nodes.size() > 0xffffffffu - 8)
       throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
-    const std::size_t before = tree_.nodes[node].fit.coefficients.size();
-    const std::size_t added = raises ? trial.raised->coefficients.size() - before : 7 * before;
+    const std::size_t before = keptCoefficients(tree_.nodes[node].fit.degree);
+    const std::size_t added = raises ? keptCoefficients(trial.raised->degree) - before : 7 * before;
     if (bytes() + coefficientBytes(options_) * double(added) + (raises ? 0 : 8 * nodeBytes()) > mostBytesOfGrowth()) {
       full_ = true;
       return;
@@ -476,7 +507,7 @@ class Construction {
   double lastSum_ = 0;                ///< their weighted error when they were last summed anew
   double measuredError_ = 0;          ///< greatest that `refineToMaxError` has left
   bool full_ = false;                 ///< no more bytes may be taken
-  std::size_t coefficients_ = 0;      ///< of all leaves
+  std::size_t coefficients_ = 0;      ///< that the field will keep of all leaves
   std::uint64_t steps_ = 0;
   std::uint64_t ofFinishing_ = 0;  ///< calls of Φ for fields that were handed out on the way
   ProgressEstimate estimate_;

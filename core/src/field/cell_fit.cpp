@@ -157,9 +157,9 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
 /// From the squared error over the cell's volume.
 void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
   const double mean = fit.coefficients[0];  // of the cell's own fit, the other polynomials having none
+  if (fit.outsideBand) return;
   fit.error.volume = volumeOf(cell);
   fit.error.near = std::abs(mean) - cell.sizes().norm() / 2 <= nearDistance_;
-  if (fit.outsideBand) return;
   fit.error.squared = squared * fit.error.volume;
   fit.error.weighted = nearness_.weight(mean) * fit.error.squared;
 }

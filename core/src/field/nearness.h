@@ -21,9 +21,9 @@ struct Nearness {
   }
 };
 
-/// What a cell adds to the totals.
+/// What a cell adds to the totals: nothing where it lies outside the narrow band.
 struct CellError {
-  double weighted = 0;  ///< ε*_e, by nearness; 0 where the cell lies outside the narrow band
+  double weighted = 0;  ///< ε*_e, by nearness
   double squared = 0;   ///< ε_e
   double volume = 0;
   bool near = false;  ///< the cell may hold points near the surface, see `BuildOptions::nearError`

@@ -59,8 +59,6 @@ class Pruning {
     double bytes = 0;
   };
 
-  double leafBytes(int degree) const { return limits_.nodeBytes + limits_.coefficientBytes * coefficientCount(degree); }
-
   CellError errorAt(std::size_t n, int degree) const {
     CellError error = tree_.nodes[n].fit.error;
     error.squared = squared_[n][degree];
@@ -78,7 +76,7 @@ class Pruning {
       const std::uint32_t first = tree_.nodes[n].firstChild;
       cost[n] = HUGE_VAL;
       for (int degree = low; degree <= top; ++degree) {
-        const double here = weight_[n] * squared_[n][degree] + lambda * leafBytes(degree);
+        const double here = weight_[n] * squared_[n][degree] + lambda * limits_.leafBytes[degree];
         if (here >= cost[n]) continue;
         cost[n] = here;
         chosen_[n] = static_cast<std::uint8_t>(degree);
@@ -104,7 +102,7 @@ class Pruning {
           sum.bytes += limits_.nodeBytes;
           for (std::uint32_t child = 0; child < 8; ++child) stack.push_back(tree_.nodes[n].firstChild + child);
         } else {
-          sum.bytes += leafBytes(chosen_[n]);
+          sum.bytes += limits_.leafBytes[chosen_[n]];
           sum.errors.add(errorAt(n, chosen_[n]));
         }
       }

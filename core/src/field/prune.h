@@ -1,6 +1,7 @@
 #pragma once
 // Taking refinements back where they save most for the error that they leave.
 
+#include <array>
 #include <optional>
 
 #include "field/build_tree.h"
@@ -9,10 +10,11 @@
 namespace hpsdf {
 
 struct PruneLimits {
-  ErrorGoal goal;                        ///< not to be left
-  std::optional<double> mostBytes = {};  ///< to be kept, even where the goal is not
-  double nodeBytes = 8, coefficientBytes = 8;
-  int leastDegree = 1;  ///< of a leaf
+  ErrorGoal goal;                                     ///< not to be left
+  std::optional<double> mostBytes = {};               ///< to be kept, even where the goal is not
+  double nodeBytes = 8;                               ///< of an internal node
+  std::array<double, kMaxDegree + 1> leafBytes = {};  ///< of a leaf with its coefficients, by degree
+  int leastDegree = 1;                                ///< of a leaf
   int mostDegree = kMaxDegree;
 };
 
