@@ -91,7 +91,7 @@ TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
         build(spheres, cube(), {.targetError = 1e-5, .grid = {16, 16, 16}, .blend = blend, .bounds = true});
     const Held found = held(exact, spheres);
     EXPECT_EQ(found.violations, 0);
-    EXPECT_LT(found.medianBound, 12 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
+    EXPECT_LT(found.medianBound, 3.5 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
   }
   EXPECT_TRUE(blended(weak).data().bounds.empty()) << "they are not those of the blended field";
 }
@@ -148,6 +148,31 @@ TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
   EXPECT_GT(touches, 100);
   EXPECT_GT(leaves, 100);
   EXPECT_FALSE(safeTrace(field, {3, 3, 3}, {1, 0, 0}, 1e-3).mayTouch) << "past the domain";
+}
+
+/// There a step may be lost in the length so far, and a point may be off by more than the slack.
+TEST(SafeDistance, RaysFromFarAwayEnd) {
+  const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
+  const auto from = [&](double far) { return safeTrace(field, {far, 0.5, 0.5}, {-1, 0, 0}, 1e-3); };
+  EXPECT_FALSE(from(1e6).mayTouch);
+  EXPECT_NEAR(from(1e6).length, 1e6 + 1.1, 1e-9);
+  EXPECT_TRUE(from(8e15).mayTouch);
+  EXPECT_LT(from(8e15).steps, 10);
+}
+
+/// The leaf that counts is the one that answers, and the same is said of it however it is found.
+TEST(SafeDistance, IsTheValueLessTheBound) {
+  for (const double blend : {0.0, 0.1}) {
+    const Field field =
+        build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .blend = blend, .bounds = true});
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> coordinate(-1.1, 1.1);
+    for (int n = 0; n < 20000; ++n) {
+      const Vector3 x(coordinate(random), coordinate(random), coordinate(random));
+      const double certain = std::abs(field.value(x)) - double(boundAt(field, x)->error);
+      ASSERT_EQ(safeDistance(field, x), std::max(0.0, certain));
+    }
+  }
 }
 
 TEST(SafeDistance, WithoutBoundsNothingIsSafe) {

@@ -33,8 +33,10 @@ double safeDistance(const Field& field, const Vector3& x);
 
 /// How far a ray came.
 struct SafeTrace {
-  double length = 0;      ///< in the field's units: before it there is no surface
-  bool mayTouch = false;  ///< the surface may be within `slack` of the ray's point there; else the ray left the domain
+  double length = 0;  ///< in the field's units: before it there is no surface
+  /// The surface may be within `slack` of the ray's point there, or within what rounding leaves open, which far from
+  /// the domain may be more; else the ray left the domain.
+  bool mayTouch = false;
   int steps = 0;
 };
 

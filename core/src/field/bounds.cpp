@@ -35,51 +35,47 @@ struct Part {
   Vector3 restGradient;              ///< the same of its derivatives
 };
 
-/// L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), whatever the degree.
+/// L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i, up to a degree; what is beyond is not set.
 using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
 
-Rows legendreOfPart(double shift, double scale) {
-  Rows row{};
+Rows legendreOfPart(double shift, double scale, int degree) {
+  Rows row;
   row[0][0] = 1;
-  for (int i = 0; i < kMaxDegree; ++i) {
-    std::array<double, kMaxDegree + 2> product{};  // (shift + scale·t) · L_i, by the recurrence of t·L_a
+  for (int i = 0; i < degree; ++i) {
+    std::array<double, kMaxDegree + 1> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
+    std::fill_n(product.begin(), i + 2, 0.0);
     for (int a = 0; a <= i; ++a) {
       product[a] += shift * row[i][a];
       product[a + 1] += scale * row[i][a] * (a + 1) / (2 * a + 1);
       if (a > 0) product[a - 1] += scale * row[i][a] * a / (2 * a + 1);
     }
     for (int a = 0; a <= i + 1; ++a)
-      row[i + 1][a] = ((2 * i + 1) * product[a] - (i > 0 ? i * row[i - 1][a] : 0)) / (i + 1);
+      row[i + 1][a] = ((2 * i + 1) * product[a] - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
   }
   return row;
 }
 
-/// The polynomial's coefficients in a part's own coordinates, as a cube of (degree + 1)³ numbers, one axis after
-/// another.
+/// The polynomial's coefficients in a part's own coordinates, as a cube of (degree + 1)³ numbers of which those of a
+/// greater total degree are 0, one axis after another.
 std::vector<double> partCoefficients(std::vector<double> c, int degree, const std::array<const Rows*, 3>& rows) {
   const int n = degree + 1;
-  std::vector<double> out(c.size());
-  std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
-  for (int axis = 0; axis < 3; ++axis) {
-    std::fill(out.begin(), out.end(), 0.0);
-    for (std::size_t at = 0; at < c.size(); ++at) {
-      if (c[at] == 0) continue;
-      const auto i = static_cast<int>(at / stride[axis] % n);
-      const std::size_t line = at - i * stride[axis];
-      for (int a = 0; a <= i; ++a) out[line + a * stride[axis]] += c[at] * (*rows[axis])[i][a];
-    }
-    std::swap(c, out);
-  }
+  const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
+  for (int axis = 0; axis < 3; ++axis)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; j + k < n; ++k) {
+        double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
+        for (int a = 0; a + j + k < n; ++a) {  // upwards: the higher ones are still those of the whole
+          double sum = 0;
+          for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * (*rows[axis])[i][a];
+          line[a * stride[axis]] = sum;
+        }
+      }
   return c;
 }
 
-/// The lower and the upper half of an axis, each reaching `beyond` of the whole over its end.
+/// The lower and the upper half of an axis.
 struct Halves {
-  double scale;  ///< half of their width, where the whole is [-1, 1]
-  Rows below, above;
-
-  explicit Halves(double beyond)
-      : scale(0.5 * (1 + 2 * beyond)), below(legendreOfPart(-scale, scale)), above(legendreOfPart(scale, scale)) {}
+  Rows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
 /// Over an eighth of a leaf (number x + 2y + 4z).
@@ -90,8 +86,8 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
     const bool upper = number >> axis & 1;
     rows[axis] = upper ? &halves.above : &halves.below;
     const double half = box.sizes()[axis] / 2;
-    part.center[axis] = box.center()[axis] + (upper ? halves.scale : -halves.scale) * half;
-    part.half[axis] = halves.scale * half;
+    part.center[axis] = box.center()[axis] + (upper ? 0.5 : -0.5) * half;
+    part.half[axis] = 0.5 * half;
   }
   const std::vector<double> c = partCoefficients(cube, degree, rows);
   part.gradient.setZero();
@@ -182,17 +178,31 @@ float roundedUp(double number) {
   return double(nearest) >= number ? nearest : std::nextafter(nearest, std::numeric_limits<float>::infinity());
 }
 
-/// Bounds of single leaves, of their own polynomials as far as these reach.
+/// A leaf's coefficients as a cube of at least (degree + 1)³.
+std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
+  const std::uint64_t bits = field.nodes[leaf];
+  const int n = degree + 1;
+  std::vector<double> cube(std::size_t(n) * n * n, 0.0);
+  std::visit(
+      [&](const auto& c) {
+        forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
+          cube[(std::size_t(i) * n + j) * n + k] = c[node::offset(bits) + index];
+        });
+      },
+      field.coefficients);
+  return cube;
+}
+
+/// Bounds of single leaves, of their own polynomials.
 class BoundFinder {
  public:
   BoundFinder(const FieldData& field, const DistanceFunction& distance)
-      : field_(field), distance_(distance), halves_(field.blend) {}
+      : field_(field), frame_(gridFrame(field)), distance_(distance) {}
 
   CellBound operator()(const Leaf& leaf) const {
-    const std::uint64_t bits = field_.nodes[leaf.node];
-    const int degree = node::degree(bits);
-    const Box box = boxOf(leaf);
-    const std::vector<double> cube = cubeOf(bits);
+    const int degree = node::degree(field_.nodes[leaf.node]);
+    const Box box = boxOf(frame_, leaf.depth, leaf.place);
+    const std::vector<double> cube = cubeOf(field_, leaf.node, degree);
     std::array<Part, 8> parts;
     std::array<std::array<Vector3, kPlaces>, 8> places;
     std::array<Vector3, 8 * kPlaces> points;  // those of one kind side by side, as exact distances are fastest
@@ -223,65 +233,139 @@ class BoundFinder {
   static constexpr std::uint64_t kCalls = 8 * kPlaces;
 
  private:
-  Box boxOf(const Leaf& leaf) const {
-    const Vector3 size = cellSize(field_, leaf.depth);
-    Vector3 lo;
-    for (int axis = 0; axis < 3; ++axis) lo[axis] = field_.domain.min()[axis] + double(leaf.place[axis]) * size[axis];
-    return Box(lo, lo + size);
-  }
-
-  std::vector<double> cubeOf(std::uint64_t bits) const {
-    const int degree = node::degree(bits), n = degree + 1;
-    std::vector<double> cube(std::size_t(n) * n * n, 0.0);
-    std::visit(
-        [&](const auto& c) {
-          forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-            cube[(std::size_t(i) * n + j) * n + k] = c[node::offset(bits) + index];
-          });
-        },
-        field_.coefficients);
-    return cube;
-  }
-
   const FieldData& field_;
+  GridFrame frame_;
   const DistanceFunction& distance_;
-  Halves halves_;  ///< of a leaf's axes, as far as blending makes it reach
+  Halves halves_;
 };
 
-/// The greater of both for each pair of leaves that touch, which takes each into account for the other.
-template <typename T, typename Take>
-std::vector<T> takenFromNeighbours(const FieldData& field, const std::vector<Leaf>& leaves, const std::vector<T>& own,
-                                   const Take& take) {
-  std::vector<T> taken = own;
-  for (const Leaf& leaf : leaves)
-    for (int x = -1; x <= 1; ++x)
-      for (int y = -1; y <= 1; ++y)
-        for (int z = -1; z <= 1; ++z)
-          if (const auto beside = notSmallerAt(field, leaf, {x, y, z})) {
-            take(taken[leaf.node], own[beside->node]);
-            take(taken[beside->node], own[leaf.node]);
-          }
-  return taken;
+/// How far the polynomials of leaves are apart, at most.
+struct Apart {
+  double value = 0, slope = 0;
+
+  void widen(const Apart& other) {
+    value = std::max(value, other.value);
+    slope = std::max(slope, other.slope);
+  }
+};
+
+/// Of two leaves that touch, where both have a say: as far on either side of what they share as the smaller one's edge
+/// times the width of its zone, neither reaching farther there.
+Apart apartInZone(const FieldData& field, const Leaf& small, const Leaf& large) {
+  const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
+  const int levels = small.depth - large.depth;
+  std::array<Rows, 3> ofSmall, ofLarge;
+  Vector3 half;
+  for (int axis = 0; axis < 3; ++axis) {  // in edges of the small cell
+    const std::int64_t smallAt = small.place[axis], largeAt = large.place[axis] << levels;
+    const std::int64_t width = std::int64_t{1} << levels, wall = std::int64_t{field.grid[axis]} << small.depth;
+    // counted from the small cell's lower side, so that nothing is lost far from the domain's corner
+    const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
+    const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
+    const double from = std::max(low - field.blend, static_cast<double>(-smallAt));
+    const double to = std::min(high + field.blend, static_cast<double>(wall - smallAt));
+    half[axis] = (to - from) / 2;
+    const auto rows = [&](double start, double edge) {
+      return legendreOfPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
+    };
+    ofSmall[axis] = rows(0, 1);
+    ofLarge[axis] = rows(static_cast<double>(largeAt - smallAt), static_cast<double>(width));
+  }
+  const std::vector<double> one =
+      partCoefficients(cubeOf(field, small.node, degree), degree, {&ofSmall[0], &ofSmall[1], &ofSmall[2]});
+  const std::vector<double> other =
+      partCoefficients(cubeOf(field, large.node, degree), degree, {&ofLarge[0], &ofLarge[1], &ofLarge[2]});
+  const Vector3 toWorld = half.cwiseProduct(cellSize(field, small.depth)).cwiseInverse();
+  const int n = degree + 1;
+  Apart apart;
+  Vector3 slope = Vector3::Zero();
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; i + j < n; ++j)
+      for (int k = 0; i + j + k < n; ++k) {
+        const std::size_t at = (std::size_t(i) * n + j) * n + k;
+        const double difference = std::abs(one[at] - other[at]);
+        apart.value += difference;
+        slope += difference * Vector3(i * (i + 1) / 2.0, j * (j + 1) / 2.0, k * (k + 1) / 2.0).cwiseProduct(toWorld);
+      }
+  apart.slope = slope.norm();
+  return apart;
 }
 
-/// In a blended leaf all that touch it have a say. Its error is a mean of theirs. Its gradient is a mean of theirs too,
-/// and what the changing weights add: their slopes times how far two of the leaves are apart.
-void takeNeighboursIn(FieldData& field, const std::vector<Leaf>& leaves) {
-  field.bounds = takenFromNeighbours(field, leaves, field.bounds, [](CellBound& to, const CellBound& from) {
-    to = {std::max(to.error, from.error), std::max(to.slope, from.slope)};
-  });
-  // how far a neighbour reaches is decided by the smallest of its own neighbours
+/// Calls f(beside) for each leaf that touches one and is larger, or of its size and later in the octree: so each pair
+/// comes once, though a larger leaf may lie in several directions.
+template <typename F>
+void forEachPair(const FieldData& field, const Leaf& leaf, const F& f) {
+  std::array<std::uint32_t, 26> seen;
+  std::size_t count = 0;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const auto beside = notSmallerAt(field, leaf, {x, y, z});
+        if (!beside || (beside->depth == leaf.depth && beside->node <= leaf.node)) continue;
+        if (std::ranges::find(seen.begin(), seen.begin() + count, beside->node) != seen.begin() + count) continue;
+        seen[count++] = beside->node;
+        f(*beside);
+      }
+}
+
+/// Depth of the deepest leaf among those that touch a leaf or one that touches it, by node.
+std::vector<int> deepestAround(const FieldData& field, const std::vector<Leaf>& leaves) {
   std::vector<int> deepest(field.nodes.size(), 0);
   for (const Leaf& leaf : leaves) deepest[leaf.node] = leaf.depth;
-  for (int ring = 0; ring < 2; ++ring)
-    deepest = takenFromNeighbours(field, leaves, deepest, [](int& to, int from) { to = std::max(to, from); });
+  for (int ring = 0; ring < 2; ++ring) {
+    const std::vector<int> inner = deepest;
+    for (const Leaf& leaf : leaves)
+      forEachPair(field, leaf, [&](const Leaf& beside) {
+        deepest[leaf.node] = std::max(deepest[leaf.node], inner[beside.node]);
+        deepest[beside.node] = std::max(deepest[beside.node], inner[leaf.node]);
+      });
+  }
+  return deepest;
+}
+
+constexpr std::size_t kChunk = 4096;
+
+void report(const Progress& progress, double fraction) {
+  if (progress.cancelled && progress.cancelled()) throw Cancelled();
+  if (progress.report) progress.report("finding bounds", fraction);
+}
+
+/// In a blended leaf all that touch it have a say: f = f₀ + Σ vₙ (fₙ − f₀), f₀ being its own polynomial and vₙ weights
+/// whose sum is 1 at most. Its error grows by how far the others are from f₀ where they have a say; its gradient by how
+/// far theirs are, and by what the changing weights make of the distance.
+void widenForBlending(FieldData& field, const std::vector<Leaf>& leaves, const Progress& progress) {
+  std::vector<Apart> apart(field.nodes.size());
+  for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
+    report(progress, 0.5 + 0.5 * double(begin) / double(leaves.size()));
+    struct Pair {
+      std::uint32_t node;
+      Apart apart;
+    };
+    std::vector<std::vector<Pair>> found(std::min(kChunk, leaves.size() - begin));
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
+      const Leaf& leaf = leaves[begin + n];
+      forEachPair(field, leaf, [&](const Leaf& beside) {
+        found[n].push_back({beside.node, apartInZone(field, leaf, beside)});
+      });
+    });
+    for (std::size_t n = 0; n < found.size(); ++n)
+      for (const Pair& pair : found[n]) {
+        apart[leaves[begin + n].node].widen(pair.apart);
+        apart[pair.node].widen(pair.apart);
+      }
+  }
+  // how far a neighbour reaches is decided by the smallest of its own neighbours
+  const std::vector<int> deepest = deepestAround(field, leaves);
   // Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over eight leaves at most, one of which weighs 1/8 at least; a weight is a product
   // of three ramps, none steeper than 3/4 over the reach
   constexpr double kSlopes = 2 * 8 * 8 * 1.7320508075688773 * 0.75;
+  const double rounding = kRounding * field.domain.diagonal().norm();
   for (const Leaf& leaf : leaves) {
     CellBound& bound = field.bounds[leaf.node];
+    const Apart& others = apart[leaf.node];
     const double reach = field.blend * cellSize(field, deepest[leaf.node]).minCoeff();
-    bound.slope = roundedUp(double(bound.slope) + kSlopes * 2 * double(bound.error) / reach);
+    bound.error = roundedUp(double(bound.error) + others.value + rounding);
+    bound.slope = roundedUp(double(bound.slope) + others.slope + kSlopes * (others.value + rounding) / reach);
   }
 }
 
@@ -292,15 +376,14 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   std::vector<CellBound> bounds(field.nodes.size());
   const std::vector<Leaf> leaves = leavesOf(field);
   const BoundFinder find(field, distance);
-  constexpr std::size_t kChunk = 4096;
+  const double share = field.blend > 0 ? 0.5 : 1;  // of the progress
   for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
-    if (progress.cancelled && progress.cancelled()) throw Cancelled();
-    if (progress.report) progress.report("finding bounds", double(begin) / double(leaves.size()));
+    report(progress, share * double(begin) / double(leaves.size()));
     tbb::parallel_for(begin, std::min(begin + kChunk, leaves.size()),
                       [&](std::size_t n) { bounds[leaves[n].node] = find(leaves[n]); });
   }
   field.bounds = std::move(bounds);
-  if (field.blend > 0) takeNeighboursIn(field, leaves);
+  if (field.blend > 0) widenForBlending(field, leaves, progress);
   return BoundFinder::kCalls * leaves.size();
 }
 

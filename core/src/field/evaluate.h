@@ -60,6 +60,24 @@ inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
   return at;
 }
 
+/// The way back from grid coordinates.
+inline Vector3 worldPoint(const GridFrame& frame, const std::array<double, 3>& coordinates) {
+  Vector3 x;
+  for (int axis = 0; axis < 3; ++axis)
+    x[axis] = frame.lower[axis] + coordinates[axis] / frame.cells[axis] * frame.size[axis];
+  return x;
+}
+
+/// Of a cell of a depth, by its place in such cells.
+inline Box boxOf(const GridFrame& frame, int depth, const std::array<std::int64_t, 3>& place) {
+  std::array<double, 3> lower, upper;
+  for (int axis = 0; axis < 3; ++axis) {
+    lower[axis] = std::ldexp(static_cast<double>(place[axis]), -depth);
+    upper[axis] = std::ldexp(static_cast<double>(place[axis] + 1), -depth);
+  }
+  return Box(worldPoint(frame, lower), worldPoint(frame, upper));
+}
+
 /// The leaf that holds a point.
 struct Location {
   std::uint32_t node;

@@ -113,21 +113,13 @@ Directory makeDirectory(const FieldData& field) {
   return directory;
 }
 
-Cell makeCell(const FieldData& field, std::uint32_t id, int depth, const std::array<std::uint32_t, 3>& base,
-              const std::array<std::uint32_t, 3>& path) {
+Cell makeCell(const FieldData& field, const GridFrame& frame, std::uint32_t id, int depth,
+              const std::array<std::int64_t, 3>& place) {
   Cell cell;
   cell.id = id;
   cell.depth = depth;
   cell.degree = node::degree(field.nodes[id]);
-  const double scale = std::ldexp(1.0, -depth);
-  Vector3 lo, hi;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double origin = field.domain.min()[axis];
-    const double size = field.domain.max()[axis] - origin;
-    lo[axis] = origin + (base[axis] + path[axis] * scale) / field.grid[axis] * size;
-    hi[axis] = origin + (base[axis] + (path[axis] + 1) * scale) / field.grid[axis] * size;
-  }
-  cell.box = Box(lo, hi);
+  cell.box = boxOf(frame, depth, place);
   const double volume = cellSize(field, depth).prod();
   cell.error = std::visit(
       [&](const auto& c) { return topDegreeError(c.data() + node::offset(field.nodes[id]), cell.degree, volume); },
@@ -181,17 +173,13 @@ void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueA
 Cell Field::cellAt(const Vector3& x) const {
   const GridPoint point = gridPoint(directory_.frame, closestWithin(directory_.frame, x));
   const Location at = locate(data_, point);
-  std::array<std::uint32_t, 3> base, path;
-  for (int axis = 0; axis < 3; ++axis) {
-    base[axis] = static_cast<std::uint32_t>(point.cell(axis, 0));
-    path[axis] = static_cast<std::uint32_t>(point.cell(axis, at.depth) - (point.cell(axis, 0) << at.depth));
-  }
-  return makeCell(data_, at.node, at.depth, base, path);
+  return makeCell(data_, directory_.frame, at.node, at.depth,
+                  {point.cell(0, at.depth), point.cell(1, at.depth), point.cell(2, at.depth)});
 }
 
 void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
   visitNodes(data_, [&](const Visited& at) {
-    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, at.node, at.depth, at.base, at.path));
+    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, directory_.frame, at.node, at.depth, placeOf(at)));
     return true;
   });
 }

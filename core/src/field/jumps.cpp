@@ -221,13 +221,7 @@ class FaceMeter {
   }
 
   Vector3 worldAt(const Leaf& leaf, const std::array<double, 3>& local) const {
-    const std::array<double, 3> coordinates = gridAt(leaf, local);
-    Vector3 x;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double lower = field_.domain.min()[axis], size = field_.domain.max()[axis] - lower;
-      x[axis] = lower + coordinates[axis] / field_.grid[axis] * size;
-    }
-    return x;
+    return worldPoint(whole_.directory().frame, gridAt(leaf, local));
   }
 
   const Field& whole_;

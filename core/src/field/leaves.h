@@ -10,7 +10,7 @@
 
 namespace hpsdf {
 
-/// A leaf and its place, in cells of its depth counted from the domain's lower corner.
+/// A leaf, or any node, and its place, in cells of its depth counted from the domain's lower corner.
 struct Leaf {
   std::uint32_t node;
   int depth;
@@ -19,6 +19,9 @@ struct Leaf {
 
 /// In the order of the octree.
 std::vector<Leaf> leavesOf(const FieldData& field);
+
+/// The node that is the cell at this place of this depth, or the larger leaf that holds it.
+Leaf nodeAt(const FieldData& field, const std::array<std::int64_t, 3>& place, int depth);
 
 /// The leaf of the same size or a larger one that holds the cell so many steps of a leaf's size away; none where
 /// smaller ones lie there, or nothing.

@@ -77,12 +77,10 @@ GridPoint pointIn(const Place& place) {
 }
 
 Vector3 centerOf(const GridFrame& frame, const Place& corner, std::int64_t width) {
-  Vector3 center;
-  for (int a = 0; a < 3; ++a) {
-    const double place = std::ldexp(static_cast<double>(corner[a]) + 0.5 * static_cast<double>(width), -kMaxDepth);
-    center[a] = frame.lower[a] + place / frame.cells[a] * frame.size[a];
-  }
-  return center;
+  std::array<double, 3> center;
+  for (int a = 0; a < 3; ++a)
+    center[a] = std::ldexp(static_cast<double>(corner[a]) + 0.5 * static_cast<double>(width), -kMaxDepth);
+  return worldPoint(frame, center);
 }
 
 /// From leaf to leaf. Each step goes on along one axis at least and along none back, whatever is rounded: so it ends,

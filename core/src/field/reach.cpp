@@ -6,37 +6,18 @@
 #include <algorithm>
 #include <array>
 
-#include "field/visit_nodes.h"
+#include "field/leaves.h"
 
 namespace hpsdf {
 namespace {
 
-/// A cell of some depth: its place counted in such cells from the domain's lower corner.
-using Place = std::array<std::int64_t, 3>;
-
-/// The node there, or the leaf that holds it.
-struct Found {
-  std::uint32_t node;
-  int depth;
-};
-
-Found nodeAt(const FieldData& field, const Place& place, int depth) {
-  const auto base = [&](int axis) { return place[axis] >> depth; };
-  Found at{static_cast<std::uint32_t>((base(2) * field.grid[1] + base(1)) * field.grid[0] + base(0)), 0};
-  while (at.depth < depth && !node::isLeaf(field.nodes[at.node])) {
-    ++at.depth;
-    const auto half = [&](int axis) { return static_cast<std::uint32_t>(place[axis] >> (depth - at.depth)) & 1; };
-    at.node = node::firstChild(field.nodes[at.node]) + half(0) + 2 * half(1) + 4 * half(2);
-  }
-  return at;
-}
+using Place = std::array<std::int64_t, 3>;  ///< as that of a `Leaf`
 
 /// The six sides of one leaf, and the deepest leaf that touches each.
 class Sides {
  public:
-  Sides(const FieldData& field, const Visited& leaf) : field_(field), depth_(leaf.depth) {
+  Sides(const FieldData& field, const Leaf& leaf) : field_(field), depth_(leaf.depth), place_(leaf.place) {
     for (int axis = 0; axis < 3; ++axis) {
-      place_[axis] = (std::int64_t{leaf.base[axis]} << depth_) + leaf.path[axis];
       last_[axis] = (std::int64_t{field.grid[axis]} << depth_) - 1;
       deepest_[axis] = {depth_, depth_};
     }
@@ -69,12 +50,12 @@ class Sides {
       if (there[axis] < 0 || there[axis] > last_[axis]) return;
       touches[axis] = {step[axis] <= 0, step[axis] >= 0};
     }
-    const Found found = nodeAt(field_, there, depth_);
-    if (!node::isLeaf(field_.nodes[found.node])) descend(found, step, touches);
+    const std::uint32_t found = nodeAt(field_, there, depth_).node;
+    if (!node::isLeaf(field_.nodes[found])) descend(found, depth_, step, touches);
   }
 
   /// Through the children of an internal node that touch the leaf.
-  void descend(const Found& at, const Place& step, const Touches& touches) {
+  void descend(std::uint32_t node, int depth, const Place& step, const Touches& touches) {
     for (std::uint32_t child = 0; child < 8; ++child) {
       Touches ofChild = touches;
       bool beside = true;
@@ -86,14 +67,14 @@ class Sides {
           beside &= upper == (step[axis] < 0);
       }
       if (!beside) continue;
-      const Found found{node::firstChild(field_.nodes[at.node]) + child, at.depth + 1};
-      if (!node::isLeaf(field_.nodes[found.node])) {
-        descend(found, step, ofChild);
+      const std::uint32_t found = node::firstChild(field_.nodes[node]) + child;
+      if (!node::isLeaf(field_.nodes[found])) {
+        descend(found, depth + 1, step, ofChild);
         continue;
       }
       for (int axis = 0; axis < 3; ++axis)
         for (int side = 0; side < 2; ++side)
-          if (ofChild[axis][side]) deepest_[axis][side] = std::max(deepest_[axis][side], found.depth);
+          if (ofChild[axis][side]) deepest_[axis][side] = std::max(deepest_[axis][side], depth + 1);
     }
   }
 
@@ -106,11 +87,7 @@ class Sides {
 }  // namespace
 
 std::vector<std::uint32_t> findReaches(const FieldData& field) {
-  std::vector<Visited> leaves;
-  visitNodes(field, [&](const Visited& at) {
-    if (node::isLeaf(field.nodes[at.node])) leaves.push_back(at);
-    return true;
-  });
+  const std::vector<Leaf> leaves = leavesOf(field);
   std::vector<std::uint32_t> reaches(field.nodes.size(), 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
     for (std::size_t n = range.begin(); n < range.end(); ++n) reaches[leaves[n].node] = Sides(field, leaves[n]).reach();

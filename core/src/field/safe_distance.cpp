@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "field/blend.h"
 #include "field/evaluate.h"
 #include "hpsdf/error.h"
 
@@ -18,17 +19,24 @@ void requireBounds(const Field& field) {
 }  // namespace
 
 std::optional<CellBound> boundAt(const Field& field, const Vector3& x) {
-  const FieldData& data = field.data();
-  if (data.bounds.empty()) return {};
-  const GridFrame frame = gridFrame(data);
-  return data.bounds[locate(data, gridPoint(frame, closestWithin(frame, x))).node];
+  if (field.data().bounds.empty()) return {};
+  const GridFrame& frame = field.directory().frame;
+  return field.data().bounds[locate(field.data(), gridPoint(frame, closestWithin(frame, x))).node];
 }
 
 double safeDistance(const Field& field, const Vector3& x) {
   requireBounds(field);
-  const Vector3 closest = closestWithin(gridFrame(field.data()), x);
-  const double certain = std::abs(field.value(closest)) - double(boundAt(field, closest)->error);
-  return std::max(0.0, certain - (x - closest).norm());
+  const FieldData& data = field.data();
+  const GridFrame& frame = field.directory().frame;
+  const Vector3 closest = closestWithin(frame, x);
+  const GridPoint point = gridPoint(frame, closest);
+  // by the octree rather than the directory, which knows no leaf's node
+  const auto [node, depth] = locate(data, point);
+  const FoundLeaf leaf =
+      leafWithin(data.nodes[node], depth, node, {point.cell(0, depth), point.cell(1, depth), point.cell(2, depth)},
+                 point.coordinates);
+  const double value = answerWithin<double>(data, field.directory(), point.coordinates, leaf);
+  return std::max(0.0, std::abs(value) - double(data.bounds[node].error) - length(x - closest));
 }
 
 SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& direction, double slack) {
@@ -51,10 +59,12 @@ SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& di
     last = std::min(last, leave);
   }
   SafeTrace trace{.length = first};
+  // the point at a length is off by a few units in the last place, which far from the domain may be much
+  const double rounding = 8 * std::numeric_limits<double>::epsilon() * (length(origin) + std::abs(last));
   while (trace.length < last) {
-    const double step = safeDistance(field, origin + trace.length * along);
+    const double step = safeDistance(field, origin + trace.length * along) - rounding;
     ++trace.steps;
-    if (step < slack) {
+    if (!(step >= std::max(slack, rounding))) {
       trace.mayTouch = true;
       return trace;
     }

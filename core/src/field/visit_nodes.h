@@ -16,6 +16,13 @@ struct Visited {
   std::array<std::uint32_t, 3> path;  ///< its place within the base cell, in cells of its depth
 };
 
+/// In cells of its depth, counted from the domain's lower corner.
+inline std::array<std::int64_t, 3> placeOf(const Visited& at) {
+  std::array<std::int64_t, 3> place;
+  for (int axis = 0; axis < 3; ++axis) place[axis] = (std::int64_t{at.base[axis]} << at.depth) + at.path[axis];
+  return place;
+}
+
 /// Base cells first to last, children 0 to 7; below an internal node where `visit` returns true for it.
 template <typename Visit>
 void visitNodes(const FieldData& field, Visit&& visit) {
