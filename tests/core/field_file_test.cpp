@@ -181,6 +181,33 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   EXPECT_EQ(again.metadata().continuityWeight, 3);
 }
 
+/// Blends, bounds and ways to steer that are none, with a right checksum.
+TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "forged.hpsdf";
+  FieldData data = small().data();
+  data.blend = 0.125;
+  data.bounds.assign(data.nodes.size(), CellBound{0.25f, 1.5f});
+  save(Field(data), file);
+  const std::string bytes = readAll(file);
+  const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
+  const std::size_t bounds = bytes.size() - 8 - 8 * count, since = bounds - 8 * (coefficients + count) - kSinceVersion3;
+  const auto refused = [&](std::size_t at, auto value) {
+    std::string forged = bytes;
+    std::memcpy(&forged[at], &value, sizeof(value));
+    writeAll(file, withChecksum(forged));
+    return !refusal(file).empty();
+  };
+  EXPECT_FALSE(refused(since + 28, 0.25)) << "the greatest width";
+  for (const double width : {-0.1, 0.2501, 1e300, double(NAN)}) EXPECT_TRUE(refused(since + 28, width)) << width;
+  for (const std::uint64_t number : {std::uint64_t{1}, count - 1, count + 1, std::uint64_t{1} << 61, ~std::uint64_t{0}})
+    EXPECT_TRUE(refused(since + 36, number)) << number;
+  for (const std::size_t at : {bounds, bounds + 4, bounds + 8 * count - 4})
+    for (const float bound : {-1.0f, NAN}) EXPECT_TRUE(refused(at, bound)) << at;
+  EXPECT_FALSE(refused(bounds, 1e30f));
+  for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{2})) << flag;
+}
+
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
 TEST(FieldFile, ForgedFilesAreRefused) {
   support::TemporaryDirectory folder;

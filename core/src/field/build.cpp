@@ -265,8 +265,7 @@ class Construction {
     return !queue_.empty();
   }
 
-  /// Spare ones and those of internal nodes are some three times those of the leaves: of the bunny at τ = 2e-7 the whole
-  /// takes 220 MB.
+  /// Spare ones and those of internal nodes are some three times those of the leaves.
   std::size_t coefficientsInMemory() const {
     return options_.criterion == Criterion::optimal ? 4 * coefficients_ : coefficients_;
   }
