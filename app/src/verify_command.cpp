@@ -45,11 +45,7 @@ const std::vector<Threshold>& thresholds() {
        [](const Verified& v) { return std::max(v.figures.uniform.error.max, v.figures.nearSurface.error.max); }},
       {"max-violations", "the number of points beyond their cell's bound",
        "Number of points at which the error or the slope is beyond the bound that the field keeps for their cell.",
-       true,
-       [](const Verified& v) {
-         if (!v.figures.bounds) throw Error("max-violations: the field keeps no bounds: build it with --bounds");
-         return double(v.figures.bounds->violations);
-       }},
+       true, [](const Verified& v) { return double(v.figures.bounds->violations); }},
       {"max-mismatches", "the number of wrong signs beyond the sign bound",
        "Number of points farther from the surface than the sign bound at which the field has the wrong sign.", true,
        [](const Verified& v) {
@@ -292,6 +288,8 @@ void runVerify(Session& session, const Arguments& arguments) {
   if (writes) checkWritable(arguments.text("script"));
   useField(session, arguments);
   const CurrentField& current = session.current();
+  if (arguments.given("max-violations") && current.field.data().bounds.empty())
+    throw Error(fmt::format("max-violations: {} keeps no bounds: build it with --bounds", current.name));
   const std::string surface = surfaceFor(session, arguments);
   const ReferenceSurface reference = surfaceOf(session, surface, arguments.flag("any-mesh"));
   const VerifyOptions options = verifyOptions(arguments);
@@ -341,18 +339,8 @@ void addVerifyCommand(Registry& registry) {
                       .help = "What the field was made from: mesh file, builtin:SHAPE or analytic:SHAPE.",
                       .valueName = "MESH",
                       .positional = true},
-                     {.name = "points",
-                      .type = ParameterType::wholeNumber,
-                      .help = "How many points, of both kinds together.",
-                      .defaultText = "1000000",
-                      .minimum = 2,
-                      .maximum = 1e9},
-                     {.name = "seed",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Which points.",
-                      .defaultText = "1",
-                      .minimum = 0,
-                      .maximum = 1e9},
+                     pointsParameter("How many points, of both kinds together.", "1000000", 2),
+                     seedParameter(),
                      {.name = "near",
                       .type = ParameterType::number,
                       .help = "How far from a random point of the surface a near point may lie. When left out, a "
