@@ -182,7 +182,7 @@ Parameter pointsParameter(std::string help, std::string count, double minimum) {
           .help = std::move(help),
           .defaultText = std::move(count),
           .minimum = minimum,
-          .maximum = 1e9};
+          .maximum = 1e8};  // some 100 bytes each
 }
 
 Parameter seedParameter() {
@@ -257,7 +257,8 @@ std::vector<Parameter> buildParameters() {
       {.name = "max-bytes",
        .type = ParameterType::wholeNumber,
        .help =
-           "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given.",
+           "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given; "
+           "with max-error it ends where that is reached.",
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},

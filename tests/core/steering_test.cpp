@@ -169,6 +169,11 @@ TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
   EXPECT_LE(measure(band).largestInBand, 0.01);
   EXPECT_LT(statistics(band).leaves, statistics(field).leaves);
 
+  // bytes are room for it, not to be filled before
+  const Field within = build(spheres, cube(), {.targetError = 0, .maxError = 0.01, .maxBytes = field.bytes() + 100000});
+  EXPECT_LE(within.metadata().measuredError, 0.01);
+  EXPECT_LE(within.bytes(), field.bytes());
+
   const Field loose = build(spheres, cube(), {.targetError = 1e-4});
   EXPECT_GT(measure(loose).largest, 0.01) << "or the target alone would have done";
   EXPECT_EQ(loose.metadata().measuredError, 0);
