@@ -111,6 +111,7 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
   EXPECT_THAT(both.err, HasSubstr("; the greatest jump"));
   EXPECT_EQ(Json::parse(both.out)["thresholds"][1]["holds"], false);
   EXPECT_EQ(with({"--max-rms", "x"}).status, kExitBadInput);
+  EXPECT_THAT(with({"--near", "1e30"}).err, HasSubstr("or near means too far"));
 }
 
 TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {
