@@ -13,7 +13,8 @@ constexpr double kMaxContinuityWeight = 1e9;
 /// interfaces, w_F the smaller cell's edge across F, ‖·‖ the L2 norm over the domain, f₀ the leaves' own fits. With w_F
 /// a length both terms have one unit, and λ has none: the same λ trades alike at every size of cell and in any unit.
 struct WeakContinuity {
-  /// λ, above 0, up to `kMaxContinuityWeight`: small for little jump, great for little change. See docs/accuracy-continuity.md.
+  /// λ, above 0, up to `kMaxContinuityWeight`: small for little jump, great for little change. See
+  /// docs/accuracy-continuity.md.
   double weight = 2.5;
   /// Of the conjugate gradients: residual at the end over the one at the start, 0 to 1. At the default the jumps and
   /// the change are those of the solution to three digits.
