@@ -6,7 +6,7 @@
 
 namespace hpsdf {
 
-/// λ beyond which nothing changes that double precision could hold apart.
+/// λ beyond which a field hardly changes; far beyond it the solver would divide by zero.
 constexpr double kMaxContinuityWeight = 1e9;
 
 /// Settings of weak continuity, which makes Σ_F w_F ∫_F jump² dA + λ‖f − f₀‖² least (Koschier et al. 2017): F the
