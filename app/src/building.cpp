@@ -145,6 +145,12 @@ bool isMadeFrom(const Source& given, const Source& source) {
   return given.fingerprint == source.fingerprint && (source.fingerprint != 0 || given.name == source.name);
 }
 
+/// An option that says nothing without another is a mistake.
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given) {
+  if (arguments.given(name) && !given)
+    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
+}
+
 std::string nameOf(const Source& source) { return source.name.empty() ? "unknown" : source.name; }
 
 }  // namespace
@@ -157,6 +163,7 @@ Parameter continuityWeightParameter() {
               "great for little error.",
           .defaultText = fmt::format("{}", WeakContinuity{}.weight),
           .minimum = 0,
+          .maximum = kMaxContinuityWeight,
           .minimumExcluded = true};
 }
 
@@ -167,6 +174,24 @@ Parameter threadsParameter(const std::string& result) {
           .defaultText = "0",
           .minimum = 0,
           .maximum = 1024};
+}
+
+Parameter pointsParameter(std::string help, std::string count, double minimum) {
+  return {.name = "points",
+          .type = ParameterType::wholeNumber,
+          .help = std::move(help),
+          .defaultText = std::move(count),
+          .minimum = minimum,
+          .maximum = 1e8};  // some 100 bytes each
+}
+
+Parameter seedParameter() {
+  return {.name = "seed",
+          .type = ParameterType::wholeNumber,
+          .help = "Which points.",
+          .defaultText = "1",
+          .minimum = 0,
+          .maximum = 1e9};
 }
 
 std::vector<Parameter> buildParameters() {
@@ -193,7 +218,8 @@ std::vector<Parameter> buildParameters() {
        .type = ParameterType::number,
        .help = "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike.",
        .defaultText = "4",
-       .minimum = 0},
+       .minimum = 0,
+       .maximum = 1000},
       {.name = "nearness-kind",
        .type = ParameterType::choice,
        .help =
@@ -204,7 +230,7 @@ std::vector<Parameter> buildParameters() {
       {.name = "near-error",
        .type = ParameterType::number,
        .help = "RMS error to reach near the surface, with far-error, in place of target error and nearness, which then "
-               "follow. By the estimate: 'hpsdf verify' measures what came of it.",
+               "follow, nearness by its exponential kind. By the estimate: 'hpsdf verify' measures what came of it.",
        .unit = "world units",
        .minimum = 0,
        .minimumExcluded = true},
@@ -229,12 +255,13 @@ std::vector<Parameter> buildParameters() {
        .minimum = 0,
        .minimumExcluded = true},
       {.name = "max-bytes",
-       .type = ParameterType::number,
+       .type = ParameterType::wholeNumber,
        .help =
-           "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given.",
+           "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given; "
+           "with max-error it ends where that is reached.",
        .unit = "bytes",
        .minimum = 1,
-       .whole = true},
+       .maximum = 1e15},
       {.name = "estimator",
        .type = ParameterType::choice,
        .help = "What stands for a cell's error: embedded, what the top degree adds, as in the paper, or residual, what "
@@ -403,11 +430,12 @@ BuildOptions buildOptions(const Arguments& arguments) {
   options.enrich = arguments.flag("enrich");
   options.bounds = arguments.flag("bounds");
   const std::string continuity = arguments.text("continuity");
-  if (continuity == "weak" || continuity == "both")
-    options.continuityWeight = arguments.number("continuity-weight");
-  else if (arguments.given("continuity-weight"))
-    throw Error("continuity-weight belongs to continuity weak: give that too, or leave it out");
-  if (continuity == "exact" || continuity == "both") options.blend = arguments.number("blend-width");
+  const bool weak = continuity == "weak" || continuity == "both", exact = continuity == "exact" || continuity == "both";
+  if (weak) options.continuityWeight = arguments.number("continuity-weight");
+  if (exact) options.blend = arguments.number("blend-width");
+  requireOwner(arguments, "continuity-weight", "continuity weak", weak);
+  requireOwner(arguments, "blend-width", "continuity exact", exact);
+  requireOwner(arguments, "near-distance", "near-error", options.nearError > 0);
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
   options.threads = arguments.whole("threads");
   return options;
@@ -415,9 +443,10 @@ BuildOptions buildOptions(const Arguments& arguments) {
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   try {
+    const BuildOptions options = buildOptions(arguments);  // mistakes, before long work
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
-    BuildInput input{distanceTo(prepared, arguments.whole("threads")), prepared.report, {}, buildOptions(arguments)};
+    BuildInput input{distanceTo(prepared, options.threads), prepared.report, {}, options};
     input.setUpSeconds = secondsSince(start);
     const Box& box = input.exact->source().box;
     input.domain = domainOf(arguments, box);

@@ -20,6 +20,10 @@ std::vector<Parameter> buildParameters();
 /// How many threads; `result`, such as "The field is", does not depend on them.
 Parameter threadsParameter(const std::string& result);
 
+/// How many random points, and which.
+Parameter pointsParameter(std::string help, std::string count, double minimum);
+Parameter seedParameter();
+
 /// λ of weak continuity, for `build` and `smooth`.
 Parameter continuityWeightParameter();
 

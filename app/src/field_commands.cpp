@@ -22,28 +22,57 @@ void saveCurrent(Session& session, const std::string& file) {
   session.setFileBytes(std::filesystem::file_size(file));
 }
 
+/// Where a command keeps the field that it makes; in a script the current field may be all that is wanted.
+Parameter fieldOutputParameter() {
+  return {.name = "output",
+          .type = ParameterType::outputPath,
+          .help = "The field's file, usually *.hpsdf.",
+          .alias = 'o',
+          .need = Need::onCommandLine};
+}
+
+void checkFieldOutput(const Arguments& arguments) {
+  if (arguments.has("output")) checkWritable(arguments.text("output"));
+}
+
+void saveMade(Session& session, const Arguments& arguments) {
+  if (arguments.has("output")) saveCurrent(session, arguments.text("output"));
+}
+
+/// What a command tells of the field that it made.
+Json madeJson(const Session& session, const Arguments& arguments) {
+  Json json = fieldJson(session.current());
+  json["output"] = arguments.has("output") ? Json(arguments.text("output")) : Json();
+  return json;
+}
+
+/// Another form of the current field takes its place.
+void changeCurrent(Session& session, const Arguments& arguments, Field field) {
+  const CurrentField& before = session.current();
+  session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});
+  saveMade(session, arguments);
+}
+
 void runBuild(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const std::string surface = arguments.text("mesh");
-  const bool saves = arguments.has("output");
-  if (saves) checkWritable(arguments.text("output"));
+  checkFieldOutput(arguments);
   const InterruptGuard guard;  // until the file is whole
   BuiltField built = buildField(console, surface, arguments);
-  session.setField({std::move(built.field), saves ? arguments.text("output") : surface, {}, surface});
+  session.setField({std::move(built.field), arguments.textOr("output", surface), {}, surface});
   session.setExact(std::move(built.exact));
-  if (saves) saveCurrent(session, arguments.text("output"));
+  saveMade(session, arguments);
   if (session.wantsJson(arguments)) {
-    Json json = fieldJson(session.current());
+    Json json = madeJson(session, arguments);
     json["build_seconds"] = built.seconds;
-    json["output"] = saves ? Json(arguments.text("output")) : Json();
     if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
     return printJson(console.out, json);
   }
   if (built.mesh) console.out << meshText(surface, *built.mesh);
   const Field& field = session.current().field;
   console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {}{}\n",
-                             saves ? arguments.text("output") + ": " : "", fieldLine(field), built.seconds,
-                             shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
+                             arguments.has("output") ? arguments.text("output") + ": " : "", fieldLine(field),
+                             built.seconds, shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -91,9 +120,10 @@ void runQuery(Session& session, const Arguments& arguments) {
 }
 
 void runSmooth(Session& session, const Arguments& arguments) {
-  const bool saves = arguments.has("output");
-  if (saves) checkWritable(arguments.text("output"));
+  checkFieldOutput(arguments);
   useField(session, arguments);
+  if (session.current().field.metadata().continuityWeight > 0)
+    throw Error(session.current().name + ": is weakly continuous already: take it as it was before, or build it anew");
   const Console& console = session.console();
   const InterruptGuard guard;  // until the file is whole
   const auto start = std::chrono::steady_clock::now();
@@ -102,15 +132,12 @@ void runSmooth(Session& session, const Arguments& arguments) {
                             arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  const CurrentField& before = session.current();
-  session.changeField({std::move(made.field), saves ? arguments.text("output") : before.name, {}, before.surface});
-  if (saves) saveCurrent(session, arguments.text("output"));
+  changeCurrent(session, arguments, std::move(made.field));
   if (session.wantsJson(arguments)) {
-    Json json = fieldJson(session.current());
+    Json json = madeJson(session, arguments);
     json["change"] = made.change;
     json["iterations"] = made.iterations;
     json["seconds"] = seconds;
-    json["output"] = saves ? Json(arguments.text("output")) : Json();
     return printJson(console.out, json);
   }
   const Field& field = session.current().field;
@@ -129,33 +156,22 @@ Command smoothCommand() {
               "does, for a field that is there; that rounds to float once, this a second time.\n"
               "\n"
               "The polynomials of cells have too few coefficients to meet along whole faces, so that this trades error "
-              "for jump; 'hpsdf study continuity' shows how. Bounds are not kept. A field can be smoothed once.",
+              "for jump; 'hpsdf study continuity' shows how. Bounds are not kept. A field can be smoothed once. In a "
+              "script, the smoothed field becomes the current one, "
+              "and the output may be left out.",
           .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
                        "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
-          .parameters = {fieldParameter(),
-                         {.name = "output",
-                          .type = ParameterType::outputPath,
-                          .help = "The field's file, usually *.hpsdf.",
-                          .alias = 'o',
-                          .need = Need::onCommandLine},
-                         continuityWeightParameter(),
+          .parameters = {fieldParameter(), fieldOutputParameter(), continuityWeightParameter(),
                          threadsParameter("The field is")},
           .action = runSmooth};
 }
 
 void runBlend(Session& session, const Arguments& arguments) {
-  const bool saves = arguments.has("output");
-  if (saves) checkWritable(arguments.text("output"));
+  checkFieldOutput(arguments);
   useField(session, arguments);
-  const CurrentField& from = session.current();
-  Field field = blended(from.field, arguments.number("width"));
-  session.setField({std::move(field), saves ? arguments.text("output") : from.name, {}, from.surface});
-  if (saves) saveCurrent(session, arguments.text("output"));
-  if (session.wantsJson(arguments)) {
-    Json json = fieldJson(session.current());
-    json["output"] = saves ? Json(arguments.text("output")) : Json();
-    return printJson(session.console().out, json);
-  }
+  const InterruptGuard guard;  // until the file is whole
+  changeCurrent(session, arguments, blended(session.current().field, arguments.number("width")));
+  if (session.wantsJson(arguments)) return printJson(session.console().out, madeJson(session, arguments));
   session.console().out << fmt::format("{}: {}, blended within {} of an edge from faces\n", session.current().name,
                                        fieldLine(session.current().field), arguments.number("width"));
 }
@@ -187,11 +203,7 @@ Command buildCommand() {
                       .valueName = "MESH",
                       .positional = true,
                       .need = Need::always},
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "The field's file, usually *.hpsdf.",
-                      .alias = 'o',
-                      .need = Need::onCommandLine}},
+                     fieldOutputParameter()},
       .action = runBuild};
   for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
   return command;
@@ -227,17 +239,11 @@ void addFieldCommands(Registry& registry) {
        .help = "Along their faces neighbouring cells are blended by smooth weights, so that neither value nor "
                "gradient jumps anywhere in the domain; away from faces the field stays as it is, to the bit. "
                "No coefficient changes: the file says how wide the zones are, and queries and pictures do "
-               "the rest. 'build --continuity exact' does the same at once.\n"
+               "the rest. Bounds are not kept. 'build --continuity exact' does the same at once.\n"
                "\n"
                "In a script, the blended field becomes the current one, and the output may be left out.",
        .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
-       .parameters = {fieldParameter(),
-                      {.name = "output",
-                       .type = ParameterType::outputPath,
-                       .help = "The field's file, usually *.hpsdf.",
-                       .alias = 'o',
-                       .need = Need::onCommandLine},
-                      blendWidthParameter("width")},
+       .parameters = {fieldParameter(), fieldOutputParameter(), blendWidthParameter("width")},
        .action = runBlend});
   registry.add({.name = "info",
                 .summary = "Tell what a field holds and how exact it is.",

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "hpsdf/error.h"
-#include "hpsdf/output_file.h"
+#include "interrupt.h"
 
 namespace hpsdf::app {
 
@@ -25,7 +25,23 @@ OutputFolder::OutputFolder(const fs::path& folder) : path_(folder) {
                           error ? error.message() : "a file of that name exists"));
 }
 
-OutputFolder::~OutputFolder() { removeCreated(); }
+OutputFolder::~OutputFolder() {
+  files_.clear();  // theirs are removed with them
+  removeCreated();
+}
+
+void OutputFolder::write(const std::string& name, std::string_view bytes) {
+  files_.push_back(std::make_unique<OutputFile>(path_ / name));
+  files_.back()->write(bytes);
+  files_.back()->flush();
+}
+
+void OutputFolder::commit() {
+  const InterruptGuard guard;  // until all have their names
+  for (const auto& file : files_) file->commit();
+  files_.clear();
+  keep();
+}
 
 /// One that is not empty stays.
 void OutputFolder::removeCreated() {

@@ -2,8 +2,12 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "hpsdf/output_file.h"
 
 namespace hpsdf::app {
 
@@ -18,6 +22,12 @@ class OutputFolder {
   OutputFolder& operator=(const OutputFolder&) = delete;
 
   void keep() { created_.clear(); }
+
+  /// Writes a file under a temporary name. `commit` gives all of them their own, and the folder is kept; without it
+  /// none is left and earlier ones stay as they were. Throws `Error` as `OutputFile` does.
+  void write(const std::string& name, std::string_view bytes);
+  void commit();
+
   const std::filesystem::path& path() const { return path_; }
 
   /// For results that take a folder to themselves, known again by their file `marker`: throws `Error` where other
@@ -33,6 +43,7 @@ class OutputFolder {
 
   std::filesystem::path path_;
   std::vector<std::filesystem::path> created_;  // innermost first
+  std::vector<std::unique_ptr<OutputFile>> files_;
 };
 
 /// A new folder under the system's own for such, removed with all that is in it.

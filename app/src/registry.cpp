@@ -65,6 +65,25 @@ std::optional<bool> parseFlag(std::string_view text) {
   return std::nullopt;
 }
 
+/// How many numbers a parameter takes, in words: "a number", "3 numbers with commas between them"; counts that follow
+/// one another are one form.
+std::vector<std::string> countForms(const Parameter& parameter) {
+  const char* kind = parameter.whole ? "whole number" : "number";
+  std::vector<std::string> forms;
+  for (std::size_t n = 0; n < parameter.counts.size(); ++n) {
+    const std::size_t first = parameter.counts[n];
+    while (n + 1 < parameter.counts.size() && parameter.counts[n + 1] == parameter.counts[n] + 1) ++n;
+    const std::size_t last = parameter.counts[n];
+    if (last == 1)
+      forms.push_back(fmt::format("a {}", kind));
+    else if (first == last)
+      forms.push_back(fmt::format("{} {}s with commas between them", first, kind));
+    else
+      forms.push_back(fmt::format("{} to {} {}s with commas between them", first, last, kind));
+  }
+  return forms;
+}
+
 /// The numbers of a value, or nothing when it is not what the parameter takes.
 std::optional<std::vector<double>> parseNumbers(const Parameter& parameter, std::string_view text) {
   const bool whole = parameter.whole || parameter.type == ParameterType::wholeNumber;
@@ -111,11 +130,8 @@ std::string expectedValue(const Parameter& parameter) {
     case ParameterType::numbers:
       break;
   }
-  const char* kind = parameter.whole ? "whole number" : "number";
   std::vector<std::string> forms = parameter.choices;
-  for (const std::size_t count : parameter.counts)
-    forms.push_back(count == 1 ? fmt::format("a {}", kind)
-                               : fmt::format("{} {}s with commas between them", count, kind));
+  for (std::string& form : countForms(parameter)) forms.push_back(std::move(form));
   return joinedWithOr(forms) + (parameter.minimum ? ", each" + rangeText(parameter) : std::string());
 }
 

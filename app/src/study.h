@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/verify.h"
 #include "registry.h"
 
 namespace hpsdf::app {
@@ -27,6 +28,7 @@ std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& na
 
 /// How many points errors are measured at, and which.
 std::vector<Parameter> samplingParameters();
+SampleOptions sampleOptions(const Arguments& arguments, int threads);
 
 /// For one of the meshes, the arguments of `build` that are among a study's: of an option that is given once for each
 /// mesh the one of its place. Throws `Error` for one that is given another number of times.

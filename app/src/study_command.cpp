@@ -83,18 +83,13 @@ std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& na
 }
 
 std::vector<Parameter> samplingParameters() {
-  return {{.name = "points",
-           .type = ParameterType::wholeNumber,
-           .help = "Random points in the domain at which errors are measured.",
-           .defaultText = "200000",
-           .minimum = 1,
-           .maximum = 1e9},
-          {.name = "seed",
-           .type = ParameterType::wholeNumber,
-           .help = "Which points.",
-           .defaultText = "1",
-           .minimum = 0,
-           .maximum = 1e9}};
+  return {pointsParameter("Random points in the domain at which errors are measured.", "200000", 1), seedParameter()};
+}
+
+SampleOptions sampleOptions(const Arguments& arguments, int threads) {
+  return {.count = static_cast<std::size_t>(arguments.number("points")),
+          .seed = static_cast<std::uint64_t>(arguments.number("seed")),
+          .threads = threads};
 }
 
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh) {

@@ -82,8 +82,7 @@ class ContinuityStudy {
 
  private:
   void takeSamples() {
-    const SampleOptions sampling{static_cast<std::size_t>(arguments_.whole("points")),
-                                 static_cast<std::uint64_t>(arguments_.whole("seed")), input_.options.threads};
+    const SampleOptions sampling = sampleOptions(arguments_, input_.options.threads);
     const double near = kNear * input_.domain.sizes().maxCoeff();
     withProgress(console_, [&](const Progress& progress) {
       uniform_ = sampleUniform(*input_.exact, input_.domain, 0, sampling, progress);
@@ -187,9 +186,9 @@ void runContinuity(Session& session, const Arguments& arguments) {
   for (const auto& ofMesh : all)
     for (const Row& row : ofMesh) rows.push_back({row, ofMesh.front()});
 
-  folder.keep();
-  writeTextFile(folder.path() / "continuity.csv", csv(rows));
-  writeTextFile(folder.path() / "continuity.json", json(rows).dump(2) + "\n");
+  folder.write("continuity.csv", csv(rows));
+  folder.write("continuity.json", json(rows).dump(2) + "\n");
+  folder.commit();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json(rows));
   session.console().out << table(rows) << (folder.path() / "continuity.csv").string() << "\n"
                         << (folder.path() / "continuity.json").string() << "\n";
@@ -214,11 +213,13 @@ Study continuityStudy() {
                       .defaultText = "30,10,2.5,1,0.4,0.1,0.03",
                       .valueName = "λ,λ,…",
                       .minimum = 0,
+                      .maximum = kMaxContinuityWeight,
                       .minimumExcluded = true,
                       .counts = counts}},
       .run = runContinuity};
-  for (auto& parameters : {samplingParameters(),
-                           buildParametersWithout({"enrich", "continuity", "continuity-weight", "max-steps", "paper"})})
+  for (auto& parameters :
+       {samplingParameters(), buildParametersWithout({"enrich", "continuity", "continuity-weight", "blend-width",
+                                                      "bounds", "max-error", "max-bytes", "max-steps", "paper"})})
     for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
   return study;
 }

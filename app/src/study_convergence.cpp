@@ -107,9 +107,7 @@ Convergence studied(Session& session, const Arguments& arguments, std::size_t me
   const std::string surface = arguments.texts("mesh")[mesh];
   const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
   return withProgress(session.console(), [&](const Progress& progress) {
-    const SampleOptions sampling{.count = static_cast<std::size_t>(arguments.number("points")),
-                                 .seed = static_cast<std::uint64_t>(arguments.number("seed")),
-                                 .threads = input.options.threads};
+    const SampleOptions sampling = sampleOptions(arguments, input.options.threads);
     const ExactSamples samples = sampleUniform(*input.exact, input.domain, 0, sampling, progress);
     Convergence convergence{surface, name, {}};
     for (const Strategy strategy : kStrategies)
@@ -229,18 +227,20 @@ std::string plotScript(const Convergence& convergence) {
       "set output \"plot.png\"\n"
       "set title \"{}\" noenhanced\n"
       "set logscale xy\n"
+      "set autoscale xfixmin\nset autoscale xfixmax\nset autoscale yfixmin\nset autoscale yfixmax\n"
+      "set offsets graph 0.03, graph 0.03, graph 0.04, graph 0.04\n"
       "set format x \"10^{{%L}}\"\n"
       "set format y \"10^{{%L}}\"\n"
       "set xlabel \"coefficients\"\n"
       "set ylabel \"error, where the longest side is 2\"\n"
-      "set grid lc rgb \"#d8d8d8\"\n"
+      "set grid lt 1 lw 0.7 lc rgb \"#dcdcd8\"\n"
       "set key outside right top\n"
       "plot ",
       convergence.name);
   const std::array<std::array<std::string_view, 3>, 3> kinds = {
       {{"5", "measured RMS", "with linespoints lw 2 pt 7 ps 0.6"},
        {"4", "estimated RMS", "with lines lw 1.5 dt (8,5)"},
-       {"6", "measured maximum", "with lines lw 1.2 dt (2,4)"}}};
+       {"6", "measured maximum", "with lines lw 2 dt (2,3)"}}};
   std::string separator;
   for (std::size_t n = 0; n < convergence.curves.size(); ++n)
     for (const auto& [column, what, style] : kinds) {
@@ -290,17 +290,18 @@ void runConvergence(Session& session, const Arguments& arguments) {
     if (plots) pictures.push_back(plotOf(gnuplot, all.back()));
   }
 
-  folder.keep();
   Json files = Json::array();
+  const InterruptGuard guard;  // until all files are there
   const auto write = [&](const std::string& file, const std::string& bytes) {
-    writeTextFile(folder.path() / file, bytes);
+    folder.write(file, bytes);
     files.push_back((folder.path() / file).string());
   };
   write("convergence.csv", csvOf(all));
   for (std::size_t n = 0; n < pictures.size(); ++n) write(fmt::format("convergence-{}.png", names[n]), pictures[n]);
   files.push_back((folder.path() / "convergence.json").string());
   const Json json = jsonOf(all, arguments, files);
-  writeTextFile(folder.path() / "convergence.json", json.dump(2) + "\n");
+  folder.write("convergence.json", json.dump(2) + "\n");
+  folder.commit();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);
   for (const Convergence& convergence : all) session.console().out << textOf(convergence, arguments);
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
@@ -308,7 +309,9 @@ void runConvergence(Session& session, const Arguments& arguments) {
 
 /// The paper's curves are of plain errors, not of weighted ones.
 std::vector<Parameter> plainBuildParameters() {
-  auto parameters = buildParametersWithout({"target-error", "strategy", "max-steps", "coefficients", "band", "paper"});
+  auto parameters =
+      buildParametersWithout({"target-error", "near-error", "far-error", "near-distance", "max-error", "max-bytes",
+                              "strategy", "max-steps", "coefficients", "band", "bounds", "paper"});
   std::ranges::find(parameters, "nearness", &Parameter::name)->defaultText = "0";
   return parameters;
 }

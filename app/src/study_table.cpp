@@ -11,6 +11,7 @@
 #include "hpsdf/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
+#include "interrupt.h"
 #include "long_work.h"
 #include "output_folder.h"
 #include "pictures.h"
@@ -49,9 +50,7 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
   const std::string surface = arguments.texts("mesh")[mesh];
   const Arguments ofBuild = buildArguments(session, arguments, mesh);
   BuiltField built = buildField(session.console(), surface, ofBuild);
-  const SampleOptions sampling{.count = static_cast<std::size_t>(arguments.number("points")),
-                               .seed = static_cast<std::uint64_t>(arguments.number("seed")),
-                               .threads = ofBuild.whole("threads")};
+  const SampleOptions sampling = sampleOptions(arguments, ofBuild.whole("threads"));
   const ExactSamples samples = withProgress(session.console(), [&](const Progress& progress) {
     return sampleUniform(*built.exact, built.field.domain(), 0, sampling, progress);
   });
@@ -99,27 +98,50 @@ std::string cssColor(const render::Color& color) {
   return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
 }
 
-/// Shares of the volume as one bar, each level in its colour, which names it.
-std::string barSvg(const Shares& shares, const Colors& colors) {
-  constexpr int kHeight = 18;
-  std::string svg = fmt::format(
+constexpr int kBarHeight = 18;
+
+/// An SVG of that width, whatever stands in it.
+std::string rowSvg(int width, const std::string& parts) {
+  return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">",
-      kBar, kHeight);
+      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
+      width, kBarHeight, parts);
+}
+
+/// A rectangle in a level's colour, its number in it where there is room.
+std::string partSvg(double from, double width, int level, const render::Color& color, const std::string& title) {
+  std::string svg =
+      fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
+                  from, width, kBarHeight, cssColor(color), title);
+  const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
+  if (width > 12)
+    svg += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", from + width / 2,
+                       isLight ? "#000000" : "#ffffff", level);
+  return svg;
+}
+
+/// Shares of the volume as one bar.
+std::string barSvg(const Shares& shares, const Colors& colors) {
+  std::string parts;
   double from = 0;
   for (const auto& [level, share] : shares) {
-    const render::Color& color = colors.at(level);
-    svg += fmt::format(
-        "<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}: {:.2f} "
-        "%</title></rect>",
-        kBar * from, kBar * share, kHeight, cssColor(color), level, 100 * share);
-    const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
-    if (share * kBar > 12)
-      svg += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", kBar * (from + share / 2),
-                         isLight ? "#000000" : "#ffffff", level);
+    parts +=
+        partSvg(kBar * from, kBar * share, level, colors.at(level), fmt::format("{}: {:.2f} %", level, 100 * share));
     from += share;
   }
-  return svg + "</svg>";
+  return rowSvg(kBar, parts);
+}
+
+/// All levels, the narrow ones of bars and those of slices too.
+std::string legendSvg(const Colors& colors) {
+  constexpr int kWidth = 26;
+  std::string parts;
+  int from = 0;
+  for (const auto& [level, color] : colors) {
+    parts += partSvg(from, kWidth, level, color, std::to_string(level));
+    from += kWidth;
+  }
+  return rowSvg(from, parts);
 }
 
 /// Everything of a row that is drawn.
@@ -165,6 +187,8 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"measured max", shortNumber(row.error.max / row.scale())}};
 }
 
+constexpr const char* kDegreeLegend = "degree-legend.svg";
+constexpr const char* kDepthLegend = "depth-legend.svg";
 constexpr const char* kErrorsNote =
     "Errors are at the scale where the mesh's longest side is 2; measured ones at random points in the domain. Bars: "
     "shares of the volume by polynomial degree and by depth. Slices: through the middle, by degree and by depth.";
@@ -174,14 +198,18 @@ std::string markdownOf(const std::vector<TableRow>& rows) {
   for (const TableRow& row : rows) {
     std::string line = "|";
     for (const auto& [name, value] : cellsOf(row)) {
-      if (&row == &rows.front()) head += " " + name + " |", rule += "---|";
+      if (&row == &rows.front()) head += " " + name + " |", rule += name == "mesh" ? "---|" : "--:|";
       line += " " + value + " |";
     }
-    body += fmt::format("{0} ![]({1}-degree.svg) | ![]({1}-depth.svg) | ![]({1}-degree.png) | ![]({1}-depth.png) |\n",
-                        line, row.name);
+    body += fmt::format(
+        "{0} ![degrees]({1}-degree.svg) | ![depths]({1}-depth.svg) | ![slice by degree]({1}-degree.png) | "
+        "![slice by depth]({1}-depth.png) |\n",
+        line, row.name);
   }
-  return fmt::format("{} degrees | depths | slice by degree | by depth |\n{}---|---|---|---|\n{}\n{}\n", head, rule,
-                     body, kErrorsNote);
+  return fmt::format(
+      "{} degrees | depths | slice by degree | by depth |\n{}---|---|---|---|\n{}\nDegree ![]({})\nDepth "
+      "![]({})\n\n{}\n",
+      head, rule, body, kDegreeLegend, kDepthLegend, kErrorsNote);
 }
 
 Json levelsJson(const Shares& shares) {
@@ -214,20 +242,15 @@ constexpr std::string_view kStyle = R"(
 body { max-width: none; }
 td, th { padding: .4rem .9rem .4rem 0; vertical-align: middle; }
 td { overflow-wrap: normal; white-space: nowrap; }
+.figure { text-align: right; }
 td img { display: block; width: 110px; border-radius: 3px; }
 td svg { display: block; margin: .3rem 0; }
-.legend span { display: inline-block; min-width: 1.4rem; margin: 0 .25rem .3rem 0; padding: .1rem .4rem; border-radius: 3px;
-               text-align: center; }
+.legend { margin: .6rem 0; }
+.legend svg { margin-left: .5rem; vertical-align: middle; border-radius: 3px; }
 )";
 
 std::string legendHtml(const std::string& title, const Colors& colors) {
-  std::string html = fmt::format("<p class=\"legend\">{}: ", title);
-  for (const auto& [level, color] : colors) {
-    const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
-    html += fmt::format("<span style=\"background:{};color:{}\">{}</span>", cssColor(color),
-                        isLight ? "#000000" : "#ffffff", level);
-  }
-  return html + "</p>\n";
+  return fmt::format("<p class=\"legend\">{} {}</p>\n", title, legendSvg(colors));
 }
 
 std::string htmlOf(const std::vector<TableRow>& rows, const std::vector<RowPictures>& pictures) {
@@ -235,12 +258,17 @@ std::string htmlOf(const std::vector<TableRow>& rows, const std::vector<RowPictu
       htmlHead("What hp-adaptive signed distance fields cost",
                fmt::format("{} meshes, as in Table 1 of Koschier, Deul and Bender (2016)", rows.size()), kStyle);
   html += legendHtml("Degree", pictures.front().degree.colors) + legendHtml("Depth", pictures.front().depth.colors);
+  const auto addCells = [&](const char* tag, const TableRow& row, bool names) {
+    for (const auto& [name, value] : cellsOf(row))
+      html += fmt::format("<{0}{1}>{2}</{0}>", tag, name == "mesh" ? "" : " class=\"figure\"",
+                          htmlEscaped(names ? name : value));
+  };
   html += "<table>\n<tr>";
-  for (const auto& [name, value] : cellsOf(rows.front())) html += fmt::format("<th>{}</th>", htmlEscaped(name));
-  html += "<th>degrees, depths</th><th>slices</th><th></th></tr>\n";
+  addCells("th", rows.front(), true);
+  html += "<th>degrees, depths</th><th>slice by degree</th><th>by depth</th></tr>\n";
   for (std::size_t n = 0; n < rows.size(); ++n) {
     html += "<tr>";
-    for (const auto& [name, value] : cellsOf(rows[n])) html += fmt::format("<td>{}</td>", htmlEscaped(value));
+    addCells("td", rows[n], false);
     html += fmt::format(
         "<td>{}{}</td><td><img src=\"{}\" alt=\"slice by degree\"></td><td><img src=\"{}\" alt=\"slice "
         "by depth\"></td></tr>\n",
@@ -271,23 +299,23 @@ void runTable(Session& session, const Arguments& arguments) {
   for (std::size_t n = 0; n < meshes.size(); ++n) rows.push_back(rowOf(session, arguments, n, names[n]));
   const std::vector<RowPictures> pictures = picturesOf(session, chosen, rows);
 
-  folder.keep();
   Json json = {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
                {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
                {"meshes", Json::array()}};
   for (const TableRow& row : rows) json["meshes"].push_back(jsonOf(row));
+  const InterruptGuard guard;  // until all files are there
   for (std::size_t n = 0; n < rows.size(); ++n) {
-    const auto write = [&](const std::string& ending, const std::string& bytes) {
-      writeTextFile(folder.path() / (names[n] + ending), bytes);
-    };
-    write("-degree.png", pictures[n].degree.png);
-    write("-depth.png", pictures[n].depth.png);
-    write("-degree.svg", pictures[n].degreeBar(rows[n]));
-    write("-depth.svg", pictures[n].depthBar(rows[n]));
+    folder.write(names[n] + "-degree.png", pictures[n].degree.png);
+    folder.write(names[n] + "-depth.png", pictures[n].depth.png);
+    folder.write(names[n] + "-degree.svg", pictures[n].degreeBar(rows[n]));
+    folder.write(names[n] + "-depth.svg", pictures[n].depthBar(rows[n]));
   }
-  writeTextFile(folder.path() / "table.md", markdownOf(rows));
-  writeTextFile(folder.path() / "table.json", json.dump(2) + "\n");
-  writeTextFile(folder.path() / "index.html", htmlOf(rows, pictures));
+  folder.write(kDegreeLegend, legendSvg(pictures.front().degree.colors));
+  folder.write(kDepthLegend, legendSvg(pictures.front().depth.colors));
+  folder.write("table.md", markdownOf(rows));
+  folder.write("table.json", json.dump(2) + "\n");
+  folder.write("index.html", htmlOf(rows, pictures));
+  folder.commit();
   json["page"] = (folder.path() / "index.html").string();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);
   session.console().out << textOf(rows) << json["page"].get<std::string>() << "\n";

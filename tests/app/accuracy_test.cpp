@@ -9,16 +9,21 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "commands.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/render/image.h"
 #include "hpsdf/shapes.h"
-#include "program.h"
+#include "other_program.h"
+#include "outcome.h"
 #include "script.h"
+#include "session.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
@@ -29,18 +34,6 @@ using Json = nlohmann::ordered_json;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-struct Outcome {
-  int status;
-  std::string out, err;
-};
-
-Outcome run(const std::vector<std::string>& words) {
-  std::istringstream in;
-  std::ostringstream out, err;
-  const int status = runProgram(words, Console{in, out, err});
-  return {status, out.str(), err.str()};
-}
 
 constexpr const char* kMesh = "builtin:torus,segments=48,sides=24";
 
@@ -63,7 +56,7 @@ class Accuracy : public testing::Test {
   Json verified(std::vector<std::string> words) const {
     words.insert(words.begin(), "verify");
     words.insert(words.end(), {"--points", "20000", "--json"});
-    const Outcome outcome = run(words);
+    const Outcome outcome = runHere(words);
     EXPECT_EQ(outcome.status, kExitDone) << outcome.err;
     return Json::parse(outcome.out);
   }
@@ -93,7 +86,7 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
   const auto with = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words = {"verify", at("f.hpsdf"), "--points", "20000"};
     words.insert(words.end(), more.begin(), more.end());
-    return run(words);
+    return runHere(words);
   };
   const Outcome good = with({"--max-rms", "0.02", "--max-near-rms", "0.02", "--max-error", "0.2", "--max-mismatches",
                              "0", "--max-angle", "90", "--max-slope", "5", "--max-jump", "1"});
@@ -118,15 +111,16 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
   EXPECT_THAT(both.err, HasSubstr("; the greatest jump"));
   EXPECT_EQ(Json::parse(both.out)["thresholds"][1]["holds"], false);
   EXPECT_EQ(with({"--max-rms", "x"}).status, kExitBadInput);
+  EXPECT_THAT(with({"--near", "1e30"}).err, HasSubstr("or near means too far"));
 }
 
 TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {
   writeField(at("f.hpsdf"), 0);
-  const Outcome other = run({"verify", at("f.hpsdf"), "builtin:gear"});
+  const Outcome other = runHere({"verify", at("f.hpsdf"), "builtin:gear"});
   EXPECT_EQ(other.status, kExitBadInput);
   EXPECT_THAT(other.out, IsEmpty());
   EXPECT_THAT(other.err, AllOf(HasSubstr(kMesh), HasSubstr("not from builtin:gear"), HasSubstr("--any-mesh")));
-  EXPECT_EQ(run({"verify", at("f.hpsdf"), "analytic:torus", "--points", "1000"}).status, kExitBadInput);
+  EXPECT_EQ(runHere({"verify", at("f.hpsdf"), "analytic:torus", "--points", "1000"}).status, kExitBadInput);
   const Json figures = verified({at("f.hpsdf"), "analytic:torus", "--any-mesh"});
   EXPECT_LT(figures["uniform"]["error"]["rms"], 0.01);
   EXPECT_LT(figures["near_surface"]["gradient"]["mean_angle"], 10);
@@ -135,13 +129,13 @@ TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {
 
 TEST_F(Accuracy, AMeshThatIsNotKnownIsAskedFor) {
   std::ofstream(at("t.off")) << "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-  ASSERT_EQ(run({"build", at("t.off"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--grid", "2"}).status, 0);
-  EXPECT_THAT(run({"verify", at("t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
-  EXPECT_EQ(run({"verify", at("t.hpsdf"), at("t.off"), "--points", "1000"}).status, kExitDone);
+  ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--grid", "2"}).status, 0);
+  EXPECT_THAT(runHere({"verify", at("t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
+  EXPECT_EQ(runHere({"verify", at("t.hpsdf"), at("t.off"), "--points", "1000"}).status, kExitDone);
   // a normalized field is measured against the mesh as it was normalized
-  ASSERT_EQ(
-      run({"build", at("t.off"), "-o", at("n.hpsdf"), "--target-error", "1e-2", "--grid", "2", "--normalize"}).status,
-      0);
+  ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("n.hpsdf"), "--target-error", "1e-2", "--grid", "2", "--normalize"})
+                .status,
+            0);
   EXPECT_LT(verified({at("n.hpsdf"), at("t.off")})["uniform"]["error"]["rms"], 0.1);
 }
 
@@ -158,7 +152,7 @@ TEST_F(Accuracy, TheSameSeedGivesTheSameBytesForAnyNumberOfThreads) {
 TEST_F(Accuracy, TheScriptFliesToTheWorstPoints) {
   writeField(at("f.hpsdf"), 0);
   const Outcome outcome =
-      run({"verify", at("f.hpsdf"), "--points", "20000", "--worst", "2", "--script", at("worst.hps"), "--json"});
+      runHere({"verify", at("f.hpsdf"), "--points", "20000", "--worst", "2", "--script", at("worst.hps"), "--json"});
   const Json point = Json::parse(outcome.out)["worst"][1]["position"];
   const std::string script = readTextFile(at("worst.hps"));
   EXPECT_THAT(script, AllOf(HasSubstr("load " + at("f.hpsdf")), HasSubstr("shot output=worst-2.png")));
@@ -177,7 +171,7 @@ TEST_F(Accuracy, TheScriptFliesToTheWorstPoints) {
   for (std::istringstream all(script); std::getline(all, found);)
     if (!found.starts_with("shot")) lookOnly += found + "\n";
   writeTextFile(at("look.hps"), lookOnly + "copy-view\n");
-  const Outcome looked = run({"run", at("look.hps")});
+  const Outcome looked = runHere({"run", at("look.hps")});
   EXPECT_EQ(looked.status, kExitDone) << looked.err;
   EXPECT_THAT(looked.out, HasSubstr("zoom="));
 }
@@ -199,7 +193,7 @@ TEST_F(Accuracy, ConvergenceOfATorusFallsAndHpIsAhead) {
   const std::vector<std::string> words = {"study",   "convergence", "analytic:torus", "-o",
                                           at("out"), "--json",      "--no-plot",      "--max-coefficients",
                                           "60000",   "--points",    "20000"};
-  const Outcome outcome = run(words);
+  const Outcome outcome = runHere(words);
   ASSERT_EQ(outcome.status, kExitDone) << outcome.err;
   const Json json = Json::parse(outcome.out);
   const auto rows = rowsOf(readTextFile(at("out/convergence.csv")));
@@ -237,14 +231,14 @@ TEST_F(Accuracy, ConvergenceOfATorusFallsAndHpIsAhead) {
   std::vector<std::string> again = words;
   again[4] = at("again");
   again.insert(again.end(), {"--threads", "1"});
-  EXPECT_EQ(run(again).status, kExitDone);
+  EXPECT_EQ(runHere(again).status, kExitDone);
   EXPECT_EQ(readTextFile(at("again/convergence.csv")), readTextFile(at("out/convergence.csv")));
 }
 
 TEST_F(Accuracy, ConvergenceComparesAtTheErrorThatIsAskedFor) {
   const auto comparison = [&](const std::string& at) {
-    const Outcome outcome = run({"study", "convergence", "analytic:torus", "-o", this->at("out"), "--no-plot",
-                                 "--max-coefficients", "30000", "--points", "5000", "--json", "--at", at});
+    const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", this->at("out"), "--no-plot",
+                                     "--max-coefficients", "30000", "--points", "5000", "--json", "--at", at});
     EXPECT_EQ(outcome.status, kExitDone) << outcome.err;
     return Json::parse(outcome.out)["meshes"][0];
   };
@@ -267,8 +261,8 @@ TEST_F(Accuracy, ConvergenceIsDrawnByGnuplot) {
       fs::permissions(at("bin/gnuplot"), fs::perms::owner_all);
     }
     setenv("PATH", at("bin").c_str(), 1);
-    const Outcome outcome = run({"study", "convergence", "analytic:torus", "-o", at("plots"), "--max-coefficients",
-                                 "5000", "--points", "1000"});
+    const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", at("plots"), "--max-coefficients",
+                                     "5000", "--points", "1000"});
     setenv("PATH", before.c_str(), 1);
     return outcome;
   };
@@ -286,10 +280,55 @@ TEST_F(Accuracy, ConvergenceIsDrawnByGnuplot) {
                             HasSubstr("hp, measured RMS"), HasSubstr("h1, measured maximum")));
 }
 
+TEST_F(Accuracy, GnuplotTakesWhatItIsTold) {
+  if (!findProgram("gnuplot")) GTEST_SKIP() << "gnuplot is not installed (package gnuplot-nox)";
+  const Outcome outcome = runHere(
+      {"study", "convergence", "analytic:torus", "-o", at("plots"), "--max-coefficients", "5000", "--points", "1000"});
+  ASSERT_EQ(outcome.status, kExitDone) << outcome.err;
+  const render::Image picture = render::loadPng(at("plots/convergence-torus.png"));
+  EXPECT_EQ(picture.width, 900);
+  EXPECT_EQ(picture.height, 560);
+}
+
+TEST_F(Accuracy, AStudyIsWrittenWholeOrNotAtAll) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> studies = {
+      {{"convergence", "--no-plot", "--max-coefficients", "3000"}, "convergence.json"},
+      {{"table", "--cpu", "--target-error", "1e-1", "--grid", "2"}, "table.json"},
+      {{"continuity", "--target-error", "1e-1", "--grid", "2", "--weights", "1"}, "continuity.json"}};
+  for (const auto& [options, late] : studies) {
+    fs::create_directories(at("out/" + late));  // in the way of one of the last files
+    std::vector<std::string> words = {"study"};
+    words.insert(words.end(), options.begin(), options.end());
+    words.insert(words.end(), {"analytic:sphere", "-o", at("out"), "--points", "1000"});
+    const Outcome outcome = runHere(words);
+    EXPECT_EQ(outcome.status, kExitBadInput) << options[0];
+    EXPECT_THAT(outcome.err, HasSubstr(late + ": is a folder"));
+    std::vector<std::string> left;
+    for (const auto& entry : fs::directory_iterator(at("out"))) left.push_back(entry.path().filename().string());
+    EXPECT_EQ(left, std::vector{late});
+    fs::remove_all(at("out"));
+  }
+}
+
+TEST_F(Accuracy, AFieldInAnotherFormKeepsItsSurface) {
+  std::ofstream(at("t.off")) << "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+  const Registry registry = makeRegistry();
+  for (const char* verb : {"blend", "smooth"}) {
+    std::istringstream in;
+    std::ostringstream out, err;
+    Session session(registry, Console{in, out, err});
+    const auto run = [&](const std::string& line) { runScript(session, parseScript(registry, "test", line, {})); };
+    run("build " + at("t.off") + " target-error=1e-2 grid=2");
+    const DistanceFunction* surface = &session.exact("");
+    run(verb);
+    EXPECT_EQ(&session.exact(""), surface) << verb << ": it would be read anew";
+  }
+}
+
 TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
-  const Outcome outcome = run({"study", "table", kMesh, "builtin:torus,segments=20,sides=10", "analytic:box", "-o",
-                               at("out"), "--cpu", "--target-error", "1e-3", "--target-error", "1e-2", "--target-error",
-                               "1e-1", "--grid", "4", "--points", "5000", "--json"});
+  const Outcome outcome = runHere({"study", "table", kMesh, "builtin:torus,segments=20,sides=10", "analytic:box", "-o",
+                                   at("out"), "--cpu", "--target-error", "1e-3", "--target-error", "1e-2",
+                                   "--target-error", "1e-1", "--grid", "4", "--points", "5000", "--json"});
   ASSERT_EQ(outcome.status, kExitDone) << outcome.err;
   const Json json = Json::parse(outcome.out), file = Json::parse(readTextFile(at("out/table.json")));
   EXPECT_EQ(file["meshes"], json["meshes"]);
@@ -311,7 +350,30 @@ TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
   const std::string page = readTextFile(at("out/index.html")), table = readTextFile(at("out/table.md"));
   EXPECT_THAT(page, AllOf(HasSubstr("<td>torus-2</td>"), HasSubstr("data:image/png;base64,"), HasSubstr("<svg"),
                           testing::Not(HasSubstr("src=\"http")), testing::Not(HasSubstr("src=\"torus"))));
-  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![](torus-2-degree.svg)")));
+  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![degrees](torus-2-degree.svg)"),
+                           HasSubstr("Degree ![](degree-legend.svg)"), HasSubstr("Depth ![](depth-legend.svg)")));
+  // every row has a cell for each of the heads
+  const auto count = [](const std::string& text, const std::string& what) {
+    std::size_t found = 0;
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count(page, "<td"), 3 * count(page, "<th"));
+  EXPECT_EQ(count(page, "<td>"), count(page, "</td>") - count(page, "<td class=\"figure\">"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("<th></th>")));
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line) && !line.empty();)
+    EXPECT_EQ(std::ranges::count(line, '|'), 16) << line;
+  // the legend has all levels, in the colours of the bars
+  const std::string legend = readTextFile(at("out/degree-legend.svg"));
+  std::set<std::string> levels;
+  for (const Json& mesh : json["meshes"])
+    for (const auto& [level, share] : mesh["degree_volume"].items()) {
+      levels.insert(level);
+      EXPECT_THAT(legend, HasSubstr("<title>" + level + "</title>"));
+    }
+  EXPECT_EQ(count(legend, "<rect"), levels.size());
+  EXPECT_THAT(page, HasSubstr(legend));
   for (const char* name : {"torus", "torus-2", "box"})
     for (const char* ending : {"-degree.png", "-depth.png", "-degree.svg", "-depth.svg"})
       EXPECT_GT(fs::file_size(at(std::string("out/") + name + ending)), 100u) << name << ending;
@@ -325,7 +387,7 @@ TEST_F(Accuracy, MistakesInStudiesAreNamedBeforeLongWork) {
     std::vector<std::string> all = {"study"};
     all.insert(all.end(), words.begin(), words.end());
     all.insert(all.end(), {"-o", at("out")});
-    const Outcome outcome = run(all);
+    const Outcome outcome = runHere(all);
     EXPECT_EQ(outcome.status, kExitBadInput);
     EXPECT_THAT(outcome.err, HasSubstr(message));
     EXPECT_FALSE(fs::exists(at("out")));

@@ -7,7 +7,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -16,7 +15,7 @@
 #include "data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/image.h"
-#include "program.h"
+#include "outcome.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
@@ -29,19 +28,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-
-struct Outcome {
-  int status = -1;
-  std::string out;
-  std::string err;
-};
-
-Outcome run(const std::vector<std::string>& words) {
-  std::istringstream in;
-  std::ostringstream out, err;
-  const int status = runProgram(words, Console{in, out, err});
-  return {status, out.str(), err.str()};
-}
 
 std::string readFile(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -83,12 +69,12 @@ class Check : public testing::Test {
   Outcome check(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"check", pictures_, "--out", results_};
     words.insert(words.end(), more.begin(), more.end());
-    return run(words);
+    return runHere(words);
   }
   Outcome accept(const std::vector<std::string>& names) const {
     std::vector<std::string> words = {"accept", pictures_, "--from", results_};
     words.insert(words.end(), names.begin(), names.end());
-    return run(words);
+    return runHere(words);
   }
   /// "SCRIPT/PICTURE: RESULT", in order; a control's picture with a !.
   std::vector<std::string> results(const std::vector<std::string>& more = {}) const {
@@ -265,7 +251,7 @@ TEST_F(Check, acceptTakesWhatIsNamedAndNothingElse) {
   EXPECT_THAT(facts.version, HasSubstr("hpsdf "));
   EXPECT_EQ(facts.budget, std::nullopt);
 
-  EXPECT_EQ(run({"accept", pictures_, "looks/a.png", "--from", results_, "--budget", "0.5"}).status, 0);
+  EXPECT_EQ(runHere({"accept", pictures_, "looks/a.png", "--from", results_, "--budget", "0.5"}).status, 0);
   const Outcome again = accept({"looks/a.png"});
   EXPECT_THAT(again.out, Not(HasSubstr("a new baseline")));
   EXPECT_EQ(loadFacts(baseline("looks/a.png")).budget, 0.5) << "kept";
@@ -317,15 +303,15 @@ TEST_F(Check, badCallsAreRefused) {
   EXPECT_EQ(check({"--junit", folder_ / "none/junit.xml"}).status, 2);
 
   writeFile(folder_ / "mine/thesis.txt", "years of work");
-  const Outcome mine = run({"check", pictures_, "--out", folder_ / "mine"});
+  const Outcome mine = runHere({"check", pictures_, "--out", folder_ / "mine"});
   EXPECT_EQ(mine.status, 2);
   EXPECT_THAT(mine.err, HasSubstr("holds other things"));
   EXPECT_EQ(readFile(folder_ / "mine/thesis.txt"), "years of work");
-  EXPECT_EQ(run({"check", pictures_, "--out", folder_ / "mine/thesis.txt"}).status, 2);
+  EXPECT_EQ(runHere({"check", pictures_, "--out", folder_ / "mine/thesis.txt"}).status, 2);
 
   EXPECT_EQ(check().status, 1);
   writeFile(folder_ / "other/scripts/looks.hps", "");
-  EXPECT_THAT(run({"accept", folder_ / "other", "looks/a.png", "--from", results_}).err, HasSubstr("a check of"));
+  EXPECT_THAT(runHere({"accept", folder_ / "other", "looks/a.png", "--from", results_}).err, HasSubstr("a check of"));
 }
 
 TEST_F(Check, noPictureAndNoScriptIsPassedOverInSilence) {

@@ -26,6 +26,7 @@
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/render/image.h"
+#include "outcome.h"
 #include "point_query.h"
 #include "progress_line.h"
 #include "report_page.h"
@@ -48,12 +49,6 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 using Clock = std::chrono::steady_clock;
-
-struct Outcome {
-  int status = -1;  ///< exit status, or -signal
-  std::string out;
-  std::string err;
-};
 
 struct Call {
   std::vector<std::string> words;
@@ -412,8 +407,91 @@ TEST_F(Cli, smoothIsWhatBuildDoesWithWeakContinuity) {
   EXPECT_LT(findJumps(load(at("smooth.hpsdf"))).value.rms, 0.5 * findJumps(load(at("plain.hpsdf"))).value.rms);
   EXPECT_THAT(run({{"info", at("smooth.hpsdf")}}).out, HasSubstr("weak, weight 0.7"));
   EXPECT_TRUE(Json::parse(run({{"info", at("plain.hpsdf"), "--json"}}).out).at("continuity_weight").is_null());
-  expectRefused({{"smooth", at("smooth.hpsdf"), "-o", at("twice.hpsdf")}}, "weakly continuous already");
+  expectRefused({{"smooth", at("smooth.hpsdf"), "-o", at("twice.hpsdf")}},
+                "smooth.hpsdf: is weakly continuous already");
   expectRefused({{"smooth", at("plain.hpsdf"), "-o", at("plain.hpsdf")}}, "plain.hpsdf");
+}
+
+TEST_F(Cli, blendIsWhatBuildDoesWithExactContinuity) {
+  const std::vector<std::string> build = {"build", "builtin:torus", "--target-error", "1e-3"};
+  const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  ASSERT_EQ(run({with(build, {"-o", at("plain.hpsdf")})}).status, 0);
+  ASSERT_EQ(run({with(build, {"-o", at("exact.hpsdf"), "--continuity", "exact", "--blend-width", "0.1"})}).status, 0);
+  const Outcome blended = run({{"blend", at("plain.hpsdf"), "-o", at("blended.hpsdf"), "--width", "0.1", "--json"}});
+  ASSERT_EQ(blended.status, 0) << blended.err;
+  EXPECT_EQ(readFile(at("blended.hpsdf")), readFile(at("exact.hpsdf")));
+  EXPECT_EQ(Json::parse(blended.out).at("output"), at("blended.hpsdf"));
+  EXPECT_EQ(load(at("blended.hpsdf")).data().blend, 0.1);
+  const auto jump = [&](const char* name) {
+    return Json::parse(run({{"jumps", at(name), "--json"}}).out).at("value").at("max").get<double>();
+  };
+  EXPECT_GT(jump("plain.hpsdf"), 1e-3);
+  EXPECT_LT(jump("blended.hpsdf"), 1e-14);
+  EXPECT_THAT(run({{"info", at("blended.hpsdf")}}).out, HasSubstr("exact: blended within 0.1 of an edge from faces"));
+  // both ways, one after the other or at once
+  ASSERT_EQ(run({{"smooth", at("plain.hpsdf"), "-o", at("smooth.hpsdf")}}).status, 0);
+  const Outcome text = run({{"blend", at("smooth.hpsdf"), "-o", at("both.hpsdf")}});
+  ASSERT_EQ(text.status, 0) << text.err;
+  EXPECT_THAT(text.out, AllOf(StartsWith(at("both.hpsdf") + ": "), HasSubstr("blended within 0.04 of an edge")));
+  const FieldMetadata both = load(at("both.hpsdf")).metadata();
+  EXPECT_EQ(both.continuityWeight, 2.5);
+  ASSERT_EQ(run({with(build, {"-o", at("once.hpsdf"), "--continuity", "both"})}).status, 0);
+  EXPECT_EQ(load(at("once.hpsdf")).metadata().continuityWeight, 2.5);
+  EXPECT_LT(jump("once.hpsdf"), 1e-14);
+  expectRefused({{"blend", at("plain.hpsdf"), "-o", at("plain.hpsdf")}}, "plain.hpsdf: is read by the same command");
+  expectRefused({{"blend", at("none.hpsdf"), "-o", at("x.hpsdf")}}, "none.hpsdf: no such file");
+  expectRefused({{"blend", at("plain.hpsdf"), "-o", at("none/x.hpsdf")}}, "none/x.hpsdf");
+}
+
+TEST_F(Cli, boundsAreKeptToldAndHold) {
+  const std::vector<std::string> build = {"build", "builtin:torus", "--target-error", "1e-3", "-o"};
+  std::vector<std::string> bounded = build, plain = build;
+  bounded.insert(bounded.end(), {at("bounds.hpsdf"), "--bounds"});
+  plain.push_back(at("plain.hpsdf"));
+  ASSERT_EQ(run({bounded}).status, 0);
+  ASSERT_EQ(run({plain}).status, 0);
+  EXPECT_GT(fs::file_size(at("bounds.hpsdf")), fs::file_size(at("plain.hpsdf")));
+  EXPECT_THAT(run({{"info", at("bounds.hpsdf")}}).out, HasSubstr("bounds of the error"));
+  EXPECT_THAT(run({{"info", at("plain.hpsdf")}}).out, Not(HasSubstr("bounds of the error")));
+  const Outcome verified =
+      run({{"verify", at("bounds.hpsdf"), "--points", "20000", "--max-violations", "0", "--worst", "0"}});
+  EXPECT_EQ(verified.status, 0) << verified.err;
+  EXPECT_THAT(verified.out, HasSubstr("no point is beyond its bound"));
+  expectRefused({{"verify", at("plain.hpsdf"), "--max-violations", "0", "--script", at("worst.hps")}},
+                "max-violations: " + at("plain.hpsdf") + " keeps no bounds");
+  // another form of the field has other errors
+  ASSERT_EQ(run({{"blend", at("bounds.hpsdf"), "-o", at("blended.hpsdf")}}).status, 0);
+  EXPECT_TRUE(load(at("blended.hpsdf")).data().bounds.empty());
+  // an open mesh is warned of
+  writeFile(at("open.off"), "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n");
+  const Outcome open =
+      run({{"build", at("open.off"), "--bounds", "-o", at("open.hpsdf"), "--target-error", "1e-1", "--grid", "2"}});
+  EXPECT_EQ(open.status, 0);
+  EXPECT_THAT(open.err, HasSubstr("warning: bounds hold for closed surfaces alone"));
+}
+
+TEST_F(Cli, optionsThatSayNothingAreRefused) {
+  const auto refused = [&](const std::vector<std::string>& options, const std::string& message) {
+    std::vector<std::string> words = {"build", "builtin:torus", "-o", at("f.hpsdf")};
+    words.insert(words.end(), options.begin(), options.end());
+    expectRefused({words}, message);
+  };
+  refused({"--continuity-weight", "1"}, "continuity-weight belongs to continuity weak");
+  refused({"--continuity", "exact", "--continuity-weight", "1"}, "continuity-weight belongs to continuity weak");
+  refused({"--blend-width", "0.1"}, "blend-width belongs to continuity exact");
+  refused({"--continuity", "weak", "--blend-width", "0.1"}, "blend-width belongs to continuity exact");
+  refused({"--near-distance", "0.1"}, "near-distance belongs to near-error");
+  refused({"--max-bytes", "1e6", "--enrich"}, "does not keep within a maximum of bytes");
+  refused({"--max-bytes", "1e3"}, "the base grid alone takes more than 1000 bytes");
+  // of studies too, where they would change nothing or end at another place
+  for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+    expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
+  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+    expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
+                  "not for 'study convergence'");
 }
 
 TEST_F(Cli, continuityIsStudied) {

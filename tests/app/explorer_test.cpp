@@ -247,16 +247,20 @@ TEST(Explorer, picksOfAShotAreWhatTheFieldSays) {
   bench.run("expect pick(450,200).jump.value < 1");
 }
 
+/// Where the middle of the explorer's picture is, of the surface or of a slice, after a script.
+std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, const std::string& script) {
+  bench.run(kTorus + ("show " + kind + "; " + script));
+  bench.explorer().frame();
+  const auto& picture = *bench.explorer().picture();
+  return render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
+}
+
 TEST(Explorer, flyingLooksAtTheInterface) {
   Bench bench;
   for (const char* kind : {"slice", "surface"}) {
-    bench.run(std::string(kTorus) + "show " + kind + "; fly 3");
-    bench.explorer().frame();
-    const auto& picture = *bench.explorer().picture();
-    const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
-    const auto pick =
-        render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
+    const auto pick = middleAfter(bench, kind, "fly 3");
     ASSERT_TRUE(pick) << kind;
+    const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
     EXPECT_LT((pick->position - face.worst).norm(), 0.05) << kind;
   }
   EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("rank: the field has"));
@@ -265,17 +269,25 @@ TEST(Explorer, flyingLooksAtTheInterface) {
 TEST(Explorer, flyingToAPointPutsItInTheMiddle) {
   Bench bench;
   for (const char* kind : {"slice", "surface"}) {
-    bench.run(std::string(kTorus) + "show " + kind + "; fly to=0.71,-0.2,0.3");
-    bench.explorer().frame();
-    const auto& picture = *bench.explorer().picture();
-    const auto pick =
-        render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
+    const auto pick = middleAfter(bench, kind, "fly to=0.71,-0.2,0.3");
     ASSERT_TRUE(pick) << kind;
     EXPECT_LT((pick->position - Vector3(0.71, -0.2, 0.3)).norm(), 0.05) << kind;
   }
   EXPECT_THAT(bench.failure("fly to=5,0,0"), HasSubstr("to: the point lies outside the field's domain"));
   EXPECT_THAT(bench.failure("fly 1 to=0,0,0"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
   EXPECT_THAT(bench.failure("fly"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
+}
+
+TEST(Explorer, aRebuildLeavesOutWhatTheContinuityNoLongerTakes) {
+  Bench bench;
+  bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
+  bench.run("settings continuity=weak ; rebuild");
+  EXPECT_EQ(bench.session.current().field.data().blend, 0);
+  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0.5);
+  bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
+  bench.run("settings continuity=exact ; rebuild");
+  EXPECT_EQ(bench.session.current().field.data().blend, 0.1);
+  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0);
 }
 
 TEST(Explorer, aRebuildUnchangedIsTheSameField) {

@@ -3,11 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
-#include "program.h"
+#include "outcome.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
 
@@ -22,9 +21,8 @@ TEST(Gallery, PicturesAreWhatTheirScriptsMake) {
   const support::TemporaryDirectory folder;
   const std::vector<std::string> words = {"check", HPSDF_SOURCE_DIR "/screenshots", std::string("mesh=") + kBunny,
                                           "--out", folder.path() / "results"};
-  std::istringstream in;
-  std::ostringstream out, err;
-  EXPECT_EQ(runProgram(words, Console{in, out, err}), kExitDone) << out.str() << err.str();
+  const Outcome outcome = runHere(words);
+  EXPECT_EQ(outcome.status, kExitDone) << outcome.out << outcome.err;
 }
 
 }  // namespace

@@ -198,6 +198,11 @@ TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
   EXPECT_LE(measure(band).largestInBand, 0.01);
   EXPECT_LT(statistics(band).leaves, statistics(field).leaves);
 
+  // bytes are room for it, not to be filled before
+  const Field within = build(spheres, cube(), {.targetError = 0, .maxError = 0.01, .maxBytes = field.bytes() + 100000});
+  EXPECT_LE(within.metadata().measuredError, 0.01);
+  EXPECT_LE(within.bytes(), field.bytes());
+
   const Field loose = build(spheres, cube(), {.targetError = 1e-4});
   EXPECT_GT(measure(loose).largest, 0.01) << "or the target alone would have done";
   EXPECT_EQ(loose.metadata().measuredError, 0);
@@ -296,6 +301,7 @@ TEST(Steering, RefusesWhatDoesNotGoTogether) {
   EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3}).find("give both"), std::string::npos);
   EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3, .farError = 1e-4}).find("above far error"),
             std::string::npos);
+  EXPECT_NE(refusal({.maxBytes = 1000000, .enrich = true}).find("maximum of bytes"), std::string::npos);
   EXPECT_NE(refusal({.maxError = -1}).find("maximum error -1"), std::string::npos);
   EXPECT_NE(refusal({.maxError = 0.1, .criterion = Criterion::optimal}).find("maximum error"), std::string::npos);
   BuildOptions paper = paperOptions();

@@ -317,8 +317,10 @@ TEST(WeakContinuity, DropsBounds) {
 
 TEST(WeakContinuity, RefusesBadSettings) {
   const Field field = randomField(1);
-  for (const double weight : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+  for (const double weight :
+       {0.0, -1.0, std::nan(""), 1.01 * kMaxContinuityWeight, std::numeric_limits<double>::infinity()})
     EXPECT_THROW(weaklyContinuous(field, {.weight = weight}), Error) << weight;
+  EXPECT_NEAR(weaklyContinuous(field, {.weight = kMaxContinuityWeight}).change, 0, 1e-8);
   for (const double tolerance : {0.0, 1.0, -1.0, std::nan("")})
     EXPECT_THROW(weaklyContinuous(field, {.tolerance = tolerance}), Error) << tolerance;
   EXPECT_THROW(weaklyContinuous(field, {.maxIterations = 0}), Error);

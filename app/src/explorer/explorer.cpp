@@ -149,6 +149,8 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
+  if (continuity != settings_.end() && continuity->second != "exact" && continuity->second != "both")
+    settings.erase("blend-width");
   for (const auto& [name, value] : settings_) settings[name] = value;
   if (maxSteps) settings["max-steps"] = fmt::format("{}", *maxSteps);
   const auto mesh = settings_.find("mesh");

@@ -23,7 +23,10 @@ class OutputFile {
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
 
-  /// Flushes to the disk and renames; throws `Error` as `write` does. Nothing can be written afterwards.
+  /// Takes all that was written to the disk: what fails for want of space fails here at the latest. Throws as `write`.
+  void flush();
+
+  /// Flushes and renames; throws `Error` as `write` does. Nothing can be written afterwards.
   void commit();
 
   /// Removes the temporary files of all that are not yet committed: for a signal handler that is about to end the

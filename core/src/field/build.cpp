@@ -233,10 +233,9 @@ class Construction {
       node.fit.error.weighted = nearness_.weight(node.fit.coefficients[0]) * node.fit.error.squared;
   }
 
-  /// Whether errors of cells decide what is refined, rather than a maximum error alone.
-  bool growsByErrors() const {
-    return options_.targetError > 0 || goal_.byDistance() || options_.maxBytes || !(options_.maxError > 0);
-  }
+  /// Whether errors of cells decide what is refined, rather than a maximum error alone: by bytes alone they would leave
+  /// it no room.
+  bool growsByErrors() const { return options_.targetError > 0 || goal_.byDistance() || !(options_.maxError > 0); }
 
   void refineWorstCells(const std::function<void(std::uint64_t)>& afterStep) {
     while (!reached() && mayStep() && (!queue_.empty() || takeUpAside())) {

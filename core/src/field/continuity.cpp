@@ -142,8 +142,8 @@ double weightedChange(const FieldData& field, std::span<const double> x0, std::s
 
 void checkWeakContinuity(const WeakContinuity& options) {
   std::ostringstream message;
-  if (!(options.weight > 0) || !std::isfinite(options.weight))
-    message << "continuity weight " << options.weight << ": expected a number above 0";
+  if (!(options.weight > 0 && options.weight <= kMaxContinuityWeight))
+    message << "continuity weight " << options.weight << ": expected a number above 0, up to " << kMaxContinuityWeight;
   else if (!(options.tolerance > 0 && options.tolerance < 1))
     message << "tolerance " << options.tolerance << ": expected a number between 0 and 1";
   else if (options.maxIterations < 1)

@@ -179,13 +179,14 @@ ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& su
                         const SampleOptions& options, const Progress& progress) {
   const SurfacePoints points(surface);
   return withThreads(options.threads, [&] {
-    return drawSamples(distance, domain, 0, options, progress,
-                       "hardly any point near the surface lies in the domain; it misses the surface",
-                       [&](std::uint64_t n) {
-                         Random random(options.seed, n);
-                         const Vector3 onSurface = points.draw(random);
-                         return Vector3(onSurface + random.inBall(radius));
-                       });
+    return drawSamples(
+        distance, domain, 0, options, progress,
+        "hardly any point near the surface lies in the domain: it misses the surface, or near means too far",
+        [&](std::uint64_t n) {
+          Random random(options.seed, n);
+          const Vector3 onSurface = points.draw(random);
+          return Vector3(onSurface + random.inBall(radius));
+        });
   });
 }
 

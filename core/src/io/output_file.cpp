@@ -89,8 +89,12 @@ void OutputFile::write(std::span<const std::byte> bytes) {
 
 void OutputFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
 
-void OutputFile::commit() {
+void OutputFile::flush() {
   if (std::fflush(stream_) != 0 || fsync(fileno(stream_)) != 0) fail();
+}
+
+void OutputFile::commit() {
+  flush();
   if (std::rename(temporary_.c_str(), file_.c_str()) != 0) fail();
   forget(temporary_.c_str());
   std::fclose(stream_);
