@@ -146,10 +146,11 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
 void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+  for (const auto& [name, value] : settings_) settings[name] = value;
+  // chosen by name, a kind of continuity without a weight leaves the weight of another kind out
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
-  for (const auto& [name, value] : settings_) settings[name] = value;
   if (maxSteps) settings["max-steps"] = fmt::format("{}", *maxSteps);
   const auto mesh = settings_.find("mesh");
   const std::string surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();
