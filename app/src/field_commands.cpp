@@ -185,10 +185,9 @@ void runBounds(Session& session, const Arguments& arguments) {
     json["output"] = saves ? Json(arguments.text("output")) : Json();
     return printJson(console.out, json);
   }
-  console.out << fmt::format("{}: nowhere wrong by more than {}{}, in the median cell by {}; {:.1f} s\n",
+  console.out << fmt::format("{}: nowhere wrong by more than {}, in the median cell by {}; {:.1f} s\n",
                              session.current().name, shortNumber(json["bounds"]["greatest"].get<double>()),
-                             unitText(session.current().field), shortNumber(json["bounds"]["median"].get<double>()),
-                             seconds);
+                             shortNumber(json["bounds"]["median"].get<double>()), seconds);
 }
 
 Command boundsCommand() {
