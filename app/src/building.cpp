@@ -109,12 +109,6 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
   return prepared;
 }
 
-void warnOfBounds(const Console& console, const BuildInput& input) {
-  if (input.options.bounds && input.mesh && !input.mesh->closed())
-    console.err << "hpsdf: warning: bounds hold for closed surfaces alone: beside this mesh's holes they do not"
-                << std::endl;
-}
-
 std::shared_ptr<const DistanceFunction> distanceOf(const std::shared_ptr<const ExactDistance>& exact,
                                                    const Normalization& normalization) {
   Source source = exact->source();
@@ -464,11 +458,17 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     Field field = withProgress(
         console, [&](const Progress& progress) { return build(*input.exact, input.domain, input.options, progress); });
     warnOfErrorLeft(console, field.metadata());
-    warnOfBounds(console, input);
+    if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }
+}
+
+void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {
+  if (mesh && !mesh->closed())
+    console.err << "hpsdf: warning: bounds hold for closed surfaces alone: beside this mesh's holes they do not"
+                << std::endl;
 }
 
 bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
@@ -490,6 +490,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
   try {
     PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
     ReferenceSurface reference;
+    reference.report = prepared.report;
     if (prepared.analytic) {
       reference.distance = std::make_shared<const DistanceFunction>(*prepared.analytic);
       reference.mesh = shapes::mesh(surface.substr(kAnalytic.size()));
@@ -514,6 +515,24 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }
+}
+
+std::string surfaceFor(const Session& session, const Arguments& arguments) {
+  if (arguments.has("mesh")) return arguments.text("mesh");
+  const CurrentField& current = session.current();
+  const std::string& source = current.field.metadata().source.name;
+  if (!current.surface.empty()) return current.surface;
+  if (isShape(source)) return source;
+  throw Error(fmt::format("{}: this needs the mesh that it was made from; give MESH{}", current.name,
+                          source.empty() ? "" : ", " + source));
+}
+
+void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
+                   std::string_view otherwise) {
+  if (reference.fieldIsMadeFromIt) return;
+  const std::string& source = current.field.metadata().source.name;
+  throw Error(fmt::format("{} was made from {}, not from {}; give that mesh{}", current.name,
+                          source.empty() ? "something unknown" : source, surface, otherwise));
 }
 
 MeshReport inspectSurface(const std::string& surface) {

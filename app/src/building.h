@@ -55,6 +55,9 @@ struct BuiltField {
 /// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments);
 
+/// That bounds do not hold beside a mesh's holes, where it has some.
+void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh);
+
 /// Whether it names a shape rather than a file: builtin:… or analytic:…
 bool isShape(std::string_view surface);
 
@@ -69,11 +72,21 @@ struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
   std::function<Vector3(const Vector3&, double)> normal;  ///< as `VerifiedSurface` has it
   TriangleMesh mesh;
+  std::optional<MeshReport> report;  ///< nothing for an analytic shape
   bool fieldIsMadeFromIt = false;
 };
 
 /// Of a mesh file or a shape, for a field that was made from `source`. Throws `Error` naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
+
+/// The surface that the argument `mesh` names, or the one that the current field itself names; throws `Error` where
+/// neither does.
+std::string surfaceFor(const Session& session, const Arguments& arguments);
+
+/// Throws `Error` where the current field was made from another surface than this one, `surface`; `otherwise` ends the
+/// message.
+void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
+                   std::string_view otherwise = "");
 
 /// The report of a mesh file or a built-in shape; throws `Error` for an analytic one.
 MeshReport inspectSurface(const std::string& surface);

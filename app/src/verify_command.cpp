@@ -24,6 +24,8 @@ struct Verified {
   VerifyOptions options;
   Verification figures;
   const Jumps& jumps;
+  FaceSteps steps;
+  double diagonal;  ///< of the domain
 };
 
 /// A figure that may be limited by an option.
@@ -61,6 +63,12 @@ const std::vector<Threshold>& thresholds() {
        }},
       {"max-jump", "the greatest jump of the value", "Greatest jump of the value between two cells.", false,
        [](const Verified& v) { return v.jumps.value.max; }},
+      {"max-step", "the greatest step of the value across a face, of the domain's diagonal,",
+       "Greatest step of the value from one side of a face to the other, as a part of the domain's diagonal.", false,
+       [](const Verified& v) { return v.steps.value / v.diagonal; }},
+      {"max-gradient-step", "the greatest step of the gradient across a face",
+       "Greatest step of the gradient from one side of a face to the other.", false,
+       [](const Verified& v) { return v.steps.gradient; }},
   };
   return list;
 }
@@ -156,6 +164,11 @@ Json verifiedJson(const Verified& verified, const std::vector<Judgement>& judgem
             {"value_max", verified.jumps.value.max},
             {"gradient_rms", verified.jumps.gradient.rms},
             {"gradient_max", verified.jumps.gradient.max}}},
+          {"steps",
+           {{"points", verified.steps.points},
+            {"value", verified.steps.value},
+            {"value_of_diagonal", verified.steps.value / verified.diagonal},
+            {"gradient", verified.steps.gradient}}},
           {"bounds", boundsJson(verified.figures.bounds)},
           {"worst", worst},
           {"thresholds", limits}};
@@ -221,6 +234,10 @@ std::string verifiedText(const Verified& verified) {
                       "jumps of the value between cells", shortNumber(verified.jumps.value.rms),
                       shortNumber(verified.jumps.value.max), shortNumber(verified.jumps.gradient.rms),
                       shortNumber(verified.jumps.gradient.max));
+  const FaceSteps& steps = verified.steps;
+  text += fmt::format("  {:<34} of the value {} ({} of the domain's diagonal), of the gradient {}; {} points\n",
+                      "greatest steps across faces", shortNumber(steps.value),
+                      shortNumber(steps.value / verified.diagonal), shortNumber(steps.gradient), grouped(steps.points));
   if (figures.uniform.signs.mismatches + figures.nearSurface.signs.mismatches > 0)
     text += fmt::format(
         "  a sign must be wrong between the surface and the field's own zero; farther away than {} it is a defect\n",
@@ -260,29 +277,6 @@ VerifyOptions verifyOptions(const Arguments& arguments) {
           .threads = arguments.whole("threads")};
 }
 
-/// The surface that is named, or the one that the field itself names.
-std::string surfaceFor(const Session& session, const Arguments& arguments) {
-  if (arguments.has("mesh")) return arguments.text("mesh");
-  const CurrentField& current = session.current();
-  const std::string& source = current.field.metadata().source.name;
-  if (!current.surface.empty()) return current.surface;
-  if (isShape(source)) return source;
-  throw Error(fmt::format("{}: measuring it needs the mesh that it was made from; give MESH{}", current.name,
-                          source.empty() ? "" : ", " + source));
-}
-
-ReferenceSurface surfaceOf(const Session& session, const std::string& surface, bool any) {
-  const CurrentField& current = session.current();
-  const Source& source = current.field.metadata().source;
-  ReferenceSurface reference = referenceSurface(session.console(), surface, source);
-  if (!reference.fieldIsMadeFromIt && !any)
-    throw Error(
-        fmt::format("{} was made from {}, not from {}; give that mesh, or --any-mesh to compare them all the "
-                    "same",
-                    current.name, source.name.empty() ? "something unknown" : source.name, surface));
-  return reference;
-}
-
 void runVerify(Session& session, const Arguments& arguments) {
   const bool writes = arguments.has("script");
   if (writes) checkWritable(arguments.text("script"));
@@ -291,12 +285,19 @@ void runVerify(Session& session, const Arguments& arguments) {
   if (arguments.given("max-violations") && current.field.data().bounds.empty())
     throw Error(fmt::format("max-violations: {} keeps no bounds: build it with --bounds", current.name));
   const std::string surface = surfaceFor(session, arguments);
-  const ReferenceSurface reference = surfaceOf(session, surface, arguments.flag("any-mesh"));
+  const ReferenceSurface reference = referenceSurface(session.console(), surface, current.field.metadata().source);
+  if (!arguments.flag("any-mesh"))
+    refuseForeign(current, reference, surface, ", or --any-mesh to compare them all the same");
   const VerifyOptions options = verifyOptions(arguments);
   Verification figures = withProgress(session.console(), [&](const Progress& progress) {
     return verify(current.field, {*reference.distance, reference.normal, reference.mesh}, options, progress);
   });
-  const Verified verified{current.name, surface, options, std::move(figures), session.jumps()};
+  const Jumps& jumps = session.jumps();
+  const FaceSteps steps = withProgress(session.console(), [&](const Progress& progress) {
+    return stepsAcrossFaces(current.field, jumps.interfaces, options.points, options.seed, options.threads, progress);
+  });
+  const Verified verified{
+      current.name, surface, options, std::move(figures), jumps, steps, current.field.domain().diagonal().norm()};
   const std::vector<Judgement> judgements = judged(verified, arguments);
   if (writes) {
     const std::string file = arguments.text("script");
@@ -319,8 +320,10 @@ void addVerifyCommand(Registry& registry) {
       .help =
           "Random points, half of them uniform in the domain, half near the surface, with the field's value and the "
           "exact distance of MESH: RMS, mean, percentiles and maximum of the difference; wrong signs; the angle "
-          "between the gradients and the length of the field's; slopes; the jumps between cells; and the worst points, "
-          "one of each cell. The same seed gives the same figures, whatever the number of threads. Lengths are in the "
+          "between the gradients and the length of the field's; slopes; the jumps between cells; as many random points "
+          "of faces again, with what queries answer on "
+          "either side; and the worst points, one of each cell. The same seed gives the same figures, whatever the "
+          "number of threads. Lengths are in the "
           "field's units.\n"
           "\n"
           "Between the surface and the field's own zero signs are wrong by necessity. Only those farther from the "

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -88,8 +89,9 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
     words.insert(words.end(), more.begin(), more.end());
     return runHere(words);
   };
-  const Outcome good = with({"--max-rms", "0.02", "--max-near-rms", "0.02", "--max-error", "0.2", "--max-mismatches",
-                             "0", "--max-angle", "90", "--max-slope", "5", "--max-jump", "1"});
+  const Outcome good =
+      with({"--max-rms", "0.02", "--max-near-rms", "0.02", "--max-error", "0.2", "--max-mismatches", "0", "--max-angle",
+            "90", "--max-slope", "5", "--max-jump", "1", "--max-step", "1", "--max-gradient-step", "5"});
   EXPECT_EQ(good.status, kExitDone) << good.err;
   EXPECT_THAT(good.out, HasSubstr("RMS error"));
   const std::vector<std::pair<std::vector<std::string>, std::string>> exceeded = {
@@ -99,7 +101,9 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
       {{"--max-mismatches", "0", "--sign-bound", "1e-6"}, "the number of wrong signs beyond the sign bound is"},
       {{"--max-angle", "1e-3"}, "the angle between gradients near the surface is"},
       {{"--max-slope", "0.5"}, "the greatest slope is"},
-      {{"--max-jump", "1e-9"}, "the greatest jump of the value is"}};
+      {{"--max-jump", "1e-9"}, "the greatest jump of the value is"},
+      {{"--max-step", "1e-12"}, "the greatest step of the value across a face, of the domain's diagonal, is"},
+      {{"--max-gradient-step", "1e-9"}, "the greatest step of the gradient across a face is"}};
   for (const auto& [words, message] : exceeded) {
     const Outcome outcome = with(words);
     EXPECT_EQ(outcome.status, kExitFailed) << message;
@@ -112,6 +116,48 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
   EXPECT_EQ(Json::parse(both.out)["thresholds"][1]["holds"], false);
   EXPECT_EQ(with({"--max-rms", "x"}).status, kExitBadInput);
   EXPECT_THAT(with({"--near", "1e30"}).err, HasSubstr("or near means too far"));
+}
+
+TEST_F(Accuracy, NothingStepsAcrossTheFacesOfABlendedField) {
+  writeField(at("f.hpsdf"), 0);
+  ASSERT_EQ(runHere({"blend", at("f.hpsdf"), "-o", at("b.hpsdf")}).status, kExitDone);
+  const Json alone = verified({at("f.hpsdf")})["steps"];
+  EXPECT_EQ(alone["points"], 20000);
+  EXPECT_GT(alone["value"], 1e-3);
+  EXPECT_GT(alone["gradient"], 1e-2);
+  EXPECT_NEAR(alone["value_of_diagonal"].get<double>() * load(at("f.hpsdf")).domain().diagonal().norm(), alone["value"],
+              1e-12);
+  const Json blended = verified({at("b.hpsdf"), "--max-step", "1e-12", "--max-gradient-step", "1e-9"});
+  EXPECT_TRUE(blended["thresholds"][0]["holds"]);
+  EXPECT_TRUE(blended["thresholds"][1]["holds"]);
+  EXPECT_THAT(runHere({"verify", at("b.hpsdf"), "--points", "20000"}).out,
+              AllOf(HasSubstr("greatest steps across faces"), HasSubstr("20,000 points")));
+}
+
+/// Cancels at the first word of this task.
+struct Canceller : WorkListener {
+  explicit Canceller(std::string task) : task_(std::move(task)) {}
+  void report(std::string_view task, double) override { heard_ = heard_ || task == task_; }
+  bool wantsCancel() override { return heard_; }
+  void ended() override {}
+
+ private:
+  std::string task_;
+  std::atomic<bool> heard_ = false;
+};
+
+TEST_F(Accuracy, CancelledBoundsLeaveWhatWasThere) {
+  writeField(at("f.hpsdf"), 0);
+  writeTextFile(at("old.hpsdf"), "old");
+  Canceller canceller("finding bounds");
+  std::istringstream in;
+  std::ostringstream out, err;
+  const std::vector<std::string> words = {"bounds", at("f.hpsdf"), "-o", at("old.hpsdf")};
+  EXPECT_EQ(runProgram(words, Console{in, out, err, false, &canceller}), kExitCancelled);
+  EXPECT_THAT(out.str(), IsEmpty());
+  EXPECT_THAT(err.str(), HasSubstr("nothing was written"));
+  EXPECT_EQ(readTextFile(at("old.hpsdf")), "old");
+  EXPECT_FALSE(fs::exists(at("old.hpsdf.tmp")));
 }
 
 TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {

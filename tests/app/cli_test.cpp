@@ -484,7 +484,6 @@ TEST_F(Cli, optionsThatSayNothingAreRefused) {
   refused({"--blend-width", "0.1"}, "blend-width belongs to continuity exact");
   refused({"--continuity", "weak", "--blend-width", "0.1"}, "blend-width belongs to continuity exact");
   refused({"--near-distance", "0.1"}, "near-distance belongs to near-error");
-  refused({"--max-bytes", "1e6", "--enrich"}, "does not keep within a maximum of bytes");
   refused({"--max-bytes", "1e3"}, "the base grid alone takes more than 1000 bytes");
   // of studies too, where they would change nothing or end at another place
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
@@ -492,6 +491,59 @@ TEST_F(Cli, optionsThatSayNothingAreRefused) {
   for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
     expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
                   "not for 'study convergence'");
+}
+
+TEST_F(Cli, boundsOfAFieldThatIsThereAreThoseOfBuild) {
+  const auto build = [&](const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"build", "builtin:torus", "--target-error", "1e-4", "-o", at(name)};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run({words});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+  };
+  build("plain.hpsdf", {});
+  build("bounded.hpsdf", {"--bounds"});
+  const Outcome found = run({{"bounds", at("plain.hpsdf"), "builtin:torus", "-o", at("found.hpsdf"), "--json"}});
+  ASSERT_EQ(found.status, 0) << found.err;
+  EXPECT_EQ(readFile(at("found.hpsdf")), readFile(at("bounded.hpsdf")));
+  const Json json = Json::parse(found.out);
+  EXPECT_GT(json.at("bounds").at("median"), 0);
+  EXPECT_EQ(json.at("output"), at("found.hpsdf"));
+  build("exact.hpsdf", {"--continuity", "exact", "--bounds"});
+  ASSERT_EQ(run({{"blend", at("plain.hpsdf"), "-o", at("blended.hpsdf")}}).status, 0);
+  ASSERT_EQ(run({{"bounds", at("blended.hpsdf"), "-o", at("certain.hpsdf")}}).status, 0) << "a shape's name is known";
+  EXPECT_EQ(readFile(at("certain.hpsdf")), readFile(at("exact.hpsdf")));
+  // anew, where there are some
+  const Outcome again = run({{"bounds", at("found.hpsdf"), "-o", at("again.hpsdf"), "--threads", "1"}});
+  EXPECT_THAT(again.out, AllOf(HasSubstr("again.hpsdf: nowhere wrong by more than"), HasSubstr("in the median cell")));
+  const auto errorsOf = [&](const std::string& name) {
+    std::vector<float> errors;
+    const Field field = load(at(name));
+    for (const CellBound& bound : field.data().bounds) errors.push_back(bound.error);
+    return errors;
+  };
+  EXPECT_EQ(errorsOf("again.hpsdf"), errorsOf("bounded.hpsdf"));
+}
+
+TEST_F(Cli, boundsNeedTheFieldsOwnMesh) {
+  writeFile(at("t.obj"), kTetrahedron);
+  writeFile(at("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto build = [&](const std::string& mesh, const std::string& name) {
+    const Outcome outcome = run(
+        {{"build", at(mesh), "-o", at(name), "--target-error", "1e-1", "--grid", "2", "--domain", "-1,-1,-1,2,2,2"}});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+  };
+  build("t.obj", "t.hpsdf");
+  build("open.obj", "open.hpsdf");
+  expectRefused({{"bounds", at("t.hpsdf"), "-o", at("b.hpsdf")}}, "give MESH, t.obj");
+  expectRefused({{"bounds", at("t.hpsdf"), "builtin:gear", "-o", at("b.hpsdf")}},
+                "was made from t.obj, not from builtin:gear; give that mesh");
+  expectRefused({{"bounds", at("t.hpsdf"), at("none.obj"), "-o", at("b.hpsdf")}}, "none.obj");
+  expectRefused({{"bounds", at("t.hpsdf"), at("t.obj"), "-o", at("t.obj")}}, "t.obj: is read by the same command");
+  expectRefused({{"bounds", at("t.hpsdf"), at("t.obj")}}, "--output is missing");
+  EXPECT_THAT(run({{"bounds", at("t.hpsdf"), at("t.obj"), "-o", at("b.hpsdf")}}).err, IsEmpty());
+  const Outcome open = run({{"bounds", at("open.hpsdf"), at("open.obj"), "-o", at("b.hpsdf")}});
+  EXPECT_EQ(open.status, 0) << open.err;
+  EXPECT_THAT(open.err, HasSubstr("bounds hold for closed surfaces alone"));
 }
 
 TEST_F(Cli, continuityIsStudied) {

@@ -174,7 +174,7 @@ TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
   EXPECT_EQ(*bench.view().sliceTarget, bench.session.jumps().interfaces[bench.explorer().worst(10)[9]].worst);
   bench.run("ui key z control=true");
   EXPECT_FALSE(bench.view().sliceTarget);
-  bench.run("ui type build/target-error 1e-3; ui click build/rebuild");
+  bench.run("panel view=false; ui type build/target-error 1e-3; ui click build/rebuild");
   EXPECT_EQ(bench.session.current().field.metadata().targetError, 1e-3);
   EXPECT_THAT(bench.failure("ui type build/target-error abc; ui click build/rebuild"),
               HasSubstr("target-error: expected a number"));
@@ -323,6 +323,41 @@ TEST(Explorer, aRebuildKeepsContinuity) {
   bench.run("settings continuity=none enrich=false ; rebuild");
   EXPECT_FALSE(bench.session.current().field.metadata().enriched);
   EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0);
+}
+
+TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
+  Bench bench;
+  bench.run("build analytic:torus target-error=1e-2 ; show size=900x1100 ; panel view=false");
+  const auto current = [&]() -> const Field& { return bench.session.current().field; };
+  const auto offers = [&](const char* control) { return bench.explorer().widgets().contains(control); };
+  EXPECT_FALSE(offers("build/continuity-weight"));
+  EXPECT_FALSE(offers("build/blend-width"));
+  bench.run("ui click build/criterion ; ui click build/criterion/optimal");
+  bench.run("ui click build/estimator ; ui click build/estimator/residual");
+  bench.run("ui click build/continuity ; ui click build/continuity/both");
+  bench.run("ui type build/continuity-weight 0.7 ; ui type build/blend-width 0.1 ; ui click build/bounds");
+  bench.run("ui click build/rebuild");
+  EXPECT_EQ(current().metadata().criterion, Criterion::optimal);
+  EXPECT_EQ(current().metadata().estimator, Estimator::residual);
+  EXPECT_EQ(current().metadata().continuityWeight, 0.7);
+  EXPECT_EQ(current().data().blend, 0.1);
+  EXPECT_FALSE(current().data().bounds.empty());
+  // a weight that was set does not stand in the way of doing without
+  bench.run("ui click build/continuity ; ui click build/continuity/none ; ui click build/bounds");
+  EXPECT_FALSE(offers("build/continuity-weight"));
+  EXPECT_FALSE(offers("build/blend-width"));
+  bench.run("ui click build/rebuild");
+  EXPECT_EQ(current().metadata().continuityWeight, 0);
+  EXPECT_EQ(current().data().blend, 0);
+  EXPECT_TRUE(current().data().bounds.empty());
+  EXPECT_EQ(current().metadata().criterion, Criterion::optimal);
+  // shown as the field has them
+  bench.run("build analytic:torus target-error=1e-2 continuity=exact blend-width=0.05 bounds=true");
+  EXPECT_TRUE(offers("build/blend-width"));
+  EXPECT_FALSE(offers("build/continuity-weight"));
+  bench.run("ui click build/rebuild");
+  EXPECT_EQ(current().data().blend, 0.05);
+  EXPECT_FALSE(current().data().bounds.empty());
 }
 
 TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "basis/legendre.h"
 #include "field/evaluate.h"
 #include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/error.h"
 #include "support/random_field.h"
 
@@ -228,6 +230,59 @@ TEST(Jumps, WorstFirstPerCellAndAsAHistogram) {
     EXPECT_EQ(counted, jumps.interfaces.size());
   }
   EXPECT_EQ(worstInterfaces(jumps, JumpKind::value, 1u << 30).size(), jumps.interfaces.size());
+}
+
+/// Each leaf a number of its own, far from the origin, in a grid whose faces have no exact coordinates there.
+Field steppedField() {
+  const Vector3 corner(1e4, -3e4, 1 / 3.0);
+  FieldData data =
+      randomField(10, {.domain = Box(corner, corner + Vector3(0.7, 1.1, 0.9)), .grid = {3, 5, 7}, .maxDepth = 3})
+          .data();
+  auto& coefficients = std::get<std::vector<double>>(data.coefficients);
+  std::fill(coefficients.begin(), coefficients.end(), 0.0);
+  double number = 0;
+  for (const std::uint64_t bits : data.nodes)
+    if (node::isLeaf(bits)) coefficients[node::offset(bits)] = std::sin(++number);
+  return Field(std::move(data));
+}
+
+TEST(FaceSteps, LieBetweenTheTwoLeavesOfEveryFace) {
+  const Field field = steppedField();
+  const Jumps jumps = findJumps(field);
+  ASSERT_GT(jumps.hanging, 100u);
+  for (const Interface& face : jumps.interfaces) {
+    const FaceSteps steps = stepsAcrossFaces(field, std::span(&face, 1), 5, 1, 1);
+    ASSERT_EQ(steps.points, 5u);
+    ASSERT_EQ(steps.value, face.value.max) << face.center.transpose();
+    ASSERT_EQ(steps.gradient, 0);
+  }
+}
+
+TEST(FaceSteps, AreGreatestOverRandomPoints) {
+  const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
+  const Jumps jumps = findJumps(field);
+  const FaceSteps steps = stepsAcrossFaces(field, jumps.interfaces, 50'000);
+  EXPECT_GT(steps.value, 0.7 * jumps.value.max);
+  EXPECT_LT(steps.value, 1.01 * jumps.value.max);
+  EXPECT_GT(steps.gradient, 0.7 * jumps.gradient.max);
+  EXPECT_LT(steps.gradient, 1.01 * jumps.gradient.max);
+  const FaceSteps blended = stepsAcrossFaces(hpsdf::blended(field), jumps.interfaces, 50'000);
+  EXPECT_LT(blended.value, 1e-13);
+  EXPECT_LT(blended.gradient, 1e-10);
+  const FaceSteps one = stepsAcrossFaces(field, jumps.interfaces, 9'999, 7, 1);
+  const FaceSteps three = stepsAcrossFaces(field, jumps.interfaces, 9'999, 7, 3);
+  EXPECT_EQ(one.points, 9'999u);
+  EXPECT_EQ(one.value, three.value);
+  EXPECT_EQ(one.gradient, three.gradient);
+  EXPECT_NE(one.value, stepsAcrossFaces(field, jumps.interfaces, 9'999, 8).value);
+}
+
+TEST(FaceSteps, OfOneCellAndCancelled) {
+  EXPECT_EQ(stepsAcrossFaces(Field(row({{1}})), {}, 100).points, 0u);
+  const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
+  const Jumps jumps = findJumps(field);
+  EXPECT_THROW(stepsAcrossFaces(field, jumps.interfaces, 100, 1, 2, {.report = {}, .cancelled = [] { return true; }}),
+               Cancelled);
 }
 
 TEST(Jumps, OneCellHasNoInterfaces) {

@@ -301,7 +301,6 @@ TEST(Steering, RefusesWhatDoesNotGoTogether) {
   EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3}).find("give both"), std::string::npos);
   EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3, .farError = 1e-4}).find("above far error"),
             std::string::npos);
-  EXPECT_NE(refusal({.maxBytes = 1000000, .enrich = true}).find("maximum of bytes"), std::string::npos);
   EXPECT_NE(refusal({.maxError = -1}).find("maximum error -1"), std::string::npos);
   EXPECT_NE(refusal({.maxError = 0.1, .criterion = Criterion::optimal}).find("maximum error"), std::string::npos);
   BuildOptions paper = paperOptions();

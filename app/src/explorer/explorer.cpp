@@ -146,12 +146,13 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
 void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+  for (const auto& [name, value] : settings_) settings[name] = value;
+  // chosen by name, a kind of continuity leaves out what belongs to the other
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
   if (continuity != settings_.end() && continuity->second != "exact" && continuity->second != "both")
     settings.erase("blend-width");
-  for (const auto& [name, value] : settings_) settings[name] = value;
   if (maxSteps) settings["max-steps"] = fmt::format("{}", *maxSteps);
   const auto mesh = settings_.find("mesh");
   const std::string surface = mesh != settings_.end() ? mesh->second : session_.current().madeFrom();

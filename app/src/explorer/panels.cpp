@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "explorer/explorer.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/field.h"
 #include "pictures.h"
 #include "summaries.h"
@@ -208,8 +209,9 @@ void drawView(Ui& ui, Explorer& explorer, Commands& commands) {
 }
 
 void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
-  const FieldMetadata& made = explorer.session().current().field.metadata();
-  const auto& grid = explorer.session().current().field.grid();
+  const Field& current = explorer.session().current().field;
+  const FieldMetadata& made = current.metadata();
+  const auto& grid = current.grid();
   const auto setting = [&](const char* name, const std::string& standard) {
     const auto found = explorer.settings().find(name);
     return found == explorer.settings().end() ? standard : found->second;
@@ -229,8 +231,25 @@ void drawBuild(Ui& ui, Explorer& explorer, Commands& commands) {
   slider("nearness", made.nearness, 0, 8, "%.1f");
   slider("max-degree", made.maxDegree, 1, kMaxDegree, "%.0f");
   slider("max-depth", made.maxDepth, 0, kMaxDepth, "%.0f");
-  choice(ui, "build/strategy", "strategy", {"hp", "h1", "h2"}, setting("strategy", strategyName(made.strategy)),
-         "settings strategy=", commands);
+  const auto oneOf = [&](const char* name, const std::vector<std::string>& names, const std::string& standard) {
+    choice(ui, fmt::format("build/{}", name), name, names, setting(name, standard), fmt::format("settings {}=", name),
+           commands);
+  };
+  oneOf("strategy", {"hp", "h1", "h2"}, strategyName(made.strategy));
+  oneOf("criterion", {"paper", "optimal"}, criterionName(made.criterion));
+  oneOf("estimator", {"embedded", "residual"}, estimatorName(made.estimator));
+  const std::string continuity = setting("continuity", continuityName(current));
+  oneOf("continuity", {"none", "weak", "exact", "both"}, continuity);
+  if (continuity == "weak" || continuity == "both")
+    field("continuity-weight",
+          shortNumber(made.continuityWeight > 0 ? made.continuityWeight : WeakContinuity{}.weight));
+  if (continuity == "exact" || continuity == "both") {
+    const double width = current.data().blend;
+    slider("blend-width", width > 0 ? width : kDefaultBlend, 0.01, kMaxBlend, "%.3f");
+  }
+  const bool bounds = setting("bounds", current.data().bounds.empty() ? "false" : "true") == "true";
+  if (const auto on = ui.checkbox("build/bounds", "bounds", bounds))
+    commands.push_back(fmt::format("settings bounds={}", *on));
   if (explorer.work) {
     ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
     if (!explorer.work->cancellable) return;

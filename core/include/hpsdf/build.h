@@ -52,8 +52,8 @@ struct BuildOptions {
   /// degree, depth, steps and bytes, and by rounding, stands in `FieldMetadata::measuredError`.
   double maxError = 0;
   /// The field as queries need it takes at most so many bytes; the best such field is built that the other settings
-  /// allow. With `maxError` it ends where that is reached, if bytes allow. Not with `enrich`. Coefficients that are
-  /// left to choose become float.
+  /// allow. With `maxError` it ends where that is reached, if bytes allow. Coefficients that are left to choose become
+  /// float.
   std::optional<std::uint64_t> maxBytes = {};
   Estimator estimator = Estimator::embedded;
   Criterion criterion = Criterion::paper;
