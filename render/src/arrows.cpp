@@ -138,7 +138,7 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
       const std::size_t i =
           std::size_t(y * samples + samples / 2) * buffers.width + std::size_t(x * samples + samples / 2);
       const double distance = from.distance + t * (to.distance - from.distance);
-      return buffers.hit(i) && distance > double(buffers.distance[i]) + tolerance ? kHidden : 1.0F;
+      return buffers.covered(i) && distance > double(buffers.distance[i]) + tolerance ? kHidden : 1.0F;
     };
     arrows.push_back({{from.x, from.y}, {to.x, to.y}, strength});
   }

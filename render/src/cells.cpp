@@ -323,7 +323,7 @@ class EdgePainter {
     const double place = std::clamp((depth - nearest_) / (farthest_ - nearest_), 0.0, 1.0);
     const float strength = edge.strength * static_cast<float>(covered * (1 + place * (kFarthestLine - 1)));
     if (strength <= coverage_[i]) return;
-    if (buffers_.hit(i)) {
+    if (buffers_.covered(i)) {
       const Vector3 p = edge.segment.a + s * (edge.segment.b - edge.segment.a);
       // what it lies on may be sampled a pixel or two away from it
       const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth);

@@ -138,7 +138,7 @@ class CellOutlines {
   bool hidden(std::size_t i, std::size_t j) const {
     if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
     const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
-    return buffers_.hit(other) && buffers_.distance[other] < buffers_.distance[flat];
+    return buffers_.covered(other) && buffers_.distance[other] < buffers_.distance[flat];
   }
 
   const ViewBuffers& buffers_;
@@ -296,7 +296,7 @@ class Openness {
     for (const auto& [dx, dy] : taps_) {
       const int tapX = x + dx, tapY = y + dy;
       if (tapX < 0 || tapX >= buffers_.width || tapY < 0 || tapY >= buffers_.height) continue;
-      if (!buffers_.hit(std::size_t(tapY) * buffers_.width + tapX)) continue;
+      if (!buffers_.covered(std::size_t(tapY) * buffers_.width + tapX)) continue;
       const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
       const float distance = towards.norm();
       if (distance <= 0) continue;
@@ -354,8 +354,9 @@ struct Lights {
 
 class SurfaceShader {
  public:
-  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color)
-      : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), color_(color) {}
+  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color,
+                std::span<const LinearColor> bodies)
+      : buffers_(buffers), frame_(buffers, camera), openness_(buffers, frame_), color_(color), bodies_(bodies) {}
   SurfaceShader(const SurfaceShader&) = delete;  // openness_ refers to frame_
 
   LinearColor operator()(int x, int y) const {
@@ -363,8 +364,8 @@ class SurfaceShader {
     const Eigen::Vector3f toEye = -frame_.ray(x, y);
     const Eigen::Vector3f n = frame_.normal(x, y, toEye);
     const float open = openness_(x, y, frame_.position(x, y), n);
-    if (!color_) {
-      const LinearColor& material = buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
+    if (!color_ || buffers_.showsBody(i)) {
+      const LinearColor& material = materialAt(i);
       return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
     }
     // Softer than clay, and without colour of its own: the legend's colour must stay recognisable.
@@ -374,10 +375,16 @@ class SurfaceShader {
   }
 
  private:
+  const LinearColor& materialAt(std::size_t i) const {
+    if (buffers_.showsBody(i)) return bodies_[buffers_.body[i]];
+    return buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
+  }
+
   const ViewBuffers& buffers_;
   CameraFrame frame_;
   Openness openness_;
   const SampleColor& color_;
+  std::span<const LinearColor> bodies_;
   Lights lights_;
   LinearColor clay_ = decodeSrgb(kClay), plainBox_ = decodeSrgb(kPlainBox);
 };
@@ -445,8 +452,8 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
 }
 
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
-                   double offset, const std::vector<float>& lines) {
-  const SurfaceShader shader(buffers, camera, color);
+                   double offset, const std::vector<float>& lines, std::span<const LinearColor> bodies) {
+  const SurfaceShader shader(buffers, camera, color, bodies);
   const Contours contours(buffers, offset);
   const SurfaceLine surfaceLine(sampling);
   std::optional<CellOutlines> outlines;
@@ -460,7 +467,7 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Sampl
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t i = std::size_t(y) * buffers.width + x;
       LinearColor& sample = row[x];
-      sample = !buffers.hit(i) ? ground : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
+      sample = !buffers.covered(i) ? ground : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
       if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
       if (buffers.shows(i, Shown::plane)) {
         const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));

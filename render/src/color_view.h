@@ -3,6 +3,7 @@
 // are coloured alike.
 
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "colormap.h"
@@ -34,9 +35,10 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
 
 /// A lit surface before the backdrop: one material where `color` is empty, else that colour, softly shaded; boxes
 /// likewise. Planes are flat, their cells outlined; where no clipping plane, with the surface f = offset as a line.
-/// `lines`: of cells, how strongly each sample is covered; or empty.
+/// `lines`: of cells, how strongly each sample is covered; or empty. `bodies`: the materials of those that the buffers
+/// show.
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
-                   double offset = 0, const std::vector<float>& lines = {});
+                   double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
 
 /// What is drawn where a slice leaves the domain, and under legend and caption.
 Color paperColor();

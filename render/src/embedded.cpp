@@ -23,6 +23,8 @@
   }
 
 HPSDF_EMBED(font, HPSDF_FONT_FILE)
+HPSDF_EMBED(bodies_frag, HPSDF_SHADER_DIR "/bodies.frag")
+HPSDF_EMBED(bodies_vert, HPSDF_SHADER_DIR "/bodies.vert")
 HPSDF_EMBED(field_glsl, HPSDF_SHADER_DIR "/field.glsl")
 HPSDF_EMBED(full_screen_vert, HPSDF_SHADER_DIR "/full_screen.vert")
 HPSDF_EMBED(leaves_alone_glsl, HPSDF_SHADER_DIR "/leaves_alone.glsl")
@@ -45,6 +47,8 @@ std::string_view text(const unsigned char* begin, const unsigned char* end) {
 std::span<const unsigned char> dejavuSans() { return {hpsdf_embedded_font, hpsdf_embedded_font_end}; }
 
 std::string_view shaderText(std::string_view name) {
+  if (name == "bodies.frag") return text(hpsdf_embedded_bodies_frag, hpsdf_embedded_bodies_frag_end);
+  if (name == "bodies.vert") return text(hpsdf_embedded_bodies_vert, hpsdf_embedded_bodies_vert_end);
   if (name == "field.glsl") return text(hpsdf_embedded_field_glsl, hpsdf_embedded_field_glsl_end);
   if (name == "full_screen.vert") return text(hpsdf_embedded_full_screen_vert, hpsdf_embedded_full_screen_vert_end);
   if (name == "leaves_alone.glsl") return text(hpsdf_embedded_leaves_alone_glsl, hpsdf_embedded_leaves_alone_glsl_end);

@@ -23,6 +23,15 @@ void checkViewSize(int width, int height) {
                 " pixels is out of range: give 1 to 2^20 pixels a side");
 }
 
+void checkCamera(const Camera& camera, int width, int height) {
+  checkViewSize(width, height);
+  checkFinite(camera.eye, "eye");
+  checkFinite(camera.forward, "forward vector");
+  checkFinite(camera.right, "right vector");
+  checkFinite(camera.up, "up vector");
+  if (camera.forward.isZero(0)) throw Error("a camera's forward vector is zero: give a direction to look along");
+}
+
 GridSpace::GridSpace(const FieldData& field)
     : lo(field.domain.min()),
       size(field.domain.max() - lo),
@@ -72,12 +81,7 @@ RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, in
       height(h),
       stepX(1.0 / w),
       stepY(1.0 / h) {
-  checkViewSize(w, h);
-  checkFinite(camera.eye, "eye");
-  checkFinite(camera.forward, "forward vector");
-  checkFinite(camera.right, "right vector");
-  checkFinite(camera.up, "up vector");
-  if (forward.isZero(0)) throw Error("a camera's forward vector is zero: give a direction to look along");
+  checkCamera(camera, w, h);
   checkClip(clip);
   if (!clip) return;
   // a little within what is kept: a cut along faces then starts in cells on that side, in single precision too

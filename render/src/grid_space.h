@@ -12,6 +12,9 @@ namespace hpsdf::render {
 /// Throws `Error` for a width or height below 1 or above 2^20.
 void checkViewSize(int width, int height);
 
+/// Throws `Error` for a size as above, or a camera that is not finite or looks nowhere.
+void checkCamera(const Camera& camera, int width, int height);
+
 /// World to grid coordinates; in the order of operations of core's queries, so that a plane through the middle of the
 /// domain lands on the same side of a face.
 struct GridSpace {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "arrows.h"
+#include "body_meshes.h"
 #include "cells.h"
 #include "color_view.h"
 #include "cracks.h"
@@ -404,37 +405,56 @@ struct Scene {
   }
 };
 
-Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& picture, const SurfaceView& view, int width,
-              int height, double lineWidth) {
+Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& picture, const SurfaceView& view,
+              const ShownBodies& bodies, int width, int height, double lineWidth) {
   Scene scene{picture.surface ? renderer.surface(view, width, height) : emptyBuffers(width, height, true)};
   if (picture.surface) addSection(field, view, scene.buffers);
   if (picture.plane) addPlane(field, view, wholeSection(field.domain(), *picture.plane, 1, 1), scene.buffers);
-  if (picture.cells.style == CellStyle::none) return scene;
-  const std::vector<Cell> cells = chosenCells(field, picture.cells);
-  if (picture.cells.style == CellStyle::boxes)
-    addBoxes(field, view, cells, scene.buffers);
-  else
-    scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
+  std::vector<Cell> cells;
+  if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells);
+  if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
+  if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
+  if (picture.cells.style == CellStyle::lines) scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
   return scene;
+}
+
+// Parallel rays start before the domain: bodies may be before it too.
+Camera cameraBefore(const ShownBodies& bodies, const Camera& camera) {
+  return bodies.renderer ? startingBefore(bodies.renderer->bounds(bodies.bodies), camera) : camera;
+}
+
+std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
+  std::vector<LinearColor> materials;
+  for (const Body& body : shown.bodies) materials.push_back(decodeSrgb(body.color));
+  return materials;
+}
+
+void addBodyDetails(const ShownBodies& shown, std::vector<std::string>& details) {
+  if (!shown.renderer) return;
+  if (!shown.note.empty()) details.push_back(shown.note);
+  details.push_back(formatCount(shown.bodies.size()) + (shown.bodies.size() == 1 ? " body" : " bodies"));
 }
 
 }  // namespace
 
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
-  return drawSurface(renderer, field, picture, evidence).image;
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence,
+           const ShownBodies& bodies) {
+  return drawSurface(renderer, field, picture, evidence, bodies).image;
 }
 
-Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence,
+                  const ShownBodies& bodies) {
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   checkArrows(picture.arrows);
   checkOffset(picture.offset);
   checkClip(picture.clip);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
-  const SurfaceView view{cameraOf(picture.camera, field.domain(), width, height), picture.offset, picture.clip};
+  const SurfaceView view{cameraBefore(bodies, cameraOf(picture.camera, field.domain(), width, height)), picture.offset,
+                         picture.clip};
   const Sampling sampling{samples, lineWidthOf(frame), 1};
   Scene scene =
-      sceneOf(renderer, field, picture, view, width * samples, height * samples, sampling.lineWidth * samples);
+      sceneOf(renderer, field, picture, view, bodies, width * samples, height * samples, sampling.lineWidth * samples);
   ViewBuffers& buffers = scene.buffers;
   const FieldStatistics figures = statistics(field);
 
@@ -442,8 +462,9 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   Image image(picture.width, picture.height, paperColor());
   for (int y = 0; y < height; ++y)
     std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
+  const std::vector<LinearColor> materials = materialsOf(bodies);
   const auto colorScene = [&](const SampleColor& color) {
-    place(image, colorSurface(buffers, view.camera, color, sampling, picture.offset, scene.lines));
+    place(image, colorSurface(buffers, view.camera, color, sampling, picture.offset, scene.lines, materials));
   };
   Legend legend;
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
@@ -474,6 +495,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   }
   addArrows(image, frame, field, view, buffers, samples, picture.arrows);
+  addBodyDetails(bodies, details);
   if (picture.plane) details.push_back(describePlane("plane", *picture.plane));
   if (picture.cells.style != CellStyle::none) details.push_back(describeCells(picture.cells));
   const bool parallel = picture.camera.projection == Projection::orthographic;

@@ -8,6 +8,7 @@
 #include "gl/field_upload.h"
 #include "gl/gl_objects.h"
 #include "gl/program.h"
+#include "gl/tiles.h"
 #include "grid_space.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
@@ -17,7 +18,6 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kTile = 2048;  // pixels a side: larger views are drawn in tiles, so that any size fits the device
 static_assert(kTile % kBlock == 0);
 
 /// Locations of the uniforms, as in shaders/.
@@ -99,20 +99,6 @@ class Target {
   GlFramebuffer framebuffer_;
 };
 
-/// A part of a view that is drawn at once.
-struct Tile {
-  int left, top, width, height;
-};
-
-std::vector<Tile> tiles(const Tile& part) {
-  std::vector<Tile> result;
-  for (int y = 0; y < part.height; y += kTile)
-    for (int x = 0; x < part.width; x += kTile)
-      result.push_back(
-          {part.left + x, part.top + y, std::min(kTile, part.width - x), std::min(kTile, part.height - y)});
-  return result;
-}
-
 /// The smallest part of a view that holds all blocks, of which there is one at least.
 Tile partWith(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
@@ -138,13 +124,6 @@ int highestDegree(const FieldData& field) {
   for (const std::uint64_t bits : field.nodes)
     if (node::isLeaf(bits)) degree = std::max(degree, node::degree(bits));
   return degree;
-}
-
-void checkGl(const char* what) {
-  const GLenum error = glGetError();
-  if (error == GL_NO_ERROR) return;
-  throw Error(std::string("the OpenGL device fails to ") + what + " (error " + std::to_string(error) +
-              "): render a smaller picture, or with --cpu");
 }
 
 /// Everything on the device. Made and destroyed with the context current.

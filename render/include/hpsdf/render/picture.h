@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/render/bodies.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
@@ -106,6 +108,14 @@ struct SurfacePicture {
   int arrows = 0;  ///< as in slices
 };
 
+/// Bodies about a field's surface. Their colours are their own, whatever those of the field mean; a clipping plane
+/// leaves them whole. What is referred to must live while a picture is drawn.
+struct ShownBodies {
+  BodyRenderer* renderer = nullptr;  ///< of their meshes; nullptr for no bodies
+  std::span<const Body> bodies = {};
+  std::string note = {};  ///< what the caption says of them, e.g. "t = 2.5 s"
+};
+
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
 /// the whole field, so that colours keep their meaning from slice to slice.
 /// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8; no more than 64 Mi samples in
@@ -113,9 +123,10 @@ struct SurfacePicture {
 /// make no scale; for a plane that misses the domain; for arrows out of range.
 ///
 /// What is in a surface's picture hides what lies behind it: surface, section, plane and boxes in the buffers, lines
-/// over them. A clipping plane cuts all of it.
+/// over them. A clipping plane cuts all of it but bodies.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {},
+           const ShownBodies& bodies = {});
 
 /// What the colours of a picture mean: as it stands in the picture, or for a legend of one's own beside a bare one.
 struct Legend {
@@ -147,7 +158,8 @@ struct Drawn {
   std::array<int, 2> corner = {0, 0};  ///< of the view in the picture, pixels from the upper left
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {},
+                  const ShownBodies& bodies = {});
 
 /// What a pixel of a picture shows, at its middle sample.
 struct Pick {
@@ -160,7 +172,7 @@ struct Pick {
 };
 
 /// Of lines and arrows, what lies behind them. Nothing where the pixel shows no part of the field: paper, backdrop,
-/// legend. Throws `Error` for a pixel outside of the picture.
+/// legend, bodies. Throws `Error` for a pixel outside of the picture.
 std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y);
 
 /// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.

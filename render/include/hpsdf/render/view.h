@@ -96,6 +96,7 @@ struct SurfaceView {
 };
 
 constexpr std::uint32_t kNoCell = 0xffffffff;
+constexpr std::uint32_t kNoBody = 0xffffffff;
 
 /// What a pixel of a picture with several things in it shows.
 enum class Shown : std::uint8_t {
@@ -121,11 +122,17 @@ struct ViewBuffers {
   std::vector<std::uint8_t> crack;
   /// Filled where a picture has more in it than a surface, else empty.
   std::vector<Shown> shown;
+  /// Filled where a picture has bodies in it, else empty: the one that a pixel shows, or kNoBody. A body is no part of
+  /// the field: its pixels are no hits, and but for the body's normal and distance all is as where a ray misses.
+  std::vector<std::uint32_t> body;
 
   bool hit(std::size_t pixel) const { return cell[pixel] != kNoCell; }
   bool shows(std::size_t pixel, Shown what) const {
     return hit(pixel) && (shown.empty() ? what == Shown::surface : shown[pixel] == what);
   }
+  bool showsBody(std::size_t pixel) const { return !body.empty() && body[pixel] != kNoBody; }
+  /// Whether it shows anything but the backdrop.
+  bool covered(std::size_t pixel) const { return hit(pixel) || showsBody(pixel); }
 };
 
 /// What a pixel of a view's buffers shows, world units; of a surface only where there is a hit.

@@ -1,0 +1,314 @@
+// OpenGL says which triangle of which body each pixel sees; distances and normals follow in double precision.
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "body_meshes.h"
+#include "gl/egl_context.h"
+#include "gl/gl_objects.h"
+#include "gl/program.h"
+#include "gl/tiles.h"
+#include "hpsdf/error.h"
+#include "hpsdf/render/bodies.h"
+
+namespace hpsdf::render {
+namespace {
+
+/// Locations of the attributes, as in shaders/bodies.vert.
+enum : GLuint { kPosition = 0, kTargetFromMesh = 1, kIndex = 5 };
+/// Where their data are bound.
+enum : GLuint { kOfVertices = 0, kOfInstances = 1 };
+
+/// What a pixel of a target holds: body and triangle.
+using Seen = std::array<std::uint32_t, 2>;
+
+/// A body, as the vertex shader takes it.
+struct Instance {
+  std::array<float, 16> targetFromMesh;  // columns
+  std::uint32_t body;
+};
+
+/// A tile's render target.
+class Target {
+ public:
+  Target(int width, int height) {
+    glTextureStorage2D(seen_.name(), 1, GL_RG32UI, width, height);
+    glTextureStorage2D(depth_.name(), 1, GL_DEPTH_COMPONENT32F, width, height);
+    glTextureParameteri(seen_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(seen_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT0, seen_.name(), 0);
+    glNamedFramebufferTexture(framebuffer_.name(), GL_DEPTH_ATTACHMENT, depth_.name(), 0);
+    if (glCheckNamedFramebufferStatus(framebuffer_.name(), GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+      throw Error(
+          "the OpenGL device cannot render bodies into 32-bit buffers: update its driver, or render with --cpu");
+  }
+
+  void bindEmpty() const {
+    constexpr GLuint kNothing[] = {kNoBody, 0, 0, 0};
+    constexpr GLfloat kInfinitelyFar = 0;
+    glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
+    glClearNamedFramebufferfv(framebuffer_.name(), GL_DEPTH, 0, &kInfinitelyFar);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  }
+
+  void read(int width, int height, std::vector<Seen>& out) const {
+    out.resize(std::size_t(width) * std::size_t(height));
+    glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT0);
+    glPixelStorei(GL_PACK_ALIGNMENT, 4);
+    glReadPixels(0, 0, width, height, GL_RG_INTEGER, GL_UNSIGNED_INT, out.data());
+  }
+
+ private:
+  GlTexture2D seen_, depth_;
+  GlFramebuffer framebuffer_;
+};
+
+/// From points, counted from the eye, to a tile's clip space. Rows run downwards. Depth is least / depth in
+/// perspective, which floats hold to the same relative precision near and far, and falls linearly for parallel rays:
+/// the greater, the nearer.
+Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
+  const bool parallel = camera.projection == Projection::orthographic;
+  const Eigen::RowVector4d right =
+      (Eigen::RowVector4d() << camera.right.transpose() / camera.right.squaredNorm(), 0).finished();
+  const Eigen::RowVector4d up = (Eigen::RowVector4d() << camera.up.transpose() / camera.up.squaredNorm(), 0).finished();
+  const Eigen::RowVector4d depth = (Eigen::RowVector4d() << camera.forward.transpose(), 0).finished();
+  const Eigen::RowVector4d one = Eigen::RowVector4d::Unit(3);
+  constexpr double kBeyond = 1.001;  // what is farthest has a depth above 0
+  Eigen::Matrix4d result;
+  result.row(3) = parallel ? one : depth;
+  result.row(2) = parallel ? Eigen::RowVector4d(one - depth / (kBeyond * farthest))
+                           : Eigen::RowVector4d(leastDepth(camera, farthest) * one);
+  const auto middle = [](int whole, int first, int part) { return double(whole - 2 * first) / part - 1; };
+  result.row(0) = double(width) / tile.width * right + middle(width, tile.left, tile.width) * result.row(3);
+  result.row(1) = -double(height) / tile.height * up + middle(height, tile.top, tile.height) * result.row(3);
+  return result;
+}
+
+/// A ball that holds a mesh, in its frame.
+struct Ball {
+  Vector3 center;
+  double radius;
+};
+
+Ball ballAround(const BodyMesh& mesh) {
+  Ball ball{mesh.box().center(), 0};
+  for (const Vector3& vertex : mesh.vertices()) ball.radius = std::max(ball.radius, (vertex - ball.center).norm());
+  return ball;
+}
+
+/// Whether a ball in the world, its centre counted from the eye, may be seen: it is within the planes left, right,
+/// above, below and behind which there is nothing in clip space.
+bool maySee(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
+  constexpr double kRounding = 1e-6;
+  for (const auto& [axis, sign] : {std::pair(0, 1), {0, -1}, {1, 1}, {1, -1}, {2, -1}}) {
+    const Eigen::RowVector4d plane = targetFromEye.row(3) + sign * targetFromEye.row(axis);
+    const double inside = plane.head<3>().dot(center) + plane[3];
+    if (inside < -(1 + kRounding) * radius * plane.head<3>().norm()) return false;
+  }
+  return true;
+}
+
+/// A mesh on the device.
+class MeshUpload {
+ public:
+  explicit MeshUpload(const BodyMesh& mesh) {
+    glNamedBufferStorage(vertices_.name(), GLsizeiptr(mesh.vertices().size() * sizeof(Eigen::Vector3f)), nullptr,
+                         GL_DYNAMIC_STORAGE_BIT);
+    glNamedBufferStorage(triangles_.name(), GLsizeiptr(mesh.triangles().size() * sizeof(Triangle)),
+                         mesh.triangles().data(), 0);
+    upload(mesh);
+  }
+
+  /// About the ball's centre: single precision counts from there.
+  void upload(const BodyMesh& mesh) {
+    ball_ = ballAround(mesh);
+    std::vector<Eigen::Vector3f> positions;
+    positions.reserve(mesh.vertices().size());
+    for (const Vector3& vertex : mesh.vertices()) positions.push_back((vertex - ball_.center).cast<float>());
+    glNamedBufferSubData(vertices_.name(), 0, GLsizeiptr(positions.size() * sizeof(Eigen::Vector3f)), positions.data());
+  }
+
+  const Ball& ball() const { return ball_; }
+  GLuint vertices() const { return vertices_.name(); }
+  GLuint triangles() const { return triangles_.name(); }
+
+ private:
+  GlBuffer vertices_, triangles_;
+  Ball ball_;
+};
+
+/// Everything on the device. Made and destroyed with the context current.
+struct Resources {
+  explicit Resources(const BodyMeshes& bodyMeshes) : program(linkedProgram({"bodies.vert"}, {"bodies.frag"})) {
+    for (std::size_t i = 0; i < bodyMeshes.size(); ++i) {
+      meshes.emplace_back(bodyMeshes[i]);
+      checkGl("take the meshes of bodies");
+    }
+    const auto attribute = [&](GLuint location, GLuint binding) {
+      glEnableVertexArrayAttrib(vertexArray.name(), location);
+      glVertexArrayAttribBinding(vertexArray.name(), location, binding);
+    };
+    attribute(kPosition, kOfVertices);
+    glVertexArrayAttribFormat(vertexArray.name(), kPosition, 3, GL_FLOAT, GL_FALSE, 0);
+    for (GLuint column = 0; column < 4; ++column) {
+      attribute(kTargetFromMesh + column, kOfInstances);
+      glVertexArrayAttribFormat(vertexArray.name(), kTargetFromMesh + column, 4, GL_FLOAT, GL_FALSE,
+                                GLuint(4 * column * sizeof(float)));
+    }
+    attribute(kIndex, kOfInstances);
+    glVertexArrayAttribIFormat(vertexArray.name(), kIndex, 1, GL_UNSIGNED_INT, offsetof(Instance, body));
+    glVertexArrayBindingDivisor(vertexArray.name(), kOfInstances, 1);
+    // greater depths are nearer
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER);
+  }
+
+  GlProgram program;
+  GlVertexArray vertexArray;
+  std::vector<MeshUpload> meshes;
+};
+
+/// Where a ray passes a triangle, in the mesh's frame. It counts as within the triangle: OpenGL rounds corners, and
+/// what it says is seen may begin a little beside the pixel's middle.
+struct Passage {
+  double distance;
+  Vector3 weights;
+  bool fromBehind;
+};
+
+Passage pass(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction) {
+  const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];
+  const Vector3 normal = toB.cross(toC);
+  const double towards = normal.dot(direction);
+  const Vector3 inPlane = start + normal.dot(corners[0] - start) / towards * direction - corners[0];
+  const double ofB = normal.dot(inPlane.cross(toC)) / normal.squaredNorm();
+  const double ofC = normal.dot(toB.cross(inPlane)) / normal.squaredNorm();
+  Vector3 weights = Vector3(1 - ofB - ofC, ofB, ofC);
+  // seen along its plane: its middle will do
+  weights = weights.allFinite() ? Vector3(weights.cwiseMax(0)) : Vector3::Ones();
+  weights /= weights.sum();
+  const Vector3 point = weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
+  return {(point - start).dot(direction), weights, towards > 0};
+}
+
+class GlBodyRenderer final : public BodyRenderer {
+ public:
+  GlBodyRenderer(std::vector<TriangleMesh> meshes, GlChoice choice) : meshes_(std::move(meshes)), context_(choice) {
+    const EglContext::Current current(context_);
+    resources_ = std::make_unique<Resources>(meshes_);
+  }
+
+  ~GlBodyRenderer() override {
+    try {
+      const EglContext::Current current(context_);
+      resources_.reset();
+    } catch (const Error&) {
+      // current on another thread: what is on the device goes with the context
+      static_cast<void>(resources_.release());
+    }
+  }
+
+  BodyBuffers view(const Camera& camera, std::span<const Body> bodies, int width, int height) override {
+    checkBodyView(camera, width, height);
+    const double farthest = farthestDepth(camera, meshes_.bounds(bodies));
+    BodyBuffers buffers = emptyBodyBuffers(width, height);
+    const EglContext::Current current(context_);
+    const Target target(std::min(width, kTile), std::min(height, kTile));
+    std::vector<Seen> seen;
+    for (const Tile& tile : tiles({0, 0, width, height})) {
+      glViewport(0, 0, tile.width, tile.height);
+      target.bindEmpty();
+      drawAll(targetFromEye(camera, tile, width, height, farthest), camera.eye, bodies);
+      target.read(tile.width, tile.height, seen);
+      checkGl("draw bodies");
+      tbb::parallel_for(0, tile.height, [&](int y) {
+        for (int x = 0; x < tile.width; ++x) {
+          const Seen& what = seen[std::size_t(y) * tile.width + x];
+          if (what[0] != kNoBody) show(camera, bodies, what, tile.left + x, tile.top + y, buffers);
+        }
+      });
+    }
+    return buffers;
+  }
+
+  void moveVertices(std::size_t mesh, std::span<const Vector3> vertices) override {
+    meshes_.moveVertices(mesh, vertices);
+    const EglContext::Current current(context_);
+    resources_->meshes[mesh].upload(meshes_[mesh]);
+    checkGl("take the vertices of a mesh");
+  }
+
+  Box bounds(std::span<const Body> bodies) const override { return meshes_.bounds(bodies); }
+
+  std::string description() const override { return context_.renderer(); }
+
+ private:
+  /// All that may be seen, mesh after mesh.
+  void drawAll(const Eigen::Matrix4d& targetFromEye, const Vector3& eye, std::span<const Body> bodies) const {
+    std::vector<std::vector<Instance>> instances(meshes_.size());
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Ball& ball = resources_->meshes[bodies[i].mesh].ball();
+      const Vector3 center = bodies[i].worldFromBody * ball.center - eye;
+      if (!maySee(targetFromEye, center, ball.radius)) continue;
+      Eigen::Matrix4d eyeFromMesh = bodies[i].worldFromBody.matrix();
+      eyeFromMesh.block<3, 1>(0, 3) = center;
+      Instance instance{.targetFromMesh = {}, .body = static_cast<std::uint32_t>(i)};
+      Eigen::Map<Eigen::Matrix4f>(instance.targetFromMesh.data()) = (targetFromEye * eyeFromMesh).cast<float>();
+      instances[bodies[i].mesh].push_back(instance);
+    }
+    glUseProgram(resources_->program.name());
+    glBindVertexArray(resources_->vertexArray.name());
+    for (std::size_t mesh = 0; mesh < instances.size(); ++mesh)
+      if (!instances[mesh].empty()) drawMesh(mesh, instances[mesh]);
+  }
+
+  void drawMesh(std::size_t mesh, const std::vector<Instance>& instances) const {
+    const GLuint vertexArray = resources_->vertexArray.name();
+    const GlBuffer buffer;
+    glNamedBufferStorage(buffer.name(), GLsizeiptr(instances.size() * sizeof(Instance)), instances.data(), 0);
+    glVertexArrayVertexBuffer(vertexArray, kOfVertices, resources_->meshes[mesh].vertices(), 0,
+                              sizeof(Eigen::Vector3f));
+    glVertexArrayVertexBuffer(vertexArray, kOfInstances, buffer.name(), 0, sizeof(Instance));
+    glVertexArrayElementBuffer(vertexArray, resources_->meshes[mesh].triangles());
+    glDrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(3 * meshes_[mesh].triangles().size()), GL_UNSIGNED_INT,
+                            nullptr, static_cast<GLsizei>(instances.size()));
+  }
+
+  void show(const Camera& camera, std::span<const Body> bodies, const Seen& what, int x, int y,
+            BodyBuffers& buffers) const {
+    const Body& body = bodies[what[0]];
+    const BodyMesh& mesh = meshes_[body.mesh];
+    const Triangle& triangle = mesh.triangles()[what[1]];
+    const Eigen::Isometry3d bodyFromWorld = body.worldFromBody.inverse();
+    const Vector3 start = bodyFromWorld * pixelEye(camera, x, y, buffers.width, buffers.height);
+    const Vector3 direction = bodyFromWorld.linear() * pixelRay(camera, x, y, buffers.width, buffers.height);
+    const std::vector<Vector3>& vertices = mesh.vertices();
+    const Passage passage =
+        pass({vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]}, start, direction);
+    const Vector3 normal = body.worldFromBody.linear() * mesh.normal(what[1], passage.weights);
+    const std::size_t pixel = std::size_t(y) * buffers.width + x;
+    buffers.body[pixel] = what[0];
+    buffers.triangle[pixel] = what[1];
+    buffers.normal[pixel] = (passage.fromBehind ? Vector3(-normal) : normal).cast<float>();
+    buffers.distance[pixel] = static_cast<float>(passage.distance);
+  }
+
+  BodyMeshes meshes_;
+  EglContext context_;
+  std::unique_ptr<Resources> resources_;
+};
+
+}  // namespace
+
+std::unique_ptr<BodyRenderer> makeGlBodyRenderer(std::vector<TriangleMesh> meshes, GlChoice choice) {
+  return std::make_unique<GlBodyRenderer>(std::move(meshes), choice);
+}
+
+}  // namespace hpsdf::render
