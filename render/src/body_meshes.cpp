@@ -64,16 +64,6 @@ void checkMesh(const TriangleMesh& mesh) {
   checkVertices(mesh, mesh.vertices);
 }
 
-void checkTriangles(const std::vector<TriangleMesh>& meshes) {
-  std::size_t all = 0;
-  for (const TriangleMesh& mesh : meshes) {
-    all += mesh.triangles.size();
-    if (all > kMostTriangles)
-      throw Error(nameOf(mesh) + " makes it " + std::to_string(all) +
-                  " triangles, more than the 67108864 that bodies may have: give coarser meshes");
-  }
-}
-
 void checkBody(const Body& body, std::size_t index, std::size_t meshes) {
   const auto name = [&] { return "body " + std::to_string(index); };
   if (body.mesh >= meshes)
@@ -154,8 +144,16 @@ Vector3 BodyMesh::normal(std::uint32_t triangle, const Vector3& weights) const {
   return sum.normalized();
 }
 
+void checkTriangleCount(std::size_t triangles) {
+  if (triangles > kMostTriangles)
+    throw Error("the meshes of bodies have " + std::to_string(triangles) +
+                " triangles, more than the 67108864 that are drawn: give coarser ones");
+}
+
 BodyMeshes::BodyMeshes(std::vector<TriangleMesh> meshes) {
-  checkTriangles(meshes);
+  std::size_t triangles = 0;
+  for (const TriangleMesh& mesh : meshes) triangles += mesh.triangles.size();
+  checkTriangleCount(triangles);
   meshes_.reserve(meshes.size());
   for (TriangleMesh& mesh : meshes) meshes_.emplace_back(std::move(mesh));
 }

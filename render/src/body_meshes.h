@@ -54,6 +54,9 @@ class BodyMeshes {
   std::vector<BodyMesh> meshes_;
 };
 
+/// Throws `Error` for more triangles of all meshes than are taken.
+void checkTriangleCount(std::size_t triangles);
+
 /// Throws `Error` for a camera or a size that `BodyRenderer::view` does not take.
 void checkBodyView(const Camera& camera, int width, int height);
 

@@ -26,7 +26,8 @@ namespace {
 constexpr int kSmallestSize = 16;
 constexpr int kLargestSize = 16384;
 constexpr int kMostSamples = 8;
-// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them.
+// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them; bodies take 28
+// more, and 12 meanwhile.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 void checkSize(int width, int height, int samples) {

@@ -65,8 +65,16 @@ TriangleMesh sheet(int n, double phase) {
   return mesh;
 }
 
+TriangleMesh smallBox() {
+  TriangleMesh mesh = shapes::mesh("box");
+  const double scale = 0.5 / boundingBox(mesh).sizes().maxCoeff();
+  for (Vector3& vertex : mesh.vertices) vertex *= scale;
+  return mesh;
+}
+
 std::vector<TriangleMesh> testMeshes() {
-  return {shapes::mesh("sphere,radius=0.3"), shapes::mesh("gear"), shapes::mesh("box"), sheet(24, 0)};
+  return {shapes::mesh("sphere,radius=0.3,subdivisions=3"), shapes::mesh("gear,teeth=12"), shapes::mesh("box"),
+          sheet(24, 0)};
 }
 
 /// Bodies anywhere in the domain, turned anyhow, some through one another.
@@ -139,7 +147,7 @@ testing::AssertionResult agree(const BodyBuffers& expected, const BodyBuffers& a
     }
   if (double(differing) > tolerance.pixels * double(expected.body.size()))
     return testing::AssertionFailure() << differing << " of " << expected.body.size() << " pixels differ";
-  if (double(otherTriangles) > 0.02 * double(hits))
+  if (double(otherTriangles) > 0.04 * double(hits))
     return testing::AssertionFailure() << otherTriangles << " of " << hits << " pixels show another triangle";
   return testing::AssertionSuccess() << differing << " differ, " << otherTriangles << " of " << hits << " beside";
 }
@@ -252,7 +260,7 @@ TEST(CpuBodies, BoxesAreWhereTheirSlabsAre) {
         ASSERT_NEAR(buffers.distance[i], nearest, 1e-6 * nearest);
         ASSERT_LT((buffers.normal[i].cast<double>() - normal).norm(), 1e-5);
       }
-    EXPECT_GT(hits, 3000);
+    EXPECT_GT(hits, 2000);
     EXPECT_LT(unsure, 20);
   }
 }
@@ -435,13 +443,44 @@ TEST_F(GlBodies, AMeshWhoseVerticesMoveIsAsOneMadeOfThem) {
   EXPECT_TRUE(result) << result.message();
 }
 
+TEST_F(GlBodies, NoDistanceIsBeyondATriangleSeenAlongItsPlane) {
+  const auto device = gl({sheet(1, 0)});
+  const std::vector<Body> bodies = {{0, placed(Vector3(0.1, 0.2, 0.3), std::numbers::pi / 2 + 0.4, Vector3::UnitX())}};
+  const Vector3 alongPlane = bodies[0].worldFromBody.linear() * Vector3(0.3, 1, 0).normalized();
+  int hits = 0;
+  for (int i = -20; i <= 20; ++i) {
+    Camera camera = cameraFrom(Projection::perspective);
+    const Vector3 toMiddle = (bodies[0].worldFromBody.translation() - camera.eye).normalized();
+    const Vector3 across = bodies[0].worldFromBody.linear() * Vector3::UnitZ();
+    camera.eye = bodies[0].worldFromBody.translation() + 5 * alongPlane + 2e-4 * i * across;
+    camera.right = Eigen::Quaterniond::FromTwoVectors(toMiddle, -alongPlane) * camera.right;
+    camera.up = Eigen::Quaterniond::FromTwoVectors(toMiddle, -alongPlane) * camera.up;
+    camera.forward = -alongPlane;
+    double nearest = kInfinity, farthest = 0;
+    for (const Vector3& vertex : sheet(1, 0).vertices) {
+      const Vector3 fromEye = bodies[0].worldFromBody * vertex - camera.eye;
+      nearest = std::min(nearest, fromEye.dot(camera.forward));
+      farthest = std::max(farthest, fromEye.norm());
+    }
+    const BodyBuffers buffers = device->view(camera, bodies, kWidth, kHeight);
+    for (std::size_t pixel = 0; pixel < buffers.body.size(); ++pixel) {
+      if (!buffers.hit(pixel)) continue;
+      ++hits;
+      ASSERT_GE(buffers.distance[pixel], nearest * (1 - 1e-6));
+      ASSERT_LE(buffers.distance[pixel], farthest * (1 + 1e-6));
+    }
+  }
+  EXPECT_GT(hits, 100);
+}
+
 TEST_F(GlBodies, HundredsOfThem) {
-  const auto cpu = makeCpuBodyRenderer(testMeshes());
-  const auto device = gl(testMeshes());
+  const std::vector<TriangleMesh> meshes = {testMeshes()[0], smallBox()};
+  const auto cpu = makeCpuBodyRenderer(meshes);
+  const auto device = gl(meshes);
   std::vector<Body> bodies;
   for (int i = 0; i < 800; ++i) {
     const Vector3 place = Vector3(i % 10, i / 10 % 10, i / 100) * 0.7 - Vector3(3, 3, 3);
-    bodies.push_back({i % 2 == 0 ? 0u : 2u, placed(0.9 * place, i), bodyColor(std::size_t(i))});
+    bodies.push_back({std::uint32_t(i % 2), placed(place, i, Vector3(1, i % 7, 3)), bodyColor(std::size_t(i))});
   }
   const Camera camera = cameraFrom(Projection::perspective, 30, 20, 2);
   const BodyBuffers actual = device->view(camera, bodies, kWidth, kHeight);
@@ -479,8 +518,8 @@ TEST(Bodies, MeshesThatCannotBeDrawnAreRefused) {
   for (const double wrong : {std::nan(""), kInfinity, 1e16})
     EXPECT_THAT(making([&](TriangleMesh& m) { m.vertices[5].y() = wrong; }),
                 ThrowsMessage<Error>(HasSubstr("has a vertex, 5, that is not finite")));
-  EXPECT_THAT(making([](TriangleMesh& m) { m.triangles.resize((std::size_t{1} << 26) + 1); }),
-              ThrowsMessage<Error>(HasSubstr("makes it 67108865 triangles")));
+  EXPECT_NO_THROW(checkTriangleCount(67108864));
+  EXPECT_THAT([] { checkTriangleCount(67108865); }, ThrowsMessage<Error>(HasSubstr("have 67108865 triangles")));
 }
 
 TEST(Bodies, PlacesThatAreNoneAreRefused) {
@@ -537,13 +576,6 @@ std::vector<Body> aboutTheBall() {
                                Vector3(-0.3, 0.2, -1.6), Vector3(0.3, 0.6, 4.0)})
     bodies.push_back({0, placed(place, place.x()), bodyColor(bodies.size())});
   return bodies;
-}
-
-TriangleMesh smallBox() {
-  TriangleMesh mesh = shapes::mesh("box");
-  const double scale = 0.5 / boundingBox(mesh).sizes().maxCoeff();
-  for (Vector3& vertex : mesh.vertices) vertex *= scale;
-  return mesh;
 }
 
 TEST(BodyPictures, TheNearerOfSurfaceAndBodyIsSeen) {
@@ -631,18 +663,36 @@ TEST(BodyPictures, BodiesHaveTheirColorsWhateverThoseOfTheFieldMean) {
   }
 }
 
-TEST(BodyPictures, SamplesAreAveraged) {
+TEST(BodyPictures, SamplesAreAveragedInLinearLight) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
-  const std::vector<Body> bodies = {{0, placed(Vector3(0, 0, 1.5), 0.4)}};
-  SurfacePicture picture{.width = 120, .height = 90, .bare = true, .surface = false};
-  std::array<std::size_t, 2> colors;
-  for (const int samples : {1, 4}) {
-    picture.samples = samples;
-    const Image image = draw(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
-    colors[samples > 1] = std::set(image.pixels.begin(), image.pixels.end()).size();
-  }
-  EXPECT_GT(colors[1], colors[0] + 50) << "no mixed colours along the silhouette";
+  const std::vector<Body> bodies = aboutTheBall();
+  constexpr int kSamples = 3;
+  SurfacePicture picture;
+  picture.width = 120;
+  picture.height = 90;
+  picture.samples = kSamples;
+  picture.bare = true;
+  const Image averaged = draw(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+  picture.width *= kSamples;
+  picture.height *= kSamples;
+  picture.samples = 1;
+  const Drawn fine = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+  int silhouettes = 0;
+  for (int y = 0; y < averaged.height; ++y)
+    for (int x = 0; x < averaged.width; ++x) {
+      LinearColor sum = LinearColor::Zero();
+      std::set<std::uint32_t> shown;
+      for (int v = y * kSamples; v < (y + 1) * kSamples; ++v)
+        for (int u = x * kSamples; u < (x + 1) * kSamples; ++u) {
+          sum += decodeSrgb(fine.image.at(u, v));
+          shown.insert(fine.buffers.body[std::size_t(v) * picture.width + u]);
+        }
+      silhouettes += shown.size() > 1;
+      const Color expected = encodeSrgb(sum / (kSamples * kSamples));
+      for (int k = 0; k < 3; ++k) ASSERT_NEAR(averaged.at(x, y)[k], expected[k], 2) << x << "," << y;
+    }
+  EXPECT_GT(silhouettes, 100);
 }
 
 TEST(BodyPictures, BodiesHideLinesAndOutlinesAndBoxes) {
@@ -675,8 +725,7 @@ TEST(BodyPictures, BodiesHideLinesAndOutlinesAndBoxes) {
 
 TEST(BodyPictures, NoRendererMeansNoBodies) {
   const auto cpu = makeCpuRenderer(ball());
-  const SurfacePicture picture{.width = 100, .height = 80};
-  const Drawn drawn = drawSurface(*cpu, ball(), picture);
+  const Drawn drawn = drawSurface(*cpu, ball(), {.camera = {}, .width = 100, .height = 80});
   EXPECT_TRUE(drawn.buffers.body.empty());
   for (const std::string& detail : drawn.details) EXPECT_THAT(detail, testing::Not(HasSubstr("bod")));
 }
@@ -686,7 +735,7 @@ TEST(BodyColors, KeepApartFromClayAndFromTheirNeighbours) {
   const auto lab = [](std::size_t i) { return toOklab(decodeSrgb(bodyColor(i))); };
   for (std::size_t i = 0; i < 1000; ++i) {
     EXPECT_GT(colorDifference(lab(i), clay), 0.09) << i;
-    for (std::size_t next = 1; next <= 4; ++next) EXPECT_GT(colorDifference(lab(i), lab(i + next)), 0.06) << i;
+    for (std::size_t next = 1; next <= 4; ++next) EXPECT_GT(colorDifference(lab(i), lab(i + next)), 0.05) << i;
   }
   EXPECT_EQ(bodyColor(7), bodyColor(7));
 }
