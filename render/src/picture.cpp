@@ -406,15 +406,16 @@ struct Scene {
   }
 };
 
-Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& picture, const SurfaceView& view,
-              const ShownBodies& bodies, int width, int height, double lineWidth) {
+Scene sceneOf(Renderer& renderer, const Field& field, const SurfacePicture& picture, const SurfaceView& view, int width,
+              int height, double lineWidth) {
   Scene scene{picture.surface ? renderer.surface(view, width, height) : emptyBuffers(width, height, true)};
   if (picture.surface) addSection(field, view, scene.buffers);
   if (picture.plane) addPlane(field, view, wholeSection(field.domain(), *picture.plane, 1, 1), scene.buffers);
   std::vector<Cell> cells;
   if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells);
   if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
-  if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
+  if (picture.bodies.renderer)
+    addBodies(picture.bodies.renderer->view(view.camera, picture.bodies.bodies, width, height), scene.buffers);
   if (picture.cells.style == CellStyle::lines) scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
   return scene;
 }
@@ -438,24 +439,22 @@ void addBodyDetails(const ShownBodies& shown, std::vector<std::string>& details)
 
 }  // namespace
 
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence,
-           const ShownBodies& bodies) {
-  return drawSurface(renderer, field, picture, evidence, bodies).image;
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
+  return drawSurface(renderer, field, picture, evidence).image;
 }
 
-Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence,
-                  const ShownBodies& bodies) {
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
   const Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   checkArrows(picture.arrows);
   checkOffset(picture.offset);
   checkClip(picture.clip);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
-  const SurfaceView view{cameraBefore(bodies, cameraOf(picture.camera, field.domain(), width, height)), picture.offset,
-                         picture.clip};
+  const SurfaceView view{cameraBefore(picture.bodies, cameraOf(picture.camera, field.domain(), width, height)),
+                         picture.offset, picture.clip};
   const Sampling sampling{samples, lineWidthOf(frame), 1};
   Scene scene =
-      sceneOf(renderer, field, picture, view, bodies, width * samples, height * samples, sampling.lineWidth * samples);
+      sceneOf(renderer, field, picture, view, width * samples, height * samples, sampling.lineWidth * samples);
   ViewBuffers& buffers = scene.buffers;
   const FieldStatistics figures = statistics(field);
 
@@ -463,7 +462,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   Image image(picture.width, picture.height, paperColor());
   for (int y = 0; y < height; ++y)
     std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
-  const std::vector<LinearColor> materials = materialsOf(bodies);
+  const std::vector<LinearColor> materials = materialsOf(picture.bodies);
   const auto colorScene = [&](const SampleColor& color) {
     place(image, colorSurface(buffers, view.camera, color, sampling, picture.offset, scene.lines, materials));
   };
@@ -496,7 +495,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   }
   addArrows(image, frame, field, view, buffers, samples, picture.arrows);
-  addBodyDetails(bodies, details);
+  addBodyDetails(picture.bodies, details);
   if (picture.plane) details.push_back(describePlane("plane", *picture.plane));
   if (picture.cells.style != CellStyle::none) details.push_back(describeCells(picture.cells));
   const bool parallel = picture.camera.projection == Projection::orthographic;

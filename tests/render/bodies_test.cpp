@@ -588,7 +588,8 @@ TEST(BodyPictures, TheNearerOfSurfaceAndBodyIsSeen) {
                            .width = 240,
                            .height = 180,
                            .samples = 2};
-    const Drawn drawn = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies, "t = 2.5 s"});
+    picture.bodies = {bodyRenderer.get(), bodies, "t = 2.5 s"};
+    const Drawn drawn = drawSurface(*cpu, ball(), picture);
     const Camera& camera = std::get<SurfaceView>(drawn.view).camera;
     const int width = drawn.buffers.width, height = drawn.buffers.height;
     const ViewBuffers alone = cpu->surface({camera}, width, height);
@@ -643,7 +644,9 @@ TEST(BodyPictures, BodiesHaveTheirColorsWhateverThoseOfTheFieldMean) {
   for (const ColorBy color : {ColorBy::normal, ColorBy::depth, ColorBy::slope}) {
     SurfacePicture picture{
         .camera = {.azimuthDegrees = 10, .distance = 0.9}, .color = color, .width = 200, .height = 150, .bare = true};
-    const Drawn drawn = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+    picture.bodies = {bodyRenderer.get(), bodies};
+    const Drawn drawn = drawSurface(*cpu, ball(), picture);
+    picture.bodies = {};
     const Image without = draw(*cpu, ball(), picture);
     int far = 0, count = 0, changed = 0, fieldOnly = 0;
     for (std::size_t i = 0; i < drawn.image.pixels.size(); ++i) {
@@ -673,11 +676,13 @@ TEST(BodyPictures, SamplesAreAveragedInLinearLight) {
   picture.height = 90;
   picture.samples = kSamples;
   picture.bare = true;
-  const Image averaged = draw(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+  picture.bodies = {bodyRenderer.get(), bodies};
+  const Image averaged = draw(*cpu, ball(), picture);
   picture.width *= kSamples;
   picture.height *= kSamples;
   picture.samples = 1;
-  const Drawn fine = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+  picture.bodies = {bodyRenderer.get(), bodies};
+  const Drawn fine = drawSurface(*cpu, ball(), picture);
   int silhouettes = 0;
   for (int y = 0; y < averaged.height; ++y)
     for (int x = 0; x < averaged.width; ++x) {
@@ -706,11 +711,13 @@ TEST(BodyPictures, BodiesHideLinesAndOutlinesAndBoxes) {
                            .bare = true,
                            .plane = AxisPlane{2, 1.0},
                            .cells = {style, {}, {}}};
-    const Drawn drawn = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+    picture.bodies = {bodyRenderer.get(), bodies};
+    const Drawn drawn = drawSurface(*cpu, ball(), picture);
     picture.plane.reset();
     picture.surface = false;
     picture.cells.style = CellStyle::none;
-    const Drawn alone = drawSurface(*cpu, ball(), picture, {}, {bodyRenderer.get(), bodies});
+    picture.bodies = {bodyRenderer.get(), bodies};
+    const Drawn alone = drawSurface(*cpu, ball(), picture);
     int count = 0;
     for (std::size_t i = 0; i < alone.image.pixels.size(); ++i) {
       if (!alone.buffers.showsBody(i)) continue;

@@ -91,6 +91,14 @@ struct ShownCells {
   std::vector<int> depths = {};   ///< likewise
 };
 
+/// Bodies about a field's surface. Their colours are their own, whatever those of the field mean; a clipping plane
+/// leaves them whole. What is referred to must live while a picture is drawn.
+struct ShownBodies {
+  BodyRenderer* renderer = nullptr;  ///< of their meshes; nullptr for no bodies
+  std::span<const Body> bodies = {};
+  std::string note = {};  ///< what the caption says of them, e.g. "t = 2.5 s"
+};
+
 struct SurfacePicture {
   OrbitCamera camera;
   double offset = 0;
@@ -106,14 +114,7 @@ struct SurfacePicture {
   std::optional<Plane> plane = {};  ///< the domain's section with it is coloured likewise
   ShownCells cells = {};
   int arrows = 0;  ///< as in slices
-};
-
-/// Bodies about a field's surface. Their colours are their own, whatever those of the field mean; a clipping plane
-/// leaves them whole. What is referred to must live while a picture is drawn.
-struct ShownBodies {
-  BodyRenderer* renderer = nullptr;  ///< of their meshes; nullptr for no bodies
-  std::span<const Body> bodies = {};
-  std::string note = {};  ///< what the caption says of them, e.g. "t = 2.5 s"
+  ShownBodies bodies = {};
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
@@ -125,8 +126,7 @@ struct ShownBodies {
 /// What is in a surface's picture hides what lies behind it: surface, section, plane and boxes in the buffers, lines
 /// over them. A clipping plane cuts all of it but bodies.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {},
-           const ShownBodies& bodies = {});
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
 /// What the colours of a picture mean: as it stands in the picture, or for a legend of one's own beside a bare one.
 struct Legend {
@@ -158,8 +158,7 @@ struct Drawn {
   std::array<int, 2> corner = {0, 0};  ///< of the view in the picture, pixels from the upper left
 };
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {},
-                  const ShownBodies& bodies = {});
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
 
 /// What a pixel of a picture shows, at its middle sample.
 struct Pick {
