@@ -16,20 +16,22 @@ namespace {
 constexpr double kRigid = 1e-6;
 constexpr std::size_t kBlock = 8;  // pairs: enough to be worth a task
 
-void requireRigid(const Eigen::Isometry3d& transform, const std::string& whose) {
-  if (!transform.matrix().allFinite()) throw Error(whose + " transform is not finite");
+/// What is wrong with it; nullptr if nothing.
+const char* fault(const Eigen::Isometry3d& transform) {
+  if (!transform.matrix().allFinite()) return "transform is not finite";
   const Eigen::Matrix3d rotation = transform.linear();
-  if (!((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kRigid) ||
-      rotation.determinant() < 0)
-    throw Error(whose + " transform is not rigid: give a rotation and a shift");
+  const bool rigid = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kRigid;
+  return rigid && rotation.determinant() > 0 ? nullptr : "transform is not rigid: give a rotation and a shift";
 }
 
-/// `where`: before the message.
-void requireValid(const BodyPair& pair, const char* where = "", std::size_t number = 0) {
-  const auto name = [&] { return *where == 0 ? std::string() : where + std::to_string(number) + ": "; };
-  if (pair.samples == nullptr || pair.field == nullptr) throw Error(name() + "samples or field are missing");
-  requireRigid(pair.worldFromSamples, name() + "the samples'");
-  requireRigid(pair.worldFromField, name() + "the field's");
+/// `where`: before the message, with the number. No text is made unless there is a fault.
+void requireValid(const BodyPair& pair, const char* where = nullptr, std::size_t number = 0) {
+  const auto refuse = [&](const std::string& what) {
+    throw Error((where ? where + std::to_string(number) + ": " : std::string()) + what);
+  };
+  if (pair.samples == nullptr || pair.field == nullptr) refuse("samples or field are missing");
+  if (const char* what = fault(pair.worldFromSamples)) refuse(std::string("the samples' ") + what);
+  if (const char* what = fault(pair.worldFromField)) refuse(std::string("the field's ") + what);
 }
 
 void requireValid(const ContactOptions& options) {

@@ -11,7 +11,7 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // to a cell's shortest edge: 16 bits tell of a thousand cells
+constexpr double kUnits = 32;        // to a cell's shortest edge: 16 bits tell of two thousand cells
 constexpr double kLoose = 0.05;      // of that edge: what bounds of polynomials may lose
 constexpr double kRounding = 1e-12;  // in the size of the numbers at hand
 
@@ -194,6 +194,12 @@ class LowerBounds {
   Rows lowerHalf_ = legendreOfPart(-0.5, 0.5, kMaxDegree), upperHalf_ = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
+using Place = std::array<std::int64_t, 3>;
+
+Place placeOf(std::int64_t n, const std::array<std::int64_t, 3>& size) {
+  return {n % size[0], n / size[0] % size[1], n / size[0] / size[1]};
+}
+
 /// Each cell's least over itself and those around it.
 std::vector<double> leastAround(std::vector<double> values, const std::array<std::int64_t, 3>& size) {
   std::int64_t stride = 1;
@@ -227,7 +233,7 @@ double worstDetour(const Vector3& cell) {
 /// shortened so that none is too long (Borgefors 1986). One pass there and one back find the shortest ones.
 void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
   struct Step {
-    std::array<std::int64_t, 3> by;
+    Place by;
     std::int64_t offset;
     double length;
   };
@@ -243,7 +249,7 @@ void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size
               {{x, y, z}, offset, shorten * cell.cwiseProduct(Vector3(double(x), double(y), double(z))).norm()});
       }
   const auto visit = [&](std::int64_t n, int sign) {
-    const std::array<std::int64_t, 3> at = {n % size[0], n / size[0] % size[1], n / size[0] / size[1]};
+    const Place at = placeOf(n, size);
     for (const Step& step : back) {
       bool within = true;
       for (int axis = 0; axis < 3; ++axis) {
@@ -257,9 +263,20 @@ void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size
   for (std::int64_t n = std::ssize(values); n-- > 0;) visit(n, -1);
 }
 
-std::int16_t roundedDown(double value, double unit) {
-  using Limits = std::numeric_limits<std::int16_t>;
-  return static_cast<std::int16_t>(std::clamp<double>(std::floor(value / unit), Limits::min(), Limits::max()));
+/// Of the cells at the domain's sides.
+double leastAtSides(const std::vector<double>& values, const std::array<std::int64_t, 3>& size) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::int64_t n = 0; n < std::ssize(values); ++n) {
+    const Place at = placeOf(n, size);
+    for (int axis = 0; axis < 3; ++axis)
+      if (at[axis] == 0 || at[axis] + 1 == size[axis]) least = std::min(least, values[n]);
+  }
+  return least;
+}
+
+std::uint16_t roundedDown(double value, double unit) {
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+  return static_cast<std::uint16_t>(std::min(value / unit, kMost));
 }
 
 }  // namespace
@@ -274,19 +291,16 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
     cell[axis] = frame.size[axis] / double(size_[axis]);
   }
   unit_ = cell.minCoeff() / kUnits;
-  const std::vector<double> within = LowerBounds(field, depth_, size_, kLoose * cell.minCoeff()).find();
+  std::vector<double> within = LowerBounds(field, depth_, size_, kLoose * cell.minCoeff()).find();
+  wall_ = leastAtSides(within, size_);
+  for (double& bound : within) bound = std::max(bound, 0.0);
   // two cells are as far apart as the one's centre and that of the nearest around the other
   std::vector<double> around = leastAround(within, size_);
   spread(around, size_, cell);
+  if (wall_ > 0) wall_ = leastAtSides(around, size_);
   cells_.resize(within.size());
   for (std::size_t n = 0; n < cells_.size(); ++n)
     cells_[n] = {roundedDown(within[n], unit_), roundedDown(around[n], unit_)};
-  wall_ = std::numeric_limits<double>::infinity();
-  for (std::int64_t n = 0; n < std::ssize(cells_); ++n) {
-    const std::array<std::int64_t, 3> at = {n % size_[0], n / size_[0] % size_[1], n / size_[0] / size_[1]};
-    for (int axis = 0; axis < 3; ++axis)
-      if (at[axis] == 0 || at[axis] + 1 == size_[axis]) wall_ = std::min(wall_, cells_[n].around * unit_);
-  }
 }
 
 const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const {
@@ -301,17 +315,21 @@ const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const 
   return cells_[(at[2] * size_[1] + at[1]) * size_[0] + at[0]];
 }
 
-// Outside the domain the field is f(q) + |x - q|, q being the domain's closest point to x.
+// Outside the domain the field is f(q) + |x - q|, q being the domain's closest point to x. At its sides f is `wall_` or
+// more.
 
 double FieldCollider::lowerBound(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());
   const double bound = cellAt(closest).within * unit_;
-  return closest == x ? bound : bound + (x - closest).norm();
+  if (closest == x) return bound;
+  const double beyond = (x - closest).norm();
+  return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-/// Of a point y and its own closest one, |q - q_y| ≤ |x - y|: the bound at q holds for y too. And the way from x to y
-/// passes the domain's sides, or y is outside and at most |x - y| nearer to them than x.
+/// What holds around q holds around x: |q - q_y| ≤ |x - y| for any y and its own closest point. And y is either
+/// outside, and no more than |x - y| nearer to the domain than x, or behind its sides: beyond reach if `wall_` is
+/// negative, and if not, that is what holds around them.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

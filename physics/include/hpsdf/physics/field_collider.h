@@ -24,10 +24,10 @@ class FieldCollider {
 
   const Field& field() const { return *field_; }
 
-  /// The field at x is no less, or both are below 0.
+  /// 0 or more; the field at x is no less, or negative where this is 0.
   double lowerBound(const Vector3& x) const;
 
-  /// At any distance r of x, the field is no less than this less r, or this less r is below 0.
+  /// 0 or more; at any distance r of x at which this less r is above 0 the field is no less than that.
   double lowerBoundAround(const Vector3& x) const;
 
   std::size_t bytes() const { return cells_.size() * sizeof(cells_[0]); }
@@ -35,8 +35,8 @@ class FieldCollider {
  private:
   /// In `unit_`, rounded down.
   struct Cell {
-    std::int16_t within;  ///< at most the field, within the cell
-    std::int16_t around;  ///< at most the field at any point, and the way there from any of the cell's
+    std::uint16_t within;  ///< at most the field, within the cell
+    std::uint16_t around;  ///< at most the field at any point, and the way there from any of the cell's
   };
 
   const Cell& cellAt(const Vector3& inDomain) const;
@@ -45,7 +45,7 @@ class FieldCollider {
   int depth_;                         ///< of the octree's cells that are the grid's
   std::array<std::int64_t, 3> size_;  ///< cells
   double unit_;
-  double wall_;              ///< the least `around` of the cells at the domain's sides
+  double wall_;              ///< the least of the field at the domain's sides or, if that is above 0, of `around` there
   std::vector<Cell> cells_;  ///< x fastest
 };
 
