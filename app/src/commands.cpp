@@ -18,6 +18,7 @@ Registry makeRegistry() {
   addViewCommand(registry);
   addReportCommand(registry);
   addStudyCommand(registry);
+  addSimulateCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);
   return registry;

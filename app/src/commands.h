@@ -16,6 +16,7 @@ void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addStudyCommand(Registry& registry);
+void addSimulateCommand(Registry& registry);
 void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
 void addUiCommand(Registry& registry);
 void addViewCommand(Registry& registry);    ///< the window

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace hpsdf::physics {
 namespace {
@@ -33,17 +34,21 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// The field and its unit gradient at a point of the world; up where it has none.
-struct Found {
-  double value;
-  Vector3 normal;
-};
+constexpr std::size_t kDirections = 128;
+constexpr double kOneSide = 0.9;  // cosine between normals
 
-Found lookUp(const FieldCollider& collider, const Eigen::Isometry3d& worldFromField, const Vector3& x) {
-  const ValueAndGradient here = collider.field().valueAndGradient(worldFromField.inverse() * x);
-  const double steepness = here.gradient.norm();
-  return {here.value,
-          steepness > 0 ? Vector3(worldFromField.linear() * (here.gradient / steepness)) : Vector3::UnitZ()};
+/// Evenly spread, along a spiral: no direction is farther than some 0.2 radians from one of them.
+const std::array<Vector3, kDirections>& directionsAllAround() {
+  static const std::array<Vector3, kDirections> directions = [] {
+    std::array<Vector3, kDirections> made;
+    const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
+    for (std::size_t i = 0; i < kDirections; ++i) {
+      const double z = 1 - (2 * double(i) + 1) / kDirections, r = std::sqrt(1 - z * z);
+      made[i] = {r * std::cos(turn * double(i)), r * std::sin(turn * double(i)), z};
+    }
+    return made;
+  }();
+  return directions;
 }
 
 }  // namespace
@@ -117,16 +122,46 @@ void RigidFieldAlgorithm::withSphere(const btCollisionObject& field, const btCol
                                      bool sphereIsSecond) {
   const FieldShape& shape = *fieldOf(field);
   const double radius = static_cast<const btSphereShape*>(sphere.getCollisionShape())->getRadius();
-  const Vector3 center = fromBullet(sphere.getWorldTransform().getOrigin());
   const Eigen::Isometry3d ofField = worldFromMesh(field, shape);
-  const double reach = radius + shape.getMargin();
-  if (shape.field().lowerBoundAround(ofField.inverse() * center) > reach) return;
-  const auto [value, normal] = lookUp(shape.field(), ofField, center);
-  if (value > reach) return;
-  if (sphereIsSecond)
-    contacts_.push_back({center - radius * normal, -normal, value - radius});
-  else
-    contacts_.push_back({center - value * normal, normal, value - radius});
+  const Vector3 center = ofField.inverse() * fromBullet(sphere.getWorldTransform().getOrigin());
+  const double margin = std::min(shape.getMargin(), 0.1 * radius);
+  if (shape.field().lowerBoundAround(center) > radius + margin) return;
+  // the nearest point of the field's surface, and what is near the sphere elsewhere, as the other side of a groove
+  std::array<Vector3, kDirections + 1> points;
+  std::array<ValueAndGradient, kDirections + 1> answers;
+  const std::array<Vector3, kDirections>& directions = directionsAllAround();
+  for (std::size_t i = 0; i < kDirections; ++i) points[i] = center + radius * directions[i];
+  points[kDirections] = center;
+  shape.field().field().valuesAndGradients(points, answers);
+  answers[kDirections].value -= radius;
+  touching_.clear();
+  for (const ValueAndGradient& answer : answers) {
+    const double steepness = answer.gradient.norm();
+    // between directions the sphere reaches up to a tenth of its radius farther
+    if (answer.value < margin + 0.1 * radius && steepness > 0)
+      touching_.push_back({Vector3::Zero(), answer.gradient / steepness, answer.value});
+  }
+  // those of one side tell the same
+  std::ranges::stable_sort(touching_, {}, &BodyContact::distance);
+  std::size_t kept = 0;
+  for (const BodyContact& candidate : touching_) {
+    const auto end = touching_.begin() + std::ptrdiff_t(kept);
+    if (kept == kMostContacts || std::any_of(touching_.begin(), end, [&](const BodyContact& other) {
+          return other.normal.dot(candidate.normal) > kOneSide;
+        }))
+      continue;
+    touching_[kept++] = candidate;
+  }
+  for (std::size_t i = 0; i < kept; ++i) {
+    const Vector3 outwards = touching_[i].normal, foot = center - radius * outwards;
+    const double value = shape.field().field().value(foot);
+    if (value > margin) continue;
+    const Vector3 normal = ofField.linear() * outwards;
+    if (sphereIsSecond)
+      contacts_.push_back({ofField * foot, -normal, value});
+    else
+      contacts_.push_back({ofField * Vector3(foot - value * outwards), normal, value});
+  }
 }
 
 void RigidFieldAlgorithm::withPlane(const btCollisionObject& field, const btCollisionObject& plane,

@@ -68,7 +68,7 @@ class RigidFieldAlgorithm final : public FieldAlgorithm {
   void withPlane(const btCollisionObject& field, const btCollisionObject& plane, bool planeIsSecond);
 
   ContactQuery query_;
-  std::vector<BodyContact> contacts_;
+  std::vector<BodyContact> contacts_, touching_;
   double size_ = 0;  ///< of the smaller body
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btManifoldPoint> before_;
