@@ -36,6 +36,18 @@ Node fetchNode(uint index) {
   return node;
 }
 
+// What others have to say in a leaf (ZoneBounds), local coordinates; nothing in a field without blending.
+struct Blending {
+  bool near;  // a face: a point where they may have a say
+  float apart, twist, reach;
+  float width;  // of the zones along the faces, in parts of the leaf's edges
+};
+
+// The field at a point, and the lowest and highest that any leaf says which has a say there.
+struct Answer {
+  float value, lowest, highest;
+};
+
 uint baseCellIndex(uvec3 base) { return (base.z * grid.y + base.y) * grid.x + base.x; }
 
 uint childIndex(Node node, uvec3 upper) { return node.firstChild + upper.x + 2u * upper.y + 4u * upper.z; }

@@ -8,6 +8,8 @@ vec4 fieldWithGradient(Node leaf, uint depth, uvec3 place, vec3 local) {
   return evaluateWithGradient(leaf.offset, leaf.degree, local);
 }
 
-Node boundsNear(Node leaf, vec3 fraction) { return leaf; }
+const bool kBlended = false;
 
-vec3 aheadNear(vec3 fraction, bvec3 forwards) { return mix(fraction, 1.0 - fraction, forwards); }
+Blending blendingAt(uint leaf, vec3 fraction) { return Blending(false, 0.0, 0.0, 0.0, 0.0); }
+
+Answer fieldAmong(Node leaf, uint depth, uvec3 place, vec3 local, float margin) { return Answer(0.0, 0.0, 0.0); }

@@ -30,7 +30,6 @@ void main() {
   // the march stood in this leaf, and finds it again from the same point
   CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);
-  at.node = boundsNear(at.node, at.fraction);
   uvec3 place = placeOf(at);
 
   // Newton's method from `first`, in double precision, by what is to be added, in single precision; halving where it
@@ -38,7 +37,8 @@ void main() {
   double first = double(bracketed ? bracket.z : t);
   vec3 local = localAt(at, ray, first);
   vec3 localDirection = 2.0 * at.scale * vec3(ray.direction);
-  float curve = at.node.curve * dot(localDirection, localDirection);
+  bool near = blendingAt(at.node.index, at.fraction).near;
+  float curve = near ? kInfinity : at.node.curve * dot(localDirection, localDirection);
   float a = bracket.x - bracket.z, b = bracket.y - bracket.z;
   float added = 0.0, change = 0.0;
   vec4 gradientValue;

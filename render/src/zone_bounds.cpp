@@ -78,18 +78,18 @@ class Cube {
 
   /// To the coordinate s along an axis of which the one up to now is scale · s + shift.
   void restrict(int axis, double scale, double shift) {
+    if (scale == 1 && shift == 0) return;
     findRows(scale, shift);
-    for (int a = 0; a < size_; ++a)
-      for (int b = 0; a + b < size_; ++b) {
-        const int most = size_ - 1 - a - b;
-        const auto along = [&](int i) -> double& {
-          return axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i);
-        };
-        // row i changes nothing above i: in place, from below
-        for (int j = 0; j <= most; ++j) {
+    const int n = size_, along = axis == 0 ? n * n : axis == 1 ? n : 1;
+    const int first = axis == 0 ? n : n * n, second = axis == 2 ? n : 1;  // steps along the other two
+    for (int a = 0; a < n; ++a)
+      for (int b = 0; a + b < n; ++b) {
+        double* line = c_.data() + a * first + b * second;
+        // entry i changes nothing above i: in place, from below
+        for (int j = 0; j < n - a - b; ++j) {
           double sum = 0;
-          for (int i = j; i <= most; ++i) sum += rows_[i][j] * along(i);
-          along(j) = sum;
+          for (int i = j; i < n - a - b; ++i) sum += rows_[i][j] * line[i * along];
+          line[j * along] = sum;
         }
       }
   }
@@ -104,27 +104,20 @@ class Cube {
     return sum;
   }
 
-  /// Bounds of the lengths of the gradient and of the matrix of second derivatives, of coordinates of which the present
-  /// ones are `perUnit` each.
-  std::array<double, 2> steepness(const Vector3& perUnit) {
-    Vector3 gradient = Vector3::Zero(), pure = Vector3::Zero(), mixed = Vector3::Zero();
+  /// A bound of the gradient's length, of coordinates of which the present ones are `perUnit` each.
+  double steepness(const Vector3& perUnit) {
+    Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)
       for (int j = 0; i + j < size_; ++j)
-        for (int k = 0; i + j + k < size_; ++k) {
-          const double c = std::abs(at(i, j, k));
-          const Vector3 first = perUnit.cwiseProduct(0.5 * Vector3(i * (i + 1), j * (j + 1), k * (k + 1)));
-          const auto second = [](double n) { return 0.125 * (n - 1) * n * (n + 1) * (n + 2); };
-          gradient += c * first;
-          pure += c * perUnit.cwiseAbs2().cwiseProduct(Vector3(second(i), second(j), second(k)));
-          mixed += c * Vector3(first.y() * first.z(), first.z() * first.x(), first.x() * first.y());
-        }
-    return {gradient.norm(), std::sqrt(pure.squaredNorm() + 2 * mixed.squaredNorm())};
+        for (int k = 0; i + j + k < size_; ++k)
+          gradient += std::abs(at(i, j, k)) * Vector3(i * (i + 1), j * (j + 1), k * (k + 1));
+    return 0.5 * perUnit.cwiseProduct(gradient).norm();
   }
 
  private:
   /// L_i(scale · s + shift) = Σ rows_[i][j] L_j(s), by L_i's recurrence and s L_j = ((j+1) L_{j+1} + j L_{j−1})/(2j+1).
   void findRows(double scale, double shift) {
-    for (auto& row : rows_) std::fill_n(row.begin(), size_ + 1, 0.0);
+    for (int i = 0; i < size_; ++i) std::fill_n(rows_[i].begin(), size_ + 1, 0.0);
     rows_[0][0] = 1;
     for (int i = 0; i + 1 < size_; ++i)
       for (int j = 0; j <= i + 1; ++j) {
@@ -145,20 +138,17 @@ class Finder {
   explicit Finder(const Field& field) : field_(field.data()), reaches_(field.directory().reaches) {}
 
   ZoneBounds bounds(const Placed& leaf) {
-    double apart = 0, gradient = 0, second = 0;
+    double apart = 0, twist = 0;
     int deepest = deepestReach(leaf);
-    bool anySmaller = false;
     visitTouching(field_, leaf, [&](const Placed& other) {
       deepest = std::max(deepest, deepestReach(other));
-      anySmaller |= other.depth > leaf.depth;
       const double rounding = restrictBoth(leaf, other);
       ofOther_.subtract(ofLeaf_);
-      const auto [slope, curve] = ofOther_.steepness(perUnit_);
       apart = std::max(apart, ofOther_.magnitude() * (1 + kWiden) + kWiden * rounding);
-      gradient = std::max(gradient, slope * (1 + kWiden) + kWiden * rounding);
-      second = std::max(second, curve * (1 + kWiden) + kWiden * rounding);
+      twist = std::max(twist, ofOther_.steepness(perUnit_) * (1 + kWiden) + kWiden * rounding);
     });
-    return combined(apart, gradient, second, std::ldexp(0.5 / field_.blend, deepest - leaf.depth), anySmaller);
+    return {static_cast<float>(apart), static_cast<float>(twist),
+            static_cast<float>(std::ldexp(2 * field_.blend, leaf.depth - deepest))};
   }
 
  private:
@@ -197,27 +187,6 @@ class Finder {
     std::visit(
         [&](const auto& c) { cube.assign(c.data() + node::offset(field_.nodes[leaf.node]), degree(leaf), size); },
         field_.coefficients);
-  }
-
-  /// `inverse` is 1 over the least reach, in local coordinates. Near K axes Σ wₙ is at least 2^−K, the leaf's own
-  /// weight, and no more than 2^K leaves reach the point, each with a weight that changes along those axes alone; where
-  /// smaller leaves touch this one, any number of the eight that there may be, and along any axis.
-  static ZoneBounds combined(double apart, double gradient, double second, double inverse, bool anySmaller) {
-    const double slope = 0.75 * inverse, curve = 1.5 * inverse * inverse;  // of a ramp
-    ZoneBounds bounds{static_cast<float>(apart), {}, {}};
-    for (int near = 1; near <= 3; ++near) {
-      const double axes = anySmaller ? 3 : near, leaves = anySmaller ? 8 : 1 << near, least = 1.0 / (1 << near);
-      const double weightSlope = std::sqrt(axes) * slope;
-      const double weightCurve = std::sqrt(axes * curve * curve + axes * (axes - 1) * std::pow(slope, 4));
-      const bool two = leaves == 2;  // then it is one ramp over the sum of two: |λ'| ≤ slope/Σw
-      const double bend = (two ? 1 : 2 * leaves) * weightSlope / least * apart + gradient;
-      const double turn =
-          (2 * leaves * (weightCurve * apart + weightSlope * gradient) + 2 * bend * leaves * weightSlope) / least +
-          second;
-      bounds.bend[near - 1] = static_cast<float>(bend * (1 + kWiden));
-      bounds.curve[near - 1] = static_cast<float>(turn * (1 + kWiden));
-    }
-    return bounds;
   }
 
   const FieldData& field_;

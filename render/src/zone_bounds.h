@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "hpsdf/field.h"
@@ -10,10 +9,11 @@ namespace hpsdf::render {
 /// What is certain about a leaf of a blended field beside the `NodeBounds` of its polynomial. The field is
 /// F = f + Σ wₙ dₙ / Σ wₙ there, f the leaf's polynomial, dₙ what those of the leaves that reach into it differ by.
 struct ZoneBounds {
-  float apart = 0;  ///< |F − f| is at most this, throughout the leaf
-  /// Where the point is near a face along one, two or three axes: the gradient of F − f in local coordinates is at most
-  /// so long, and no second derivative of it, along any unit vector, is larger.
-  std::array<float, 3> bend = {}, curve = {};
+  float apart = 0;  ///< |F − f| is at most this, throughout the leaf, where others reach into it |dₙ| too
+  float twist = 0;  ///< |∇dₙ| is at most this there, in local coordinates
+  /// The shortest reach of any weight there, from half of its own to none, in local coordinates. Over a step of a
+  /// quarter of it F sags below its chord by a few hundredths of what the dₙ differ by, at most.
+  float reach = 0;
 };
 
 /// One for every node, none for a field without blending. A little wider than certain, by what single precision may

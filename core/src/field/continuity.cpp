@@ -50,9 +50,7 @@ class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
       : coupling_(coupling), options_(options), change_(x0.size(), 0.0), residual_(x0.size()) {
-    // about 1 for every weight, so that a great one stays in the range of floats
-    for (const double entry : coupling.diagonal())
-      scale_.push_back(static_cast<float>((1 + options.weight) / (entry + options.weight)));
+    for (const double entry : coupling.diagonal()) scale_.push_back(static_cast<float>(1 / (entry + options.weight)));
     coupling_.apply(0, x0, residual_);
     for (double& r : residual_) r = -r;
   }

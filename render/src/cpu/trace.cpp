@@ -11,6 +11,7 @@ namespace {
 constexpr double kNudge = 1e-6;      // beyond a face; also the shortest step
 constexpr double kPastFace = 4e-7;   // of the grid: how far past a face of a node, at most, its neighbour is entered
 constexpr double kConverged = 1e-8;  // change of the root between two steps of its refinement
+constexpr double kGrain = 0.25;      // in a weight's reach: steps where a blended field may be zero; as in the shader
 constexpr int kMostSteps = 1 << 16;
 constexpr int kMostRefinements = 24;
 
@@ -68,19 +69,24 @@ double evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length from the point to where the ray has left the node's box: past a face by a little, because a ray that
-/// runs along a face, on it up to rounding, would otherwise leave it again at every step.
-/// `endOf(fraction)` is where it ends, both in parts of the node along the ray's way.
-template <typename EndOf>
-double lengthTo(const EndOf& endOf, const CellPoint& at, const Vector3& direction, const Vector3& grid) {
+/// World length from the point to where the ray has left the node's box, or the box within it whose faces are `margin`
+/// of its edges inside: past a face by a little, because a ray that runs along a face, on it up to rounding, would
+/// otherwise leave it again at every step.
+double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
     if (direction[axis] == 0) continue;
     const double along = direction[axis] > 0 ? at.fraction[axis] : 1 - at.fraction[axis];
-    const double ahead = endOf(along) - along;
+    const double ahead = 1 - margin - along;
     exit = std::min(exit, (std::ldexp(ahead, -at.depth) + kPastFace * grid[axis]) / std::abs(direction[axis]));
   }
   return exit;
+}
+
+/// How far along a ray a height stays above zero at least that falls no steeper than `steepest`.
+double certainlyAbove(double height, double steepest) {
+  if (!(height > 0)) return 0;
+  return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -92,20 +98,8 @@ TraceField::TraceField(const Field& field)
       zones_(zoneBounds(field)),
       bounds_(nodeBounds(field_, zones_)) {}
 
-TraceField::Part TraceField::partAt(const CellPoint& at, const Vector3& direction) const {
-  const NodeBounds& bounds = bounds_[at.node];
-  Part part{0, bounds.bend, bounds.curve};
-  const double blend = field_.blend;
-  part.toExit = lengthTo([&](double along) { return along < blend       ? blend
-                                                    : along < 1 - blend ? 1 - blend
-                                                                        : 1.0; }, at,
-                         direction, space_.grid);
-  const auto near = ((at.fraction.array() < blend) || (at.fraction.array() > 1 - blend)).count();
-  if (blend > 0 && near > 0) {
-    part.bend += zones_[at.node].bend[near - 1];
-    part.curve += zones_[at.node].curve[near - 1];
-  }
-  return part;
+bool TraceField::nearFace(const CellPoint& at) const {
+  return field_.blend > 0 && ((at.fraction.array() < field_.blend) || (at.fraction.array() > 1 - field_.blend)).any();
 }
 
 /// Calls use(leaf, local, weight, its gradient) for each, `p` in grid coordinates, which gradients refer to.
@@ -287,7 +281,7 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
       const double sideHere = bounds.lo > offset ? 1 : -1;
       if (side == 0) side = sideHere;
       if (side != sideHere) return hitOnFace(t);
-      t += lengthTo([](double) { return 1.0; }, at, ray.direction, space_.grid) + nudge;
+      t += lengthToExit(at, ray.direction, space_.grid) + nudge;
       continue;
     }
     if (at.node != lastLeaf) {
@@ -298,22 +292,42 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
       reach = std::numeric_limits<double>::infinity();
       if (lastHeight < 0) return hitOnFace(t);
     }
-    const auto [toExit, bendThere, curveThere] = partAt(at, ray.direction);
-    // within this part of the leaf the height's slope along the ray lies between these two, its second derivative in
-    // ±curve
+    // within the leaf the slope of its polynomial's height along the ray lies between these two, its second derivative
+    // in ±curve
     const Vector3 localDirection = std::ldexp(2.0, at.depth) * ray.direction;
     const double slope = side * linearSlope(at.node, localDirection);
-    const double bend = bendThere * localDirection.norm();
-    const double curve = curveThere * localDirection.squaredNorm();
+    const double bend = bounds.bend * localDirection.norm();
+    const double curve = bounds.curve * localDirection.squaredNorm();
     const double steepest = slope - bend;
     const double shallowest = slope + bend;
-    if (lastHeight + steepest * toExit >= 0) {
-      t += toExit + nudge;
+    const double toLeave = lengthToExit(at, ray.direction, space_.grid);
+    const auto leave = [&](double length) {
+      t += length + nudge;
       lastLeaf = kNoCell;
+    };
+    // of a blended field: what it cannot fall below is the polynomial's height less `apart`
+    const bool near = nearFace(at);
+    const double own = near ? side * (samplePolynomial(at.node, localAt(at, t)).value - offset) : lastHeight;
+    const double clear = own - (field_.blend > 0 ? zones_[at.node].apart : 0);
+    if (clear + steepest * toLeave >= 0) {
+      leave(toLeave);
       continue;
     }
+    if (near) {
+      const double grain = kGrain * zones_[at.node].reach / localDirection.norm();
+      const double length = std::min(toLeave, std::max(certainlyAbove(clear, steepest), grain) + nudge);
+      const double ahead = heightAt(at, t + length);
+      if (ahead <= 0) return refine(at, t, lastHeight, t + length, ahead);
+      if (length == toLeave)
+        leave(length);
+      else
+        t += length;
+      lastHeight = ahead;
+      continue;
+    }
+    const double toExit = lengthToExit(at, ray.direction, space_.grid, field_.blend);
     const bool falling = shallowest < 0;  // throughout: at most one root
-    const double safe = lastHeight / -steepest + nudge;
+    const double safe = certainlyAbove(lastHeight, steepest) + nudge;
     const double length =
         std::min(toExit, falling ? lastHeight / -shallowest + nudge
                                  : std::max(safe, std::min(reach, std::sqrt(4 * lastHeight / curve))));
@@ -323,9 +337,10 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
       return refine(at, t, lastHeight, t + length, ahead);
     // the height sags below its chord by at most curve · length² / 8
     if (ahead > 0 && (certain || std::min(lastHeight, ahead) > 0.125 * curve * length * length)) {
-      const bool leaves = length == toExit;
-      t += leaves ? length + nudge : length;
-      if (leaves) lastLeaf = kNoCell;
+      if (length == toLeave)
+        leave(length);
+      else
+        t += length;
       lastHeight = ahead;
       reach = std::numeric_limits<double>::infinity();
     } else {

@@ -71,13 +71,8 @@ class TraceField {
   std::optional<Hit> trace(const Ray& ray, double offset) const;
 
  private:
-  /// What the bounds hold for that a ray's next steps are taken by: of a blended field a leaf's middle, or a part of it
-  /// near a face, an edge or a corner.
-  struct Part {
-    double toExit;  ///< world length until the ray has left it
-    double bend, curve;
-  };
-  Part partAt(const CellPoint& at, const Vector3& direction) const;
+  /// Whether others may have a say there: of a blended field alone.
+  bool nearFace(const CellPoint& at) const;
 
   Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
   /// The definition, by all leaves that reach the point.

@@ -83,13 +83,10 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Node
 }
 
 std::vector<NodeTexel> zoneTexels(const std::vector<ZoneBounds>& zones, const std::vector<std::uint32_t>& reaches) {
-  std::vector<NodeTexel> texels;
+  std::vector<NodeTexel> texels(zones.size());
   const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x); };
-  for (std::size_t n = 0; n < zones.size(); ++n) {
-    const ZoneBounds& zone = zones[n];
-    texels.push_back({reaches[n], bits(zone.apart), bits(zone.bend[0]), bits(zone.curve[0])});
-    texels.push_back({bits(zone.bend[1]), bits(zone.curve[1]), bits(zone.bend[2]), bits(zone.curve[2])});
-  }
+  for (std::size_t n = 0; n < zones.size(); ++n)
+    texels[n] = {reaches[n], bits(zones[n].apart), bits(zones[n].twist), bits(zones[n].reach)};
   return texels;
 }
 
@@ -112,7 +109,6 @@ FieldUpload::FieldUpload(const Field& whole, const std::vector<NodeBounds>& boun
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &largest);
   checkFits(field.nodes.size(), largest, "nodes");
-  checkFits(2 * zones.size(), largest, "halves of nodes' blended zones");
   checkFits(uploadedCount(field), std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "coefficients");
 
   const std::vector<NodeTexel> ofNodes = nodeTexels(field, bounds);

@@ -14,8 +14,7 @@ namespace hpsdf::render {
 /// coefficients, R32F: as in FieldData, but those of leaves up to degree 4 in the order of field.glsl's straight code,
 /// and all leaves padded to a multiple of four; coefficientQuads: the same by four, RGBA32F.
 /// linearParts, RGBA32F: `NodeBounds::linear`.
-/// zones, RGBA32UI, two texels a node, none without blending: reach, apart, bend[0], curve[0] and bend[1], curve[1],
-/// bend[2], curve[2] of `Directory::reaches` and `ZoneBounds`, floats by their bits.
+/// zones, RGBA32UI, none without blending: `Directory::reaches`, and `ZoneBounds` by the floats' bits.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.

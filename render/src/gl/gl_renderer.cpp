@@ -24,7 +24,7 @@ static_assert(kTile % kBlock == 0);
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
-enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend };
+enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kTogetherSteps };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
@@ -40,9 +40,9 @@ constexpr int evaluationLoops(int degree) {
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
 
-/// The same where eight leaves reach the point: the search for them, eight places at each depth with ramps along three
-/// axes, and for each its evaluation and its ramps.
-constexpr int blendedLoops(int evaluation) { return 42 * (kMaxDepth + 1) + 8 * (evaluation + 5) + 2; }
+/// The same near a face: at each depth eight places, down to which the first have to descend, and leaves that are
+/// evaluated, of which sixteen are near the point at most.
+constexpr int blendedLoops(int evaluation) { return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2; }
 
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
@@ -205,10 +205,12 @@ class GlRenderer final : public Renderer {
     bounds_ = nodeBounds(field.data(), zones);
     const int alone = evaluationLoops(highestDegree(field.data()));
     const int evaluation = zones.empty() ? alone : blendedLoops(alone);
-    stepsInPass_ = std::max(1, kLoopBudget / (evaluation + kMaxDepth + 4));
+    const int ofStep = alone + kMaxDepth + 4;
+    stepsInPass_ = std::max(1, kLoopBudget / ofStep);
     refinements_ = std::clamp((kLoopBudget - kMaxDepth) / (evaluation + 1) - 1, 1, kRefinementsInAll);
     const EglContext::Current current(context_);
     resources_ = std::make_unique<Resources>(field, bounds_, zones);
+    if (!zones.empty()) glProgramUniform1i(resources_->march.name(), kTogetherSteps, evaluation / ofStep);
   }
 
   ~GlRenderer() override {
