@@ -48,7 +48,7 @@ Eigen::Isometry3d randomPose(std::mt19937_64& random, double reach) {
 /// 800 bodies in a lattice of 10 x 10 x 8, turned and moved by chance: all pairs of which the spheres meet, both ways.
 std::vector<BodyPair> pile() {
   constexpr int kBodies = 800;
-  constexpr double kPitch = 2.05;  // some 10 contacts a body, as in the paper's pile
+  constexpr double kPitch = 2.05;  // some 50 contacts a body, five times as many as in the paper
   std::mt19937_64 random(2016);
   std::vector<BodyPair> bodies, pairs;
   for (int i = 0; i < kBodies; ++i) {

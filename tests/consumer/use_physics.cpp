@@ -1,6 +1,7 @@
 #include <hpsdf/physics/contacts.h>
 #include <hpsdf/shapes.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 

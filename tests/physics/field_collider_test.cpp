@@ -22,9 +22,18 @@ Vector3 pointAround(const Box& box, std::mt19937_64& random, double beyond = 1.2
   return box.center() + beyond / 2 * box.sizes().cwiseProduct(from);
 }
 
+/// 10‖x‖² − 5 over [-1, 1]³: high at the sides, negative in the middle, and much steeper than a distance.
+Field steepField() {
+  FieldData data;
+  data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+  data.nodes = {node::leaf(2, 0)};
+  data.coefficients = std::vector<double>{5, 0, 20.0 / 3, 0, 0, 20.0 / 3, 0, 0, 0, 20.0 / 3};
+  return Field(std::move(data));
+}
+
 /// Fields that are anything but distances; the last are smooth ones, of a single leaf of the highest degree too.
 std::vector<Field> fields() {
-  std::vector<Field> result;
+  std::vector<Field> result = {steepField()};
   const Box flat(Vector3(-3, -1, 5), Vector3(1, 2, 5.5));
   for (unsigned seed = 0; seed < 2; ++seed) {
     result.push_back(randomField(seed, {.roughness = 1}));
