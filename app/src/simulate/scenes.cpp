@@ -263,8 +263,7 @@ std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request
           world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
       sheet->m_cfg.piterations = 8;
       sheet->m_cfg.kDF = 0.6;
-      sheet->m_cfg.kDP = 0.02;
-      sheet->m_cfg.kKHR = 1;
+      sheet->m_cfg.kDP = 0.05;
       sheet->getCollisionShape()->setMargin(kMargin);
       sheet->setTotalMass(1, false);
       bodySize_ = kMargin;

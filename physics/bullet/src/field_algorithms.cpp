@@ -271,7 +271,7 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
   // Bullet hands const objects to algorithms that are there to change them
   btSoftBody& soft = *const_cast<btSoftBody*>(btSoftBody::upcast((fieldIsFirst ? second : first).getCollisionObject()));
   btRigidBody* rigid = const_cast<btRigidBody*>(btRigidBody::upcast(&object));
-  const double step = soft.m_sst.sdt;
+  const double step = soft.m_sst.sdt, margin = soft.getCollisionShape()->getMargin();
   const btTransform& transform = object.getWorldTransform();
   const btScalar inverseMass = rigid != nullptr ? rigid->getInvMass() : 0;
   const btMatrix3x3 inverseInertia =
@@ -286,7 +286,8 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       contact.t2.setZero();
       contact.m_cti.m_colObj = &object;
       contact.m_cti.m_normal = toBullet(touching.normal);
-      contact.m_cti.m_offset = touching.distance - contact.m_cti.m_normal.dot(node.m_x);
+      // half of the margin is the body's thickness
+      contact.m_cti.m_offset = touching.distance - margin / 2 - contact.m_cti.m_normal.dot(node.m_x);
       const btVector3 arm = node.m_x - transform.getOrigin();
       const btVector3 ofBody = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
       const btVector3 relative = node.m_x - node.m_q - ofBody;
