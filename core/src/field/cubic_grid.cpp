@@ -27,7 +27,7 @@ static_assert(sizeof(double) == 8 && std::numeric_limits<double>::is_iec559);
 
 constexpr std::size_t kChunk = 4096;  // points that are looked up together
 constexpr int kNodesOfCell = 32;
-constexpr std::size_t kSizesInFile = 8;  // u64 numbers: cells and fields, and twice three lengths of lists
+constexpr std::size_t kSizesInFile = 8;  // numbers of cells and fields, and two lengths of each of three lists
 
 using Place = std::array<std::uint64_t, 3>;
 
