@@ -178,8 +178,7 @@ void runBlend(Session& session, const Arguments& arguments) {
 }
 
 void runBounds(Session& session, const Arguments& arguments) {
-  const bool saves = arguments.has("output");
-  if (saves) checkWritable(arguments.text("output"));
+  checkFieldOutput(arguments);
   useField(session, arguments);
   const CurrentField& from = session.current();
   const Console& console = session.console();
@@ -193,14 +192,10 @@ void runBounds(Session& session, const Arguments& arguments) {
     return withBounds(from.field, *reference.distance, arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  session.changeField({std::move(field), saves ? arguments.text("output") : from.name, {}, from.surface});
-  if (saves) saveCurrent(session, arguments.text("output"));
-  Json json = fieldJson(session.current());
-  if (session.wantsJson(arguments)) {
-    json["seconds"] = seconds;
-    json["output"] = saves ? Json(arguments.text("output")) : Json();
-    return printJson(console.out, json);
-  }
+  changeCurrent(session, arguments, std::move(field));
+  Json json = madeJson(session, arguments);
+  json["seconds"] = seconds;
+  if (session.wantsJson(arguments)) return printJson(console.out, json);
   console.out << fmt::format("{}: nowhere wrong by more than {}, in the median cell by {}; {:.1f} s\n",
                              session.current().name, shortNumber(json["bounds"]["greatest"].get<double>()),
                              shortNumber(json["bounds"]["median"].get<double>()), seconds);
@@ -230,11 +225,7 @@ Command boundsCommand() {
                       .help = "What the field was made from: mesh file, builtin:SHAPE or analytic:SHAPE.",
                       .valueName = "MESH",
                       .positional = true},
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "The field's file, usually *.hpsdf.",
-                      .alias = 'o',
-                      .need = Need::onCommandLine},
+                     fieldOutputParameter(),
                      threadsParameter("The field is")},
       .action = runBounds};
 }
