@@ -13,6 +13,7 @@ Registry makeRegistry() {
   addMotionCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);
+  addExportCommand(registry);
   addViewCommands(registry);
   addUiCommand(registry);
   addViewCommand(registry);
