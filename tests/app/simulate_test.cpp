@@ -84,7 +84,8 @@ TEST(Simulate, MistakesAreToldInALine) {
   refused({"simulate", "poles", "--body", "none.obj", "--bodies", "1"}, "none.obj");
   refused({"simulate", "poles", "--ground", "builtin:torus"}, "ground: is not for the scene poles");
   refused({"simulate", "cloth", "--bodies", "3"}, "bodies: is not for the scene cloth");
-  refused({"simulate", "helix", "--ground", "builtin:gear", "--target-error", "1e-3"}, "nothing lies below");
+  refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
+          "nothing lies below");
 }
 
 }  // namespace
