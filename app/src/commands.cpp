@@ -13,11 +13,13 @@ Registry makeRegistry() {
   addMotionCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);
+  addExportCommand(registry);
   addViewCommands(registry);
   addUiCommand(registry);
   addViewCommand(registry);
   addReportCommand(registry);
   addStudyCommand(registry);
+  addSimulateCommand(registry);
   addCheckCommands(registry);
   addToolCommands(registry);
   return registry;

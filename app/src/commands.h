@@ -14,8 +14,10 @@ void addPictureCommands(Registry& registry);  ///< slice, render
 void addMotionCommands(Registry& registry);   ///< turntable, frames: after those above, whose parameters they share
 void addFigureCommands(Registry& registry);   ///< pick, expect
 void addProbeCommand(Registry& registry);
+void addExportCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 void addStudyCommand(Registry& registry);
+void addSimulateCommand(Registry& registry);
 void addViewCommands(Registry& registry);  ///< what the explorer shows: show, camera, plane, color, panel, …
 void addUiCommand(Registry& registry);
 void addViewCommand(Registry& registry);    ///< the window

@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/cubic_grid.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
@@ -606,6 +607,44 @@ TEST_F(Cli, jumpsAreReportedAndListed) {
   EXPECT_THAT(run({{"jumps", field(), "--worst", "0"}}).out, Not(HasSubstr("degrees, depths")));
   expectRefused({{"jumps", field(), "--by", "valeu"}}, "value");
   expectRefused({{"jumps", field(), "-o", field()}}, field(), {"jumps.csv"});
+}
+
+TEST_F(Cli, cubicGridsAreExportedAndMeasured) {
+  const Outcome outcome = run({{"export", field(), "-o", at("grid.cdf"), "--resolution", "20", "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  const Field torus = load(field());
+  const GridResolution cells = cubicGridResolution(torus.domain(), 20);
+  EXPECT_EQ(json.at("resolution"), Json(cells));
+  EXPECT_EQ(json.at("file_bytes"), readFile(at("grid.cdf")).size());
+  EXPECT_EQ(json.at("file_bytes").get<double>(), cubicGridBytes(cells));
+  const CubicGrid grid = sampleCubicGrid(torus, cells);
+  const CubicGridError error = measureCubicGrid(grid, torus, 100000);
+  EXPECT_EQ(json.at("difference").at("points"), 100000);
+  EXPECT_EQ(json.at("difference").at("rms"), error.everywhere.rms);
+  EXPECT_EQ(json.at("difference").at("max"), error.everywhere.max);
+  EXPECT_EQ(json.at("difference_near").at("points"), error.nearSurface.points);
+  EXPECT_EQ(json.at("difference_near").at("rms"), error.nearSurface.rms);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("grid.cdf"));
+
+  const Outcome text = run({{"export", field(), "-o", at("grid.cdf"), "--max-bytes", "1e6"}});
+  EXPECT_THAT(text.out, AllOf(HasSubstr("cubic cells"), HasSubstr("beside the field       RMS"),
+                              HasSubstr("random points within")));
+  EXPECT_LE(readFile(at("grid.cdf")).size(), 1000000u);
+  EXPECT_GT(readFile(at("grid.cdf")).size(), 700000u);
+  ASSERT_EQ(run({{"export", field(), "-o", at("box.cdf"), "--resolution", "3,4,5"}}).status, 0);
+  EXPECT_EQ(double(readFile(at("box.cdf")).size()), cubicGridBytes({3, 4, 5}));
+
+  const std::set<std::string> before = {"box.cdf", "grid.cdf"};
+  expectRefused({{"export", field(), "-o", at("x.obj")}}, "expected .cdf", before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "3,4"}}, "resolution", before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "9", "--max-bytes", "1e6"}}, "excludes",
+                before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "225"}}, "give fewer cells", before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "1e7,1e7,1e7"}}, "give fewer cells", before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--max-bytes", "559"}}, "560 at least", before);
+  expectRefused({{"export", at("none.hpsdf"), "-o", at("x.cdf")}}, "none.hpsdf", before);
+  expectRefused({{"export", field(), "-o", at("none/x.cdf")}}, "none/x.cdf", before);
 }
 
 /// The rows of a CSV file, its header first.
@@ -1401,7 +1440,8 @@ TEST_F(Cli, interruptStopsTheConstruction) {
         std::vector<std::string>{"report", "builtin:gear", "-o", at("report"), "--target-error", "1e-12"},
         std::vector<std::string>{"frames", "builtin:gear", "-o", at("frames"), "--target-error", "1e-12"},
         std::vector<std::string>{"turntable", field(), "-o", at("turn"), "--frames", "9999", "--size", "160x120",
-                                 "--cpu"}}) {
+                                 "--cpu"},
+        std::vector<std::string>{"export", field(), "-o", at("grid.cdf"), "--resolution", "3", "--points", "1e8"}}) {
     Process process({words});
     process.waitForErrorLine();
     const auto start = Clock::now();

@@ -146,9 +146,9 @@ TEST(IncludeDirection, acceptsWhatRunsTheRightWay) {
       {"render/src/gl/context.cpp",
        "#include <epoxy/egl.h>\n#include <hpsdf/field.h>\n#include \"hpsdf/render/view.h\""},
       {"render/src/cpu/cpu_renderer.cpp", "#include \"../picture/colormap.h\""},
-      {"physics/src/collide.cpp", "#include \"hpsdf/physics/collide.h\"\n#include \"hpsdf/field.h\""},
+      {"physics/src/contacts.cpp", "#include \"hpsdf/physics/contacts.h\"\n#include \"hpsdf/field.h\""},
       {"app/src/main.cpp",
-       "#include <CLI/CLI.hpp>\n#include \"hpsdf/render/picture.h\"\n#include \"hpsdf/physics/collide.h\""},
+       "#include <CLI/CLI.hpp>\n#include \"hpsdf/render/picture.h\"\n#include \"hpsdf/physics/contacts.h\""},
       {"core/src/mesh/shapes.cpp", "// not an include: \"hpsdf/render/view.h\"\nint include = 0;"},
   };
   for (const Sample& sample : samples)
@@ -161,12 +161,12 @@ TEST(IncludeDirection, refusesWhatRunsTheWrongWay) {
       {"core/src/field/build.cpp", "#include <hpsdf/render/view.h>"},
       {"core/src/field/build.cpp", "  #  include \"../../../render/src/gl/context.h\"  // why not"},
       {"core/src/field/build.cpp", "#include \"app/src/registry.h\""},
-      {"core/src/field/build.cpp", "#include \"hpsdf/physics/collide.h\""},
+      {"core/src/field/build.cpp", "#include \"hpsdf/physics/contacts.h\""},
       {"core/src/field/build.cpp", "#include <GL/gl.h>"},
       {"render/src/gl/context.cpp", "#include \"../../../app/src/registry.h\""},
-      {"render/src/gl/context.cpp", "#include \"hpsdf/physics/collide.h\""},
-      {"physics/src/collide.cpp", "#include \"hpsdf/render/view.h\""},
-      {"physics/src/collide.cpp", "#include \"app/src/registry.h\""},
+      {"render/src/gl/context.cpp", "#include \"hpsdf/physics/contacts.h\""},
+      {"physics/src/contacts.cpp", "#include \"hpsdf/render/view.h\""},
+      {"physics/src/contacts.cpp", "#include \"app/src/registry.h\""},
   };
   for (const Sample& sample : samples)
     EXPECT_EQ(faults(sample.file, sample.text).size(), 1u) << sample.file << "\n" << sample.text;
@@ -181,6 +181,8 @@ TEST(IncludeDirection, refusesForeignHeadersInPublicOnes) {
       {"render/include/hpsdf/render/renderer.h", "#include <GL/gl.h>"},
       {"render/include/hpsdf/render/renderer.h", "#include <epoxy/gl.h>"},
       {"render/include/hpsdf/render/image.h", "#include <stb_image.h>"},
+      {"physics/include/hpsdf/physics/contacts.h", "#include <tbb/parallel_for.h>"},
+      {"physics/include/hpsdf/physics/contacts.h", "#include \"sphere_tree.h\""},
   };
   for (const Sample& sample : samples)
     EXPECT_EQ(faults(sample.file, sample.text).size(), 1u) << sample.file << "\n" << sample.text;
@@ -189,6 +191,7 @@ TEST(IncludeDirection, refusesForeignHeadersInPublicOnes) {
 TEST(IncludeDirection, refusesPrivateHeadersOfAnotherRoom) {
   EXPECT_EQ(faults("render/src/gl/upload.cpp", "#include \"../../../core/src/field/evaluate.h\"").size(), 1u);
   EXPECT_EQ(faults("app/src/main.cpp", "#include \"render/src/gl/context.h\"").size(), 1u);
+  EXPECT_EQ(faults("physics/src/contacts.cpp", "#include \"../../core/src/threads.h\"").size(), 1u);
 }
 
 TEST(IncludeDirection, namesFileLineAndInclude) {

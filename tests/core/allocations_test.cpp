@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <random>
 #include <vector>
 
@@ -12,35 +9,12 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
-
-namespace {
-
-std::atomic<std::size_t> allocations = 0;
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {  // stable sorts take their buffers here
-  ++allocations;
-  return std::malloc(size);
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
+#include "support/count_allocations.h"
 
 namespace hpsdf {
 namespace {
 
-template <typename F>
-std::size_t allocationsOf(F&& f) {
-  const std::size_t before = allocations;
-  f();
-  return allocations - before;
-}
+using support::allocationsOf;
 
 TEST(Allocations, AreCounted) {
   EXPECT_GT(allocationsOf([] { std::vector<int>(100).at(3) = 1; }), 0u);

@@ -1,0 +1,32 @@
+#include "simulate/scene_request.h"
+
+namespace hpsdf::app {
+
+std::span<const SceneKind> scenes() {
+  const std::vector<std::string> bodies = {"builtin:gear", "builtin:torus", "builtin:box,width=1,height=0.7,depth=0.5"};
+  static const std::vector<SceneKind> all = {
+      {"bowl",
+       "marbles into a bowl with fine relief (Fig. 1)",
+       {.bodies = 1000, .samples = 1000, .ground = "builtin:structured-bowl,bumps=20,cells=160"},
+       12},
+      {"helix",
+       "a marble down the groove of a bowl (Fig. 9)",
+       {.bodies = 1, .samples = 1000, .ground = "builtin:helix-bowl,cells=143"},
+       12},
+      {"run",
+       "a marble down a run, and out of it among bodies (Fig. 8)",
+       {.bodies = 6, .samples = 3000, .ground = "builtin:marble-run", .meshes = {bodies.front()}},
+       12},
+      {"poles", "bodies onto 64 poles (Fig. 7)", {.bodies = 800, .samples = 10000, .meshes = bodies}, 25},
+      {"slope",
+       "rigid and soft bodies down a slope with obstacles (Fig. 7)",
+       {.bodies = 16, .samples = 3000, .meshes = bodies},
+       8},
+      {"cloth",
+       "a sheet of cloth over a body (Fig. 1)",
+       {.nodes = 10000, .samples = 1000, .ground = "builtin:torus"},
+       4}};
+  return all;
+}
+
+}  // namespace hpsdf::app

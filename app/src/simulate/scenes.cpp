@@ -1,0 +1,285 @@
+#include <BulletSoftBody/btSoftBody.h>
+#include <BulletSoftBody/btSoftBodyHelpers.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "hpsdf/error.h"
+#include "hpsdf/shapes.h"
+#include "simulate/scene.h"
+
+namespace hpsdf::app {
+namespace {
+
+using physics::Material;
+
+Eigen::Isometry3d shift(const Vector3& by) { return Eigen::Isometry3d(Eigen::Translation3d(by)); }
+
+/// The same on every machine, unlike the distributions of the standard library.
+class Random {
+ public:
+  explicit Random(std::uint64_t start) : engine_(start) {}
+
+  double within(double lo, double hi) { return lo + (hi - lo) * double(engine_() >> 11) * 0x1p-53; }
+
+  Eigen::Quaterniond rotation() {  // Shoemake 1992
+    const double u = within(0, 1), a = within(0, 2 * std::numbers::pi), b = within(0, 2 * std::numbers::pi);
+    const double s = std::sqrt(1 - u), c = std::sqrt(u);
+    return {c * std::cos(b), s * std::sin(a), s * std::cos(a), c * std::sin(b)};
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Where a marble's centre is when it is let down onto a field from above.
+Vector3 above(const Field& field, double x, double y, double radius) {
+  Vector3 at(x, y, field.domain().max().z() + radius);
+  for (int step = 0; step < 10000; ++step) {
+    const double gap = field.value(at) - radius;
+    if (gap < 1e-4 * radius) break;
+    at.z() -= 0.5 * gap;
+    if (at.z() < field.domain().min().z()) throw Error("nothing lies below the marble's start");
+  }
+  return at;
+}
+
+/// Marbles over something that is open upwards.
+class MarbleScene : public Scene {
+ public:
+  MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request) {
+    TriangleMesh mesh = sceneMesh(request.ground, request.filesAreYUp, 0);
+    Field field = sceneField(console, mesh, request);
+    kinds_.emplace_back(std::move(mesh), std::move(field), request.samples, radius / 10);
+    stand(kinds_.front(), Eigen::Isometry3d::Identity());
+    shapes_.push_back(std::make_unique<btSphereShape>(radius));
+    bodySize_ = radius;
+    floor_ = ground().domain().min().z() - 10 * radius;
+  }
+
+ protected:
+  const Field& ground() const { return kinds_.front().field; }
+
+  void dropMarble(double seconds, const Vector3& at) {
+    constexpr double kDensity = 2500;
+    const double mass = kDensity * 4 / 3 * std::numbers::pi * std::pow(bodySize_, 3);
+    drop({seconds,
+          shapes_.front().get(),
+          mass,
+          shift(at),
+          {.friction = 0.4, .rollingFriction = 0.02 * bodySize_, .linearDamping = 0.05, .angularDamping = 0.1}});
+  }
+};
+
+/// A layer every so often, as many as have room side by side.
+std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request) {
+  struct Bowl final : MarbleScene {
+    Bowl(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.03) {
+      const Box box = ground().domain();
+      const double reach = 0.3 * box.sizes().head<2>().minCoeff(), apart = 2.6 * bodySize_;
+      const double height = box.max().z() + 2 * bodySize_;
+      Random random(from.seed);
+      std::size_t left = from.bodies;
+      for (int layer = 0; left > 0; ++layer)
+        for (double y = -reach; y <= reach && left > 0; y += apart)
+          for (double x = -reach; x <= reach && left > 0; x += apart) {
+            if (std::hypot(x, y) > reach) continue;
+            const Vector3 jitter(random.within(-1, 1), random.within(-1, 1), random.within(-1, 1));
+            dropMarble(0.2 * layer, Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) +
+                                        0.2 * bodySize_ * jitter);
+            --left;
+          }
+    }
+  };
+  return std::make_unique<Bowl>(console, request);
+}
+
+std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request) {
+  struct Helix final : MarbleScene {
+    Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
+      // where the shape's groove is at y = 0, next to the rim
+      for (std::size_t n = 0; n < from.bodies; ++n) dropMarble(2.0 * double(n), above(ground(), 0.75, 0, bodySize_));
+    }
+  };
+  return std::make_unique<Helix>(console, request);
+}
+
+/// Down the run, and out of it among the bodies that stand there.
+std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) {
+  struct Run final : MarbleScene {
+    Run(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.045) {
+      const double table = ground().domain().min().z() - 0.02;
+      floor_ = table - 1;
+      shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
+      world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
+      dropMarble(0, above(ground(), 0.92, -0.05, bodySize_));
+      constexpr double kPin = 0.2;
+      TriangleMesh mesh = sceneMesh(from.meshes.front(), from.filesAreYUp, kPin);
+      Field field = sceneField(to, mesh, from);
+      kinds_.emplace_back(std::move(mesh), std::move(field), from.samples, 0.01 * kPin);
+      const BodyKind& pin = kinds_.back();
+      const double stands = table - boundingBox(pin.mesh).min().z();
+      std::size_t left = from.bodies;
+      for (int row = 0; left > 0; ++row)
+        for (int i = 0; i <= row && left > 0; ++i, --left)
+          drop({0,
+                const_cast<physics::FieldShape*>(&pin.shape),
+                200 * pin.mass.volume,
+                shift({0.92 + 1.2 * kPin * (i - 0.5 * row), -0.6 - kPin * row, stands}) * pin.mass.meshFromInertia,
+                {.friction = 0.5}});
+    }
+  };
+  return std::make_unique<Run>(console, request);
+}
+
+/// Bodies of the given meshes, of size 1 where not said otherwise, and what they fall on.
+class PileScene : public Scene {
+ public:
+  explicit PileScene(const SceneRequest& request) : Scene(request), random_(request.seed) { floor_ = -1; }
+
+ protected:
+  const BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples) {
+    const double size = boundingBox(mesh).sizes().minCoeff();
+    Field field = sceneField(console, mesh, request);
+    return kinds_.emplace_back(std::move(mesh), std::move(field), samples, std::min(0.005, 0.02 * size));
+  }
+
+  std::vector<const BodyKind*> bodyKinds(const Console& console, const SceneRequest& request, double size) {
+    bodySize_ = size;
+    std::vector<const BodyKind*> made;
+    for (const std::string& name : request.meshes)
+      made.push_back(&addKind(console, request, sceneMesh(name, request.filesAreYUp, size), request.samples));
+    return made;
+  }
+
+  void addGround() {
+    shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0));
+    world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.6});
+  }
+
+  void dropBody(const BodyKind& kind, double seconds, const Vector3& at) {
+    constexpr double kDensity = 1000;
+    drop({seconds,
+          const_cast<physics::FieldShape*>(&kind.shape),
+          kDensity * kind.mass.volume,
+          shift(at) * Eigen::Isometry3d(random_.rotation()),
+          {.friction = 0.5, .linearDamping = 0.02, .angularDamping = 0.05}});
+  }
+
+  Random random_;
+};
+
+std::unique_ptr<Scene> poles(const Console& console, const SceneRequest& request) {
+  struct Poles final : PileScene {
+    Poles(const Console& to, const SceneRequest& from) : PileScene(from) {
+      constexpr int kSide = 8;
+      constexpr double kApart = 1.3, kHeight = 4, kWave = 1.2;
+      const auto kinds = bodyKinds(to, from, 1);
+      const BodyKind& pole = addKind(to, from, poleMesh(0.12, kHeight), 2000);
+      addGround();
+      const auto place = [](int i) { return kApart * (i - 0.5 * (kSide - 1)); };
+      for (int x = 0; x < kSide; ++x)
+        for (int y = 0; y < kSide; ++y) stand(pole, shift({place(x), place(y), kHeight / 2}));
+      for (std::size_t n = 0; n < from.bodies; ++n) {
+        const int x = int(n % kSide), y = int(n / kSide % kSide);
+        const std::size_t wave = n / (kSide * kSide);
+        const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), random_.within(-0.1, 0.1));
+        dropBody(*kinds[n % kinds.size()], kWave * double(wave), Vector3(place(x), place(y), kHeight + 2.5) + jitter);
+      }
+    }
+  };
+  return std::make_unique<Poles>(console, request);
+}
+
+std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& at, double size) {
+  const TriangleMesh mesh = shapes::mesh("torus,major=0.7,minor=0.3,segments=24,sides=12");
+  std::vector<btScalar> places;
+  for (const Vector3& x : mesh.vertices)
+    for (int axis = 0; axis < 3; ++axis) places.push_back(at[axis] + size / 2 * x[axis]);
+  std::vector<int> corners;
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t vertex : triangle) corners.push_back(int(vertex));
+  std::unique_ptr<btSoftBody> body(
+      btSoftBodyHelpers::CreateFromTriMesh(info, places.data(), corners.data(), int(mesh.triangles.size()), false));
+  body->generateBendingConstraints(2);
+  body->m_cfg.piterations = 4;
+  body->m_cfg.kMT = 0.05;  // towards its own form
+  body->m_cfg.kDF = 0.3;
+  body->m_cfg.kDP = 0.01;
+  body->getCollisionShape()->setMargin(0.02);
+  body->setTotalMass(20, true);
+  body->setPose(false, true);
+  return body;
+}
+
+std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request) {
+  struct Slope final : PileScene {
+    Slope(const Console& to, const SceneRequest& from) : PileScene(from) {
+      constexpr double kLength = 8, kWidth = 4, kThick = 0.4, kSize = 0.6;
+      const auto kinds = bodyKinds(to, from, kSize);
+      const BodyKind& slab = addKind(to, from, slabMesh({kLength, kWidth, kThick}), 4000);
+      const BodyKind& table = addKind(to, from, slabMesh({kLength, 2 * kWidth, kThick}), 4000);
+      const BodyKind& pole = addKind(to, from, poleMesh(0.12, 0.8), 1000);
+      floor_ = -4;
+      const Eigen::Isometry3d ramp =
+          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.45, Vector3::UnitY()));  // falls towards +x
+      stand(slab, ramp);
+      stand(table, shift({0.75 * kLength, 0, -0.3}));
+      for (int row = 0; row < 3; ++row)
+        for (int i = 0; i < 3 + row % 2; ++i)
+          stand(pole, ramp * shift({-1.0 + 1.6 * row, 1.1 * (i - 0.5 * (2 + row % 2)), 0.4 + kThick / 2}));
+      for (std::size_t n = 0; n < from.bodies; ++n) {
+        const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), 0);
+        const Vector3 at = ramp * Vector3(-3.2, 1.0 * (double(n % 3) - 1), 0.9) + jitter;
+        if (n % 4 == 3)
+          world_.add(softTorus(world_.softBodyInfo(), at + Vector3(0.8, 0, 0.4 + 0.3 * double(n / 4)), kSize));
+        else
+          dropBody(*kinds[n % kinds.size()], 0.5 * double(n / 3), at);
+      }
+    }
+  };
+  return std::make_unique<Slope>(console, request);
+}
+
+std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request) {
+  struct Cloth final : PileScene {
+    Cloth(const Console& to, const SceneRequest& from) : PileScene(from) {
+      constexpr double kMargin = 0.01, kSide = 1.6;
+      const TriangleMesh mesh = sceneMesh(from.ground, from.filesAreYUp, 1);
+      const double stands = -boundingBox(mesh).min().z();
+      const double top = boundingBox(mesh).sizes().z();
+      const BodyKind& body = addKind(to, from, mesh, from.samples);
+      const BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
+      stand(body, shift({0, 0, stands}));
+      stand(table, shift({0, 0, -0.1}));
+      const int side = std::max(2, int(std::ceil(std::sqrt(double(from.nodes)))));
+      const auto corner = [&](double x, double y) { return btVector3(x * kSide / 2, y * kSide / 2, top + 0.05); };
+      std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(
+          world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
+      sheet->m_cfg.piterations = 8;
+      sheet->m_cfg.kDF = 0.6;
+      sheet->m_cfg.kDP = 0.05;
+      sheet->getCollisionShape()->setMargin(kMargin);
+      sheet->setTotalMass(1, false);
+      bodySize_ = kMargin;
+      world_.add(std::move(sheet));
+    }
+  };
+  return std::make_unique<Cloth>(console, request);
+}
+
+}  // namespace
+
+std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request) {
+  using Maker = std::unique_ptr<Scene> (*)(const Console&, const SceneRequest&);
+  static const std::map<std::string, Maker> makers = {{"bowl", bowl},   {"helix", helix}, {"run", run},
+                                                      {"poles", poles}, {"slope", slope}, {"cloth", cloth}};
+  return makers.at(name)(console, request);
+}
+
+}  // namespace hpsdf::app

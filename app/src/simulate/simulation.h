@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "session.h"
+#include "simulate/scene_request.h"
+
+namespace hpsdf::app {
+
+/// Of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
+struct SimulationFigures {
+  std::size_t bodies = 0, nodes = 0;  ///< that move
+  std::size_t lost = 0;               ///< at the end
+  std::uint64_t steps = 0;
+  double simulated = 0;  ///< seconds
+  double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
+  double penetrating = 0;  ///< sum over the steps
+  std::size_t mostPenetrating = 0, lastPenetrating = 0;
+  double size = 0;  ///< what depths are compared with: the radius of a marble, the size of a body, a cloth's margin
+  double deepest = 0, sumOfDeepest = 0, deepestAtEnd = 0;  ///< the last of the simulation's last second
+  std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end
+};
+
+/// Runs a scene. Throws `Error` for what cannot be made or simulated, and in a program that was built without Bullet;
+/// `Cancelled` after Ctrl-C.
+SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
+                           double seconds, int threads);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,205 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "building.h"
+#include "commands.h"
+#include "long_work.h"
+#include "session.h"
+#include "simulate/scene_request.h"
+#include "simulate/simulation.h"
+#include "summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+const SceneKind& kindOf(const Arguments& arguments) {
+  return *std::ranges::find(scenes(), arguments.text("scene"), &SceneKind::name);
+}
+
+/// What a scene has no use for is refused, rather than ignored.
+void refuse(const Arguments& arguments, const std::string& name, bool takes) {
+  if (arguments.given(name) && !takes)
+    throw Error(fmt::format("{}: is not for the scene {}", name, arguments.text("scene")));
+}
+
+SceneRequest requestOf(const Arguments& arguments) {
+  SceneRequest request = kindOf(arguments).defaults;
+  refuse(arguments, "bodies", request.bodies > 0);
+  refuse(arguments, "nodes", request.nodes > 0);
+  refuse(arguments, "ground", !request.ground.empty());
+  refuse(arguments, "body", !request.meshes.empty());
+  if (arguments.given("bodies")) request.bodies = std::size_t(arguments.whole("bodies"));
+  if (arguments.given("nodes")) request.nodes = std::size_t(arguments.whole("nodes"));
+  if (arguments.given("samples")) request.samples = std::size_t(arguments.whole("samples"));
+  if (arguments.given("ground")) request.ground = arguments.text("ground");
+  if (arguments.given("body")) request.meshes = arguments.texts("body");
+  if (arguments.has("cache")) request.cache = arguments.text("cache");
+  request.filesAreYUp = arguments.text("up") == "y";
+  request.targetError = arguments.number("target-error");
+  request.seed = std::uint64_t(arguments.whole("seed"));
+  request.step = 1 / arguments.number("rate");
+  request.iterations = int(arguments.whole("iterations"));
+  return request;
+}
+
+Json jsonOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
+  const double steps = double(figures.steps);
+  return {
+      {"scene", scene},
+      {"bodies", figures.bodies},
+      {"nodes", figures.nodes},
+      {"lost", figures.lost},
+      {"simulated_seconds", figures.simulated},
+      {"step_seconds", request.step},
+      {"steps", figures.steps},
+      {"contacts",
+       {{"mean", figures.penetrating / steps}, {"max", figures.mostPenetrating}, {"last", figures.lastPenetrating}}},
+      {"penetration",
+       {{"size", figures.size},
+        {"max", figures.deepest},
+        {"mean_of_deepest", figures.sumOfDeepest / steps},
+        {"last_second", figures.deepestAtEnd}}},
+      {"milliseconds_a_step",
+       {{"queries", 1e3 * figures.querySeconds / steps},
+        {"solver", 1e3 * figures.solverSeconds / steps},
+        {"rest", 1e3 * (figures.seconds - figures.querySeconds - figures.solverSeconds) / steps},
+        {"all", 1e3 * figures.seconds / steps},
+        {"longest_queries", 1e3 * figures.longestQuerySeconds}}},
+      {"set_up_seconds", figures.setUpSeconds},
+      {"state", fmt::format("{:016x}", figures.state)}};
+}
+
+std::string textOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
+  const double steps = double(figures.steps);
+  const auto milliseconds = [&](double seconds) { return fmt::format("{:.2f} ms", 1e3 * seconds / steps); };
+  std::string text = fmt::format("{}: {} bodies", scene, grouped(figures.bodies));
+  if (figures.nodes > 0) text += fmt::format(", {} nodes of soft bodies", grouped(figures.nodes));
+  text += fmt::format(", {:.4g} s in {} steps of 1/{:.4g} s\n", figures.simulated, grouped(figures.steps),
+                      1 / request.step);
+  text += fmt::format("  contacts a step     {:.0f} in the mean, {} at most, {} at the end\n",
+                      figures.penetrating / steps, grouped(figures.mostPenetrating), grouped(figures.lastPenetrating));
+  text += fmt::format("  deepest             {} ({:.2g} % of {}), in the last second {} ({:.2g} %)\n",
+                      shortNumber(figures.deepest), 100 * figures.deepest / figures.size, shortNumber(figures.size),
+                      shortNumber(figures.deepestAtEnd), 100 * figures.deepestAtEnd / figures.size);
+  text += fmt::format("  lost bodies         {}\n", grouped(figures.lost));
+  text += fmt::format("  a step takes        {}: queries {}, solver {}, rest {}\n", milliseconds(figures.seconds),
+                      milliseconds(figures.querySeconds), milliseconds(figures.solverSeconds),
+                      milliseconds(figures.seconds - figures.querySeconds - figures.solverSeconds));
+  text += fmt::format("  state at the end    {:016x}\n", figures.state);
+  return text;
+}
+
+void runSimulate(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const SceneRequest request = requestOf(arguments);
+  const double seconds = arguments.given("seconds") ? arguments.number("seconds") : kindOf(arguments).seconds;
+  const std::string scene = arguments.text("scene");
+  const SimulationFigures figures = simulate(console, scene, request, seconds, int(arguments.whole("threads")));
+  if (session.wantsJson(arguments)) return printJson(console.out, jsonOf(scene, request, figures));
+  console.out << textOf(scene, request, figures);
+}
+
+Command simulateCommand() {
+  std::string kinds;
+  std::vector<std::string> names;
+  for (const SceneKind& kind : scenes()) {
+    names.push_back(kind.name);
+    kinds +=
+        fmt::format("{}: {}{}; {:g} s.\n", kind.name, kind.help,
+                    kind.defaults.bodies > 1 ? fmt::format(", {} by default", kind.defaults.bodies) : "", kind.seconds);
+  }
+  return {
+      .name = "simulate",
+      .summary = "Let things fall onto each other, their fields as colliders: the paper's scenes, by Bullet.",
+      .help = "SCENE is one of\n" + kinds +
+              "\n"
+              "Each body's surface is sampled, and the samples are looked up in the fields of the bodies around, which "
+              "tell depth and direction; Bullet's solver does the rest. Bodies have a size of 1 or so, gravity is "
+              "9.81. Tells how many samples lay in other bodies, how deep, and what a step took. The same scene, "
+              "settings and seed end in the same state, whatever the number of threads.\n"
+              "\n"
+              "The paper's meshes are not part of the program: give your own with --body and --ground.",
+      .examples = {"hpsdf simulate bowl", "hpsdf simulate poles --body bunny.obj --body dragon.obj --cache fields",
+                   "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json"},
+      .parameters = {{.name = "scene",
+                      .type = ParameterType::choice,
+                      .help = "Which scene.",
+                      .choices = names,
+                      .positional = true,
+                      .need = Need::always},
+                     {.name = "seconds",
+                      .type = ParameterType::number,
+                      .help = "How long, in simulated time; each scene has its own default.",
+                      .unit = "seconds",
+                      .minimum = 0,
+                      .maximum = 3600,
+                      .minimumExcluded = true},
+                     {.name = "bodies",
+                      .type = ParameterType::wholeNumber,
+                      .help = "How many bodies move.",
+                      .minimum = 1,
+                      .maximum = 20000},
+                     {.name = "nodes",
+                      .type = ParameterType::wholeNumber,
+                      .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
+                      .minimum = 4,
+                      .maximum = 1e6},
+                     {.name = "samples",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Points on the surface of each kind of body.",
+                      .minimum = 1,
+                      .maximum = 1e6},
+                     {.name = "body",
+                      .type = ParameterType::text,
+                      .help =
+                          "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope.",
+                      .valueName = "MESH",
+                      .repeatable = true},
+                     {.name = "ground",
+                      .type = ParameterType::text,
+                      .help = "The mesh file or shape that things fall on. For bowl, helix, run and cloth.",
+                      .valueName = "MESH"},
+                     {.name = "up",
+                      .type = ParameterType::choice,
+                      .help = "The axis that points up in mesh files. In shapes it is z.",
+                      .defaultText = "y",
+                      .choices = {"y", "z"}},
+                     {.name = "target-error",
+                      .type = ParameterType::number,
+                      .help = "τ of the fields, as 'build' has it.",
+                      .defaultText = "1e-6",
+                      .minimum = 0,
+                      .minimumExcluded = true},
+                     {.name = "cache",
+                      .type = ParameterType::outputPath,
+                      .help = "A folder in which fields are kept, and taken from the next time.",
+                      .valueName = "FOLDER"},
+                     {.name = "rate",
+                      .type = ParameterType::number,
+                      .help = "Steps a second. Fast or small things need more.",
+                      .defaultText = "240",
+                      .minimum = 1,
+                      .maximum = 100000},
+                     {.name = "iterations",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Of Bullet's solver, in each step.",
+                      .defaultText = "20",
+                      .minimum = 1,
+                      .maximum = 1000},
+                     {.name = "seed",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Which random places and directions bodies start with.",
+                      .defaultText = "1",
+                      .minimum = 0,
+                      .maximum = 1e9},
+                     threadsParameter("The simulation is")},
+      .action = runSimulate};
+}
+
+}  // namespace
+
+void addSimulateCommand(Registry& registry) { registry.add(simulateCommand()); }
+
+}  // namespace hpsdf::app

@@ -1,0 +1,73 @@
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "field_algorithms.h"
+#include "hpsdf/physics/bullet.h"
+
+namespace hpsdf::physics {
+
+struct FieldDispatcher::Algorithms {
+  struct Prepared {
+    FieldAlgorithm* algorithm;
+    const btCollisionObject *first, *second;
+  };
+
+  CreateFieldAlgorithm<RigidFieldAlgorithm> rigid;
+  CreateFieldAlgorithm<SoftFieldAlgorithm> soft;
+  std::vector<Prepared> prepared;  ///< room that is used again
+};
+
+FieldDispatcher::FieldDispatcher(btCollisionConfiguration* configuration)
+    : btCollisionDispatcher(configuration), algorithms_(new Algorithms) {
+  const auto both = [this](int other, btCollisionAlgorithmCreateFunc& create) {
+    registerCollisionCreateFunc(FAST_CONCAVE_MESH_PROXYTYPE, other, &create);
+    registerCollisionCreateFunc(other, FAST_CONCAVE_MESH_PROXYTYPE, &create);
+  };
+  for (const int other : {FAST_CONCAVE_MESH_PROXYTYPE, SPHERE_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE})
+    both(other, algorithms_->rigid);
+  both(SOFTBODY_SHAPE_PROXYTYPE, algorithms_->soft);
+}
+
+FieldDispatcher::~FieldDispatcher() { delete algorithms_; }
+
+void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
+                                                btDispatcher* dispatcher) {
+  const auto start = std::chrono::steady_clock::now();
+  figures_ = {};
+  auto& prepared = algorithms_->prepared;
+  prepared.clear();
+  btBroadphasePairArray& array = pairs->getOverlappingPairArray();
+  for (int i = 0; i < array.size(); ++i) {
+    btBroadphasePair& pair = array[i];
+    const auto* first = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
+    const auto* second = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+    if (!needsCollision(first, second)) continue;
+    if (pair.m_algorithm == nullptr) {
+      const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
+                                         -1);
+      const btCollisionObjectWrapper other(nullptr, second->getCollisionShape(), second, second->getWorldTransform(),
+                                           -1, -1);
+      pair.m_algorithm = findAlgorithm(&one, &other, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+    }
+    if (auto* algorithm = dynamic_cast<FieldAlgorithm*>(pair.m_algorithm))
+      prepared.push_back({algorithm, first, second});
+  }
+  tbb::parallel_for(std::size_t{0}, prepared.size(),
+                    [&](std::size_t i) { prepared[i].algorithm->prepare(*prepared[i].first, *prepared[i].second); });
+  figures_.querySeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  figures_.pairs = prepared.size();
+  for (const auto& one : prepared) {
+    const Findings& found = one.algorithm->findings();
+    figures_.penetrating += found.penetrating;
+    figures_.contacts += found.contacts;
+    figures_.deepest = std::max(figures_.deepest, found.deepest);
+  }
+  btCollisionDispatcher::dispatchAllCollisionPairs(pairs, info, dispatcher);
+}
+
+}  // namespace hpsdf::physics

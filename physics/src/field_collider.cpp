@@ -1,0 +1,340 @@
+#include "hpsdf/physics/field_collider.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace hpsdf::physics {
+namespace {
+
+constexpr std::size_t kMostCells = std::size_t{1} << 20;
+constexpr double kUnits = 32;        // to a cell's shortest edge: 16 bits tell of two thousand cells
+constexpr double kLoose = 0.05;      // of that edge: what bounds of polynomials may lose
+constexpr double kRounding = 1e-12;  // in the size of the numbers at hand
+
+/// L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i, up to a degree; what is beyond is not set.
+using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
+
+/// By the recurrences of L_i and of t·L_a.
+Rows legendreOfPart(double shift, double scale, int degree) {
+  Rows row;
+  row[0][0] = 1;
+  for (int i = 0; i < degree; ++i)
+    for (int a = 0; a <= i + 1; ++a) {
+      double product = 0;  // of (shift + scale·t)·L_i
+      if (a <= i) product += shift * row[i][a];
+      if (a > 0) product += scale * row[i][a - 1] * a / (2 * a - 1);
+      if (a + 1 <= i) product += scale * row[i][a + 1] * (a + 1) / (2 * a + 3);
+      row[i + 1][a] = ((2 * i + 1) * product - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
+    }
+  return row;
+}
+
+/// A polynomial over a box, which is -1 to 1 in its coordinates.
+struct Piece {
+  std::array<double, 3> lower, upper;  ///< in the grid's cells
+  int degree;
+  std::vector<double> c;  ///< a cube of (degree + 1)³, z fastest; those of a greater total degree are 0
+  double rest = 0;        ///< what terms that were left out amount to, at most
+
+  double width(int axis) const { return upper[axis] - lower[axis]; }
+  double at(int i, int j, int k) const { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
+  double& at(int i, int j, int k) { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
+
+  /// Calls f(i, j, k) for all of a total degree in a range.
+  template <typename F>
+  static void forEachTerm(int least, int most, const F& f) {
+    for (int i = 0; i <= most; ++i)
+      for (int j = 0; i + j <= most; ++j)
+        for (int k = std::max(0, least - i - j); i + j + k <= most; ++k) f(i, j, k);
+  }
+
+  /// Over a part of one axis, of which the rows are.
+  void restrict(int axis, const Rows& rows) {
+    for (int a = 0; a <= degree; ++a)
+      for (int b = 0; a + b <= degree; ++b) {
+        const auto along = [&](int i) -> double& {
+          return axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i);
+        };
+        for (int to = 0; to <= degree - a - b; ++to) {  // upwards: the higher ones are still those of the whole
+          double sum = 0;
+          for (int from = to; from <= degree - a - b; ++from) sum += rows[from][to] * along(from);
+          along(to) = sum;
+        }
+      }
+  }
+
+  /// Leaves the highest degrees out, as many as come to no more than `tolerance` together.
+  void trim(double tolerance) {
+    int kept = degree;
+    double sum = 0, leftOut = 0;
+    for (; kept > 1; --kept) {
+      forEachTerm(kept, kept, [&](int i, int j, int k) { sum += std::abs(at(i, j, k)); });
+      if (sum > tolerance) break;
+      leftOut = sum;
+    }
+    if (kept == degree) return;
+    rest += leftOut;
+    Piece smaller{lower, upper, kept, std::vector<double>(std::size_t(kept + 1) * (kept + 1) * (kept + 1), 0.0), rest};
+    forEachTerm(0, kept, [&](int i, int j, int k) { smaller.at(i, j, k) = at(i, j, k); });
+    *this = std::move(smaller);
+  }
+
+  /// What all terms but the constant and the linear ones amount to, at most, roundings included.
+  double bend() const {
+    double high = rest, low = 0;
+    forEachTerm(0, 1, [&](int i, int j, int k) { low += std::abs(at(i, j, k)); });
+    forEachTerm(2, degree, [&](int i, int j, int k) { high += std::abs(at(i, j, k)); });
+    return high + kRounding * (high + low);
+  }
+};
+
+/// Lower bounds of the field in each cell of a grid.
+class LowerBounds {
+ public:
+  LowerBounds(const Field& field, int depth, const std::array<std::int64_t, 3>& size, double tolerance)
+      : field_(field),
+        depth_(depth),
+        size_(size),
+        tolerance_(tolerance),
+        least_(std::size_t(size[0] * size[1] * size[2]), std::numeric_limits<double>::infinity()) {}
+
+  std::vector<double> find() {
+    field_.forEachCell([&](const Cell& leaf) { lower(pieceOf(leaf)); });
+    return std::move(least_);
+  }
+
+ private:
+  /// A leaf's polynomial where it has a say. A blended field is a mean of those that do.
+  Piece pieceOf(const Cell& leaf) const {
+    const FieldData& data = field_.data();
+    const GridFrame& frame = field_.directory().frame;
+    const std::uint64_t bits = data.nodes[leaf.id];
+    const int degree = node::degree(bits);
+    Piece piece{{}, {}, degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
+    std::visit(
+        [&](const auto& coefficients) {
+          std::size_t next = node::offset(bits);
+          Piece::forEachTerm(0, degree, [&](int i, int j, int k) { piece.at(i, j, k) = coefficients[next++]; });
+        },
+        data.coefficients);
+    const double edge = std::ldexp(1.0, depth_ - leaf.depth);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double from = leaf.box.min()[axis] - frame.lower[axis];
+      const double place = std::round(std::ldexp(from / frame.size[axis] * frame.cells[axis], leaf.depth));
+      piece.lower[axis] = place * edge;
+      piece.upper[axis] = piece.lower[axis] + edge;
+      if (data.blend == 0) continue;
+      const auto beyond = [&](bool upper) {
+        const int depth = reach::depth(field_.directory().reaches[leaf.id], axis, upper);
+        return depth == reach::kWall ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
+      };
+      const double below = beyond(false), above = beyond(true);
+      piece.lower[axis] -= below;
+      piece.upper[axis] += above;
+      piece.restrict(axis, legendreOfPart((above - below) / edge, piece.width(axis) / edge, degree));
+    }
+    return piece;
+  }
+
+  /// In halves, until the linear polynomial tells nearly all.
+  void lower(Piece piece) {
+    piece.trim(tolerance_ / 8);
+    const double bend = piece.bend();
+    const auto widths = {piece.width(0), piece.width(1), piece.width(2)};
+    const auto widest = std::ranges::max_element(widths);
+    if (bend <= tolerance_ || *widest <= 1) return fill(piece, bend);
+    const auto axis = static_cast<int>(widest - widths.begin());
+    const double middle = (piece.lower[axis] + piece.upper[axis]) / 2;
+    Piece upper = piece;
+    upper.lower[axis] = middle;
+    upper.restrict(axis, upperHalf_);
+    lower(std::move(upper));
+    piece.upper[axis] = middle;
+    piece.restrict(axis, lowerHalf_);
+    lower(std::move(piece));
+  }
+
+  void fill(const Piece& piece, double bend) {
+    // of the linear term along each axis, its least over each cell that the piece reaches
+    std::array<std::int64_t, 3> first, count;
+    std::array<double, 3> slope{};
+    if (piece.degree > 0) slope = {piece.at(1, 0, 0), piece.at(0, 1, 0), piece.at(0, 0, 1)};
+    for (int axis = 0; axis < 3; ++axis) {
+      first[axis] = std::max<std::int64_t>(0, static_cast<std::int64_t>(std::floor(piece.lower[axis])));
+      const auto last = std::min(size_[axis], static_cast<std::int64_t>(std::ceil(piece.upper[axis])));
+      count[axis] = last - first[axis];
+      linear_[axis].resize(static_cast<std::size_t>(std::max<std::int64_t>(0, count[axis])));
+      for (std::int64_t i = 0; i < count[axis]; ++i) {
+        const auto local = [&](double x) {
+          const double inside = std::clamp(x, piece.lower[axis], piece.upper[axis]);
+          return 2 * (inside - piece.lower[axis]) / piece.width(axis) - 1;
+        };
+        const auto cell = static_cast<double>(first[axis] + i);
+        linear_[axis][i] = std::min(slope[axis] * local(cell), slope[axis] * local(cell + 1));
+      }
+    }
+    for (std::int64_t z = 0; z < count[2]; ++z)
+      for (std::int64_t y = 0; y < count[1]; ++y) {
+        double* row = &least_[((first[2] + z) * size_[1] + first[1] + y) * size_[0] + first[0]];
+        const double base = piece.at(0, 0, 0) - bend + linear_[1][y] + linear_[2][z];
+        for (std::int64_t x = 0; x < count[0]; ++x) row[x] = std::min(row[x], base + linear_[0][x]);
+      }
+  }
+
+  const Field& field_;
+  int depth_;
+  std::array<std::int64_t, 3> size_;
+  double tolerance_;
+  std::vector<double> least_;
+  std::array<std::vector<double>, 3> linear_;
+  Rows lowerHalf_ = legendreOfPart(-0.5, 0.5, kMaxDegree), upperHalf_ = legendreOfPart(0.5, 0.5, kMaxDegree);
+};
+
+using Place = std::array<std::int64_t, 3>;
+
+Place placeOf(std::int64_t n, const std::array<std::int64_t, 3>& size) {
+  return {n % size[0], n / size[0] % size[1], n / size[0] / size[1]};
+}
+
+/// Each cell's least over itself and those around it.
+std::vector<double> leastAround(std::vector<double> values, const std::array<std::int64_t, 3>& size) {
+  std::int64_t stride = 1;
+  for (int axis = 0; axis < 3; stride *= size[axis++]) {
+    std::vector<double> least = values;
+    for (std::int64_t n = 0; n < std::ssize(values); ++n) {
+      const std::int64_t place = n / stride % size[axis];
+      if (place > 0) least[n] = std::min(least[n], values[n - stride]);
+      if (place + 1 < size[axis]) least[n] = std::min(least[n], values[n + stride]);
+    }
+    values = std::move(least);
+  }
+  return values;
+}
+
+/// A way by steps to neighbours is longer than the straight one, at most by this factor. Within the steps along a,
+/// along a and b, and along all, a way's length is a linear function of where it leads; its gradient's length is the
+/// factor.
+double worstDetour(const Vector3& cell) {
+  double worst = 1;
+  std::array<int, 3> order = {0, 1, 2};
+  do {
+    const double a = cell[order[0]], b = cell[order[1]], c = cell[order[2]];
+    const double flat = std::hypot(a, b), whole = std::hypot(flat, c);
+    worst = std::max(worst, Vector3(1, (flat - a) / b, (whole - flat) / c).norm());
+  } while (std::next_permutation(order.begin(), order.end()));
+  return worst;
+}
+
+/// The least of all cells' values and the ways there, between centres, or a little less: ways go by steps that are
+/// shortened so that none is too long (Borgefors 1986). One pass there and one back find the shortest ones.
+void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
+  struct Step {
+    Place by;
+    std::int64_t offset;
+    double length;
+  };
+  const double shorten = (1 - kRounding) / worstDetour(cell);
+  std::vector<Step> back;  // to those that come before
+  for (std::int64_t z = -1; z <= 0; ++z)
+    for (std::int64_t y = -1; y <= 1; ++y)
+      for (std::int64_t x = -1; x <= 1; ++x) {
+        const std::int64_t offset = (z * size[1] + y) * size[0] + x;
+        const bool before = z < 0 || (z == 0 && (y < 0 || (y == 0 && x < 0)));
+        if (before)
+          back.push_back(
+              {{x, y, z}, offset, shorten * cell.cwiseProduct(Vector3(double(x), double(y), double(z))).norm()});
+      }
+  const auto visit = [&](std::int64_t n, int sign) {
+    const Place at = placeOf(n, size);
+    for (const Step& step : back) {
+      bool within = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::int64_t there = at[axis] + sign * step.by[axis];
+        within &= there >= 0 && there < size[axis];
+      }
+      if (within) values[n] = std::min(values[n], values[n + sign * step.offset] + step.length);
+    }
+  };
+  for (std::int64_t n = 0; n < std::ssize(values); ++n) visit(n, 1);
+  for (std::int64_t n = std::ssize(values); n-- > 0;) visit(n, -1);
+}
+
+/// Of the cells at the domain's sides.
+double leastAtSides(const std::vector<double>& values, const std::array<std::int64_t, 3>& size) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::int64_t n = 0; n < std::ssize(values); ++n) {
+    const Place at = placeOf(n, size);
+    for (int axis = 0; axis < 3; ++axis)
+      if (at[axis] == 0 || at[axis] + 1 == size[axis]) least = std::min(least, values[n]);
+  }
+  return least;
+}
+
+std::uint16_t roundedDown(double value, double unit) {
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+  return static_cast<std::uint16_t>(std::min(value / unit, kMost));
+}
+
+}  // namespace
+
+FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
+  const GridFrame& frame = field.directory().frame;
+  const std::size_t base = std::size_t(field.grid()[0]) * field.grid()[1] * field.grid()[2];
+  while (depth_ < kMaxDepth && base << (3 * (depth_ + 1)) <= kMostCells) ++depth_;
+  Vector3 cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    size_[axis] = std::int64_t{field.grid()[axis]} << depth_;
+    cell[axis] = frame.size[axis] / double(size_[axis]);
+  }
+  unit_ = cell.minCoeff() / kUnits;
+  std::vector<double> within = LowerBounds(field, depth_, size_, kLoose * cell.minCoeff()).find();
+  wall_ = leastAtSides(within, size_);
+  for (double& bound : within) bound = std::max(bound, 0.0);
+  // two cells are as far apart as the one's centre and that of the nearest around the other
+  std::vector<double> around = leastAround(within, size_);
+  spread(around, size_, cell);
+  if (wall_ > 0) wall_ = leastAtSides(around, size_);
+  cells_.resize(within.size());
+  for (std::size_t n = 0; n < cells_.size(); ++n)
+    cells_[n] = {roundedDown(within[n], unit_), roundedDown(around[n], unit_)};
+}
+
+const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const {
+  const GridFrame& frame = field_->directory().frame;
+  const double scale = double(std::uint32_t{1} << depth_);
+  std::array<std::int64_t, 3> at;
+  for (int axis = 0; axis < 3; ++axis) {
+    // as the field finds its own cells, to the bit
+    const double coordinate = (inDomain[axis] - frame.lower[axis]) / frame.size[axis] * frame.cells[axis];
+    at[axis] = std::min(static_cast<std::int64_t>(coordinate * scale), size_[axis] - 1);
+  }
+  return cells_[(at[2] * size_[1] + at[1]) * size_[0] + at[0]];
+}
+
+// Outside the domain the field is f(q) + |x - q|, q being the domain's closest point to x. At its sides f is `wall_` or
+// more.
+
+double FieldCollider::lowerBound(const Vector3& x) const {
+  const Box& domain = field_->domain();
+  const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());
+  const double bound = cellAt(closest).within * unit_;
+  if (closest == x) return bound;
+  const double beyond = (x - closest).norm();
+  return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
+}
+
+/// What holds around q holds around x: |q - q_y| ≤ |x - y| for any y and its own closest point. And y is either
+/// outside, and no more than |x - y| nearer to the domain than x, or behind its sides: beyond reach if `wall_` is
+/// negative, and if not, that is what holds around them.
+double FieldCollider::lowerBoundAround(const Vector3& x) const {
+  const Box& domain = field_->domain();
+  const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());
+  const double bound = cellAt(closest).around * unit_;
+  return closest == x ? bound : std::max(bound, wall_ + (x - closest).norm());
+}
+
+}  // namespace hpsdf::physics

@@ -1,0 +1,198 @@
+// Fields as shapes of Bullet.
+
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletSoftBody/btSoftBody.h>
+#include <BulletSoftBody/btSoftBodyHelpers.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <cmath>
+#include <limits>
+
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/physics/world.h"
+#include "hpsdf/shapes.h"
+#include "spread.h"
+
+namespace hpsdf::physics {
+namespace {
+
+/// A mesh with its field, samples and shape.
+struct Kind {
+  explicit Kind(const std::string& spec, std::size_t count = 2000) : Kind(shapes::mesh(spec), nullptr, count) {}
+
+  /// With another field than the mesh's.
+  Kind(TriangleMesh of, const std::function<double(const Vector3&)>& distance, std::size_t count)
+      : mesh(std::move(of)),
+        field(distance ? build(distance, domainAround(mesh), {.targetError = 1e-9})
+                       : build(ExactDistance(mesh), domainAround(mesh), {.targetError = 1e-7})),
+        collider(field),
+        samples(sampleSurface(mesh, {.count = count})),
+        mass(massProperties(mesh)),
+        shape(collider, samples, mass, 0.005) {}
+
+  TriangleMesh mesh;
+  Field field;
+  FieldCollider collider;
+  SurfaceSamples samples;
+  MassProperties mass;
+  FieldShape shape;
+};
+
+/// A hollow of radius 1 around the origin, of which the lower half matters: as smooth as a field can be.
+Kind& hollow() {
+  static Kind kind(
+      shapes::mesh("box,width=2.4,height=2.4,depth=2.4"), [](const Vector3& x) { return 1 - x.norm(); }, 10);
+  return kind;
+}
+
+Eigen::Isometry3d at(const Vector3& place) { return Eigen::Isometry3d(Eigen::Translation3d(place)); }
+
+double energy(const World& world, std::size_t number) {
+  const btRigidBody& body = world.body(number);
+  const btVector3 v = body.getLinearVelocity(), w = body.getAngularVelocity();
+  const btVector3 inertia = body.getLocalInertia();  // of a sphere
+  return 0.5 * body.getMass() * v.length2() + 0.5 * inertia.x() * w.length2() +
+         9.81 * body.getMass() * body.getWorldTransform().getOrigin().z();
+}
+
+TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
+  TriangleMesh mesh = shapes::mesh("box,width=2,height=1,depth=0.5");
+  const Eigen::Matrix3d turn = Eigen::Quaterniond(0.4, 0.3, -0.7, 0.5).normalized().toRotationMatrix();
+  for (Vector3& x : mesh.vertices) x = turn * x + Vector3(1000, 2000, -3000);
+  const MassProperties mass = massProperties(mesh);
+  EXPECT_NEAR(mass.volume, 1, 1e-9);
+  EXPECT_NEAR((mass.meshFromInertia.translation() - Vector3(1000, 2000, -3000)).norm(), 0, 1e-9);
+  EXPECT_NEAR((mass.inertia - Vector3(2 * 2 + 1, 2 * 2 + 0.25, 1 + 0.25) / 12).cwiseAbs().maxCoeff(), 0, 1e-9);
+  EXPECT_NEAR(mass.meshFromInertia.linear().determinant(), 1, 1e-12);
+  EXPECT_THROW(massProperties(TriangleMesh{}), Error);
+}
+
+TEST(Spread, KeepsTheDeepestAndWhatSurroundsIt) {
+  std::vector<BodyContact> contacts;
+  for (int x = 0; x < 10; ++x)
+    for (int y = 0; y < 10; ++y)
+      contacts.push_back({Vector3(x, y, 0), Vector3::UnitZ(), x == 4 && y == 5 ? -0.2 : -0.1});
+  spread(5, 1, contacts);
+  ASSERT_EQ(contacts.size(), 5u);
+  EXPECT_EQ(contacts[0].onSecond, Vector3(4, 5, 0));
+  for (const Vector3& corner : {Vector3(0, 0, 0), Vector3(9, 0, 0), Vector3(0, 9, 0), Vector3(9, 9, 0)})
+    EXPECT_TRUE(std::ranges::any_of(contacts, [&](const BodyContact& c) { return c.onSecond == corner; })) << corner;
+}
+
+TEST(BulletField, AMarbleInASmoothBowlGainsNoEnergyAndComesToRestInTheMiddle) {
+  constexpr double kRadius = 0.05;
+  btSphereShape sphere(kRadius);
+  World world;
+  world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
+  const std::size_t marble =
+      world.add(sphere, 1, at({(1 - kRadius) * std::sin(0.7), 0, -(1 - kRadius) * std::cos(0.7)}),
+                {.friction = 0.5, .linearDamping = 0.5, .angularDamping = 0.5});
+  double before = energy(world, marble);
+  const double start = before;
+  double farthest = 0;
+  for (int step = 0; step < 240 * 20; ++step) {
+    world.step();
+    const double now = energy(world, marble);
+    ASSERT_LE(now, before + 1e-4 * 9.81) << "at step " << step;
+    before = std::min(before, now);
+    if (step > 200) farthest = std::max(farthest, -world.worldFromBody(marble).translation().x());
+    EXPECT_LT(world.figures().dispatch.deepest, 0.1 * kRadius);
+  }
+  EXPECT_GT(farthest, 0.2) << "it rolls up the other side";
+  EXPECT_LT(before, start - 1);
+  const Vector3 end = world.worldFromBody(marble).translation();
+  EXPECT_NEAR(end.x(), 0, 0.01);
+  EXPECT_NEAR(end.y(), 0, 0.01);
+  EXPECT_NEAR(end.z(), -(1 - kRadius), 0.02 * kRadius);
+}
+
+TEST(BulletField, ABodyComesToRestOnAPlaneAndOnAnother) {
+  Kind box("box,width=1,height=0.8,depth=0.4"), slab("box,width=4,height=4,depth=0.5");
+  btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
+  World world;
+  world.add(plane, 0, at(Vector3::Zero()));
+  world.add(slab.shape, 0, at({10, 0, 0.25}) * slab.mass.meshFromInertia);
+  const std::size_t onPlane = world.add(box.shape, 1, at({0, 0, 0.5}) * box.mass.meshFromInertia);
+  const std::size_t onSlab = world.add(box.shape, 1, at({10, 0, 1}) * box.mass.meshFromInertia);
+  for (int step = 0; step < 720; ++step) world.step();
+  EXPECT_NEAR(world.worldFromBody(onPlane).translation().z(), 0.2, 0.005);
+  EXPECT_NEAR(world.worldFromBody(onSlab).translation().z(), 0.7, 0.005);
+  EXPECT_LT(world.body(onPlane).getLinearVelocity().length(), 0.01);
+  EXPECT_LT(world.body(onSlab).getLinearVelocity().length(), 0.01);
+}
+
+TEST(BulletField, ThreadsAndRepetitionsChangeNothing) {
+  Kind gear("gear"), slab("box,width=6,height=6,depth=0.5");
+  const auto end = [&](int threads) {
+    tbb::task_arena arena(threads);
+    return arena.execute([&] {
+      World world;
+      world.add(slab.shape, 0, slab.mass.meshFromInertia);
+      for (int n = 0; n < 5; ++n)
+        world.add(gear.shape, 1, at({0.2 * n, 0.1 * n * n, 1 + 0.7 * n}) * Eigen::AngleAxisd(n, Vector3::UnitX()));
+      for (int step = 0; step < 200; ++step) world.step();
+      std::vector<double> places;
+      for (std::size_t n = 0; n < world.bodies(); ++n) {
+        const Eigen::Matrix4d place = world.worldFromBody(n).matrix();
+        places.insert(places.end(), place.data(), place.data() + 16);
+      }
+      EXPECT_GT(world.figures().dispatch.contacts, 3u);
+      return places;
+    });
+  };
+  const std::vector<double> once = end(1);
+  EXPECT_EQ(once, end(1));
+  EXPECT_EQ(once, end(2));
+}
+
+TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
+  btSphereShape sphere(0.1);
+  World world;
+  world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
+  world.add(sphere, 1, at(Vector3::Zero()));
+  world.step();
+  world.body(1).setLinearVelocity(btVector3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
+  try {
+    world.step();
+    ADD_FAILURE() << "a speed that is no number goes on";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("step 2: body 1"));
+  }
+  EXPECT_THROW(world.add(sphere, -1, at(Vector3::Zero())), Error);
+  EXPECT_THROW(World({.step = 0}), Error);
+}
+
+TEST(BulletField, ClothRestsOnABody) {
+  Kind ball("sphere,radius=0.5");
+  World world;
+  world.add(ball.shape, 0, ball.mass.meshFromInertia);
+  const auto corner = [](double x, double y) { return btVector3(0.6 * x, 0.6 * y, 0.55); };
+  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
+                                                                   corner(-1, 1), corner(1, 1), 31, 31, 0, true));
+  constexpr double kMargin = 0.02;
+  sheet->m_cfg.piterations = 8;
+  sheet->m_cfg.kDF = 1;
+  sheet->m_cfg.kDP = 0.05;
+  sheet->getCollisionShape()->setMargin(kMargin);
+  sheet->setTotalMass(1, false);
+  world.add(std::move(sheet));
+  for (int step = 0; step < 480; ++step) world.step();
+  EXPECT_GT(world.figures().dispatch.contacts, 100u);
+  EXPECT_LT(world.figures().dispatch.deepest, kMargin / 2);
+  const btSoftBody& cloth = world.softBody(0);
+  const auto middle = cloth.m_nodes[31 * 15 + 15].m_x;
+  EXPECT_NEAR(middle.z(), 0.5, kMargin);
+  EXPECT_LT(cloth.m_nodes[0].m_x.z(), 0.3) << "corners hang";
+  double speed = 0;
+  for (int node = 0; node < cloth.m_nodes.size(); ++node)
+    speed += cloth.m_nodes[node].m_v.length() / cloth.m_nodes.size();
+  EXPECT_LT(speed, 0.05);
+}
+
+}  // namespace
+}  // namespace hpsdf::physics

@@ -1,0 +1,115 @@
+#include "hpsdf/physics/field_collider.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/shapes.h"
+#include "support/random_field.h"
+
+namespace hpsdf::physics {
+namespace {
+
+Vector3 pointAround(const Box& box, std::mt19937_64& random, double beyond = 1.2) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Vector3 from(uniform(random), uniform(random), uniform(random));
+  return box.center() + beyond / 2 * box.sizes().cwiseProduct(from);
+}
+
+/// 10‖x‖² − 5 over [-1, 1]³: high at the sides, negative in the middle, and much steeper than a distance.
+Field steepField() {
+  FieldData data;
+  data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+  data.nodes = {node::leaf(2, 0)};
+  data.coefficients = std::vector<double>{5, 0, 20.0 / 3, 0, 0, 20.0 / 3, 0, 0, 0, 20.0 / 3};
+  return Field(std::move(data));
+}
+
+/// Fields that are anything but distances; the last are smooth ones, of a single leaf of the highest degree too.
+std::vector<Field> fields() {
+  std::vector<Field> result = {steepField()};
+  const Box flat(Vector3(-3, -1, 5), Vector3(1, 2, 5.5));
+  for (unsigned seed = 0; seed < 2; ++seed) {
+    result.push_back(randomField(seed, {.roughness = 1}));
+    result.push_back(blended(result.back(), 0.25));
+    result.push_back(
+        randomField(seed, {.domain = flat, .grid = {3, 1, 1}, .radius = 0.2, .roughness = 0.5, .single = true}));
+    result.push_back(randomField(seed, {.grid = {1, 1, 1}, .maxDepth = 9, .deepAt = Vector3(0.1, 0.2, 0.6)}));
+    result.push_back(blended(result.back(), 0.1));
+    result.push_back(randomField(seed, {.refinement = 0, .maxDegree = 30}));
+  }
+  const DistanceFunction torus = shapes::analytic("torus");
+  result.push_back(build(torus, domainAround(torus.source().box), {.targetError = 1e-7}));
+  result.push_back(build(torus, domainAround(torus.source().box),
+                         {.targetError = 1e-7, .grid = {1, 1, 1}, .strategy = Strategy::hp}));
+  return result;
+}
+
+TEST(FieldCollider, BoundsTheFieldFromBelow) {
+  std::mt19937_64 random(1);
+  for (const Field& field : fields()) {
+    const FieldCollider collider(field);
+    for (int i = 0; i < 20000; ++i) {
+      const Vector3 x = pointAround(field.domain(), random);
+      const double bound = collider.lowerBound(x);
+      ASSERT_TRUE(bound == 0 || field.value(x) >= bound) << bound << " for " << field.value(x);
+    }
+  }
+}
+
+TEST(FieldCollider, BoundsTheFieldInSpheres) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  int wrongByItself = 0;
+  for (const Field& field : fields()) {
+    const FieldCollider collider(field);
+    const double size = field.domain().diagonal().norm();
+    for (int i = 0; i < 20000; ++i) {
+      const Vector3 center = pointAround(field.domain(), random, 1.5);
+      const Vector3 other = pointAround(field.domain(), random, 1.5);
+      const Vector3 x = center + std::pow(uniform(random), 3) * (other - center);
+      const double radius = (x - center).norm() + 1e-14 * size;
+      const double value = field.value(x);
+      const double bound = collider.lowerBoundAround(center) - radius;
+      ASSERT_TRUE(bound <= 0 || value >= bound) << bound << " for " << value;
+      const double byItself = field.value(center) - radius;
+      wrongByItself += byItself > 0 && value < byItself;
+    }
+  }
+  EXPECT_GT(wrongByItself, 1000) << "the fields' own values would not do";
+}
+
+/// Bounds that are always low would be right too.
+TEST(FieldCollider, LosesFewCells) {
+  const DistanceFunction sphere = shapes::analytic("sphere,radius=0.7");
+  const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-7});
+  const FieldCollider collider(field);
+  const double cell = field.domain().sizes().x() / 96;
+  std::mt19937_64 random(3);
+  for (int i = 0; i < 20000; ++i) {
+    const Vector3 x = pointAround(field.domain(), random, 1);
+    const double value = field.value(x);
+    ASSERT_GT(collider.lowerBound(x), value - 2 * cell);
+    ASSERT_GT(collider.lowerBoundAround(x), 0.88 * value - 4 * cell);
+  }
+  EXPECT_LT(collider.bytes(), 4u << 20);
+}
+
+TEST(FieldCollider, KnowsThatFarAwayIsOutside) {
+  const DistanceFunction sphere = shapes::analytic("sphere,radius=0.7");
+  const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-5});
+  const FieldCollider collider(field);
+  EXPECT_GT(collider.lowerBoundAround({10, 0, 0}), 9);
+  EXPECT_GT(collider.lowerBound({10, 0, 0}), 9);
+  EXPECT_GT(collider.lowerBoundAround({1e300, 0, 0}), 1e200);
+  EXPECT_GT(collider.lowerBoundAround({std::numeric_limits<double>::infinity(), 0, 0}), 1e200);
+}
+
+}  // namespace
+}  // namespace hpsdf::physics
