@@ -37,7 +37,7 @@ SceneRequest requestOf(const Arguments& arguments) {
   if (arguments.given("body")) request.meshes = arguments.texts("body");
   if (arguments.has("cache")) request.cache = arguments.text("cache");
   request.filesAreYUp = arguments.text("up") == "y";
-  request.targetError = arguments.number("target-error");
+  if (arguments.given("target-error")) request.targetError = arguments.number("target-error");
   request.seed = std::uint64_t(arguments.whole("seed"));
   request.step = 1 / arguments.number("rate");
   request.iterations = int(arguments.whole("iterations"));
@@ -168,8 +168,7 @@ Command simulateCommand() {
                       .choices = {"y", "z"}},
                      {.name = "target-error",
                       .type = ParameterType::number,
-                      .help = "τ of the fields, as 'build' has it.",
-                      .defaultText = "1e-6",
+                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for the bowl's relief 1e-7.",
                       .minimum = 0,
                       .minimumExcluded = true},
                      {.name = "cache",

@@ -55,7 +55,7 @@ class Scene {
     physics::Material material;
   };
 
-  void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh);
+  void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
   /// In the order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 
