@@ -24,8 +24,8 @@ std::vector<std::string> inSmall(const std::string& scene, const std::string& ca
   if (scene == "helix") add({"--ground", "builtin:helix-bowl,cells=32", "--seconds", "1"});
   if (scene == "run")
     add({"--ground", "builtin:marble-run,steps=32,sides=4,turns=1,height=0.4", "--bodies", "3", "--seconds", "4"});
-  if (scene == "poles") add({"--bodies", "6", "--samples", "1000", "--seconds", "2"});
-  if (scene == "slope") add({"--bodies", "5", "--samples", "1000", "--seconds", "2"});
+  if (scene == "poles") add({"--bodies", "6", "--points", "1000", "--seconds", "2"});
+  if (scene == "slope") add({"--bodies", "5", "--points", "1000", "--seconds", "2"});
   if (scene == "cloth") add({"--nodes", "400", "--seconds", "1"});
   return words;
 }
