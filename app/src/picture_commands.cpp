@@ -448,12 +448,14 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain)
 
 render::SurfacePicture cameraPicture(const Arguments& arguments) {
   render::SurfacePicture picture;
-  const auto camera = arguments.numbers("camera");
-  if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
-  if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0");
-  picture.camera.azimuthDegrees = camera[0];
-  picture.camera.elevationDegrees = camera[1];
-  picture.camera.distance = camera[2];
+  if (arguments.has("camera")) {
+    const auto camera = arguments.numbers("camera");
+    if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+    if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0");
+    picture.camera.azimuthDegrees = camera[0];
+    picture.camera.elevationDegrees = camera[1];
+    picture.camera.distance = camera[2];
+  }
   if (arguments.given("view")) {
     if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
     turnTo(picture.camera, arguments.text("view"));

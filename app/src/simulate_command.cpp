@@ -141,8 +141,16 @@ SimulationFigures simulateAs(const Console& console, const Arguments& arguments,
                   camera);
 }
 
+/// The scene's own camera where nothing else is said.
 SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
-  return {cameraPicture(arguments), backend(arguments), framesPerSecond(arguments), std::move(take)};
+  render::SurfacePicture look = cameraPicture(arguments);
+  const auto& [azimuth, elevation] = kindOf(arguments).view;
+  if (!arguments.given("camera")) look.camera.distance = 1;
+  if (!arguments.given("camera") && !arguments.given("view")) {
+    look.camera.azimuthDegrees = azimuth;
+    look.camera.elevationDegrees = elevation;
+  }
+  return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
 }
 
 /// What came of a simulation and its pictures.
@@ -158,11 +166,10 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
   checkWritable(file);
   std::optional<CurrentField> shown;
   std::optional<render::Drawn> drawn;
-  std::string renderer;
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
     shown.emplace(shot.field, shot.field.metadata().source.name);
     drawn = std::move(shot.drawn);
-    renderer = shot.renderer;
+    session.setLastRenderer(shot.renderer);
   });
   const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
   const int width = drawn->image.width, height = drawn->image.height;
@@ -170,8 +177,8 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
   session.setField(std::move(*shown));
   session.setPicture(std::move(*drawn));
   return {figures,
-          {{"output", file}, {"width", width}, {"height", height}, {"renderer", renderer}},
-          fmt::format("{}: {}x{}, {}\n", file, width, height, renderer)};
+          {{"output", file}, {"width", width}, {"height", height}, {"renderer", session.lastRenderer()}},
+          fmt::format("{}: {}x{}, {}\n", file, width, height, session.lastRenderer())};
 }
 
 Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
@@ -179,19 +186,18 @@ Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest
   const InterruptGuard guard;  // until all is in its place
   Json rows = Json::array();
   render::Image last;
-  std::string renderer;
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
     last = std::move(shot.drawn.image);
     film.add(last);
     rows.push_back({{"file", ""}, {"seconds", shot.seconds}, {"contacts", shot.contacts}});
-    renderer = shot.renderer;
+    session.setLastRenderer(shot.renderer);
   });
   const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
   withProgress(session.console(), [&](const Progress& progress) {
     film.encode(framesPerSecond(arguments), progress);
     return true;
   });
-  const Json about = film.about(last, renderer, std::move(rows));
+  const Json about = film.about(last, session.lastRenderer(), std::move(rows));
   film.publish(about);
   return {figures, about, Film::line(about)};
 }
@@ -220,10 +226,10 @@ void runSimulate(Session& session, const Arguments& arguments) {
 std::vector<Parameter> lookParameters(const Registry& registry) {
   std::vector<Parameter> parameters;
   for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
-  parameters[0].help =
+  parameters.front().help =
       "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
-      "view.";
-  parameters[0].defaultText = "30,30,1";
+      "view, which is the default; each scene has its own direction.";
+  parameters.front().defaultText.clear();
   return parameters;
 }
 

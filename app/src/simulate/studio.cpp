@@ -52,6 +52,12 @@ TriangleMesh meshOf(const btSoftBody& body) {
   return mesh;
 }
 
+Box boxAround(std::span<const Vector3> points) {
+  Box box;
+  for (const Vector3& x : points) box.extend(x);
+  return box;
+}
+
 TriangleMesh sphereMesh(double radius) { return shapes::mesh(fmt::format("sphere,radius={},subdivisions=3", radius)); }
 
 /// Where a plane is, with its outside upwards, below or above a point: from a frame in which it is z = 0.
@@ -83,6 +89,15 @@ std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape
   return points;
 }
 
+/// What falls onto level ground spreads: the corners of a box on it, drawn apart.
+void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<Vector3>& points) {
+  constexpr double kSpread = 1.25;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3 apart = box.center() + kSpread * (box.corner(Box::CornerType(corner)) - box.center());
+    points.push_back(planeAt(plane, apart).translation());
+  }
+}
+
 /// Of everything in a scene, in the world.
 std::vector<Vector3> outlineOf(const Scene& scene) {
   std::map<const btCollisionShape*, std::vector<Vector3>> outlines;
@@ -94,13 +109,11 @@ std::vector<Vector3> outlineOf(const Scene& scene) {
   });
   for (std::size_t n = 0; n < scene.world().softBodies(); ++n)
     std::ranges::copy(verticesOf(scene.world().softBody(n)), std::back_inserter(points));
+  const Box box = boxAround(points);
+  forEachRigid(scene, [&](const btCollisionShape& shape, const Eigen::Isometry3d&) {
+    if (const auto* plane = dynamic_cast<const btStaticPlaneShape*>(&shape)) addFootprint(*plane, box, points);
+  });
   return points;
-}
-
-Box boxAround(std::span<const Vector3> points) {
-  Box box;
-  for (const Vector3& x : points) box.extend(x);
-  return box;
 }
 
 render::Camera cameraOf(const render::SurfacePicture& look, const Box& domain) {
