@@ -1,7 +1,7 @@
 # Every benchmark that bench/compare names is one of the program's: -D PROGRAM=… -D COMPARE=…
 execute_process(COMMAND ${PROGRAM} --benchmark_list_tests OUTPUT_VARIABLE known COMMAND_ERROR_IS_FATAL ANY)
 file(READ ${COMPARE} text)
-string(REGEX MATCHALL "\"(build|distance|frame|memory|near|query)/[a-z0-9_/]+\"" names "${text}")
+string(REGEX MATCHALL "\"(build|contacts|distance|frame|memory|near|query)/[a-z0-9_/]+\"" names "${text}")
 list(REMOVE_DUPLICATES names)
 list(LENGTH names count)
 if(count LESS 20)
@@ -9,7 +9,7 @@ if(count LESS 20)
 endif()
 foreach(quoted IN LISTS names)
   string(REPLACE "\"" "" name ${quoted})
-  if(name MATCHES "/(cgal|embree|openvdb)$")
+  if(name MATCHES "/(cgal|embree|gimpact|openvdb)$")
     continue() # another library's, which may not be installed
   endif()
   if(NOT "\n${known}" MATCHES "\n${name}(/(iterations:|process_time|real_time)[^\n]*)?\n")

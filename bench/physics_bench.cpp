@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "contact_places.h"
 #include "hpsdf/physics/contacts.h"
-#include "scene.h"
 
 namespace hpsdf::bench {
 namespace {
@@ -27,7 +27,7 @@ const FieldCollider& bunnyCollider() {
 }
 
 const SurfaceSamples& armadilloSamples() {
-  static const SurfaceSamples samples = physics::sampleSurface(testMesh("paper/armadillo_100k.obj"), {.count = 10'000});
+  static const SurfaceSamples samples = physics::sampleSurface(armadillo(), {.count = 10'000});
   return samples;
 }
 
@@ -67,6 +67,32 @@ std::vector<BodyPair> pile() {
   return pairs;
 }
 
+BodyPair bunnyInArmadillo(const Places& where) {
+  return {&bunnySamples(), where.bunny, &armadilloCollider(), where.armadillo};
+}
+
+BodyPair armadilloInBunny(const Places& where) {
+  return {&armadilloSamples(), where.armadillo, &bunnyCollider(), where.bunny};
+}
+
+std::vector<Places> findPlaces(Nearness nearness) {
+  std::mt19937_64 random(2016);
+  physics::ContactQuery query;
+  const auto contacts = [&](const Places& where, double margin) {
+    const std::size_t bunnys = query.find(bunnyInArmadillo(where), {.margin = margin}).size();
+    return bunnys + query.find(armadilloInBunny(where), {.margin = margin}).size();
+  };
+  std::vector<Places> found;
+  while (found.size() < kPlaces) {
+    const Places where{randomPose(random, 1), randomPose(random, 1)};
+    const std::size_t touching = contacts(where, 0);
+    if (nearness == Nearness::touching ? touching > 0 && touching < 100
+                                       : contacts(where, 0.03) == 0 && contacts(where, 0.1) > 0)
+      found.push_back(where);
+  }
+  return found;
+}
+
 void collider(benchmark::State& state) {
   const Field& field = bunnyField();
   timeEach(state, 1, [&] { benchmark::DoNotOptimize(FieldCollider(field)); });
@@ -87,6 +113,33 @@ void query(benchmark::State& state) {
   });
 }
 
+void report(const physics::QueryCost& cost, std::size_t of, benchmark::State& state) {
+  state.counters["spheres"] = double(cost.spheres) / double(of);
+  state.counters["samples"] = double(cost.samples) / double(of);
+  state.counters["evaluations"] = double(cost.evaluations) / double(of);
+}
+
+/// Both ways, as two bodies in Bullet.
+void bothWays(benchmark::State& state, Nearness nearness) {
+  physics::ContactQuery query;
+  timeContacts(state, nearness, [&](const Places& where) {
+    Touch touch;
+    for (const BodyPair& pair : {bunnyInArmadillo(where), armadilloInBunny(where)})
+      for (const physics::Contact& contact : query.find(pair)) {
+        ++touch.contacts;
+        touch.deepest = std::max(touch.deepest, contact.depth);
+      }
+    return touch;
+  });
+  physics::QueryCost cost;
+  for (const Places& where : places(nearness))
+    for (const BodyPair& pair : {bunnyInArmadillo(where), armadilloInBunny(where)}) {
+      query.find(pair);
+      cost += query.cost();
+    }
+  report(cost, places(nearness).size(), state);
+}
+
 void pileStep(benchmark::State& state) {
   const std::vector<BodyPair> pairs = pile();
   physics::PairContacts contacts;
@@ -94,9 +147,7 @@ void pileStep(benchmark::State& state) {
   timeEach(state, 1, [&] { arena.execute([&] { physics::findContacts(pairs, {}, contacts); }); });
   state.counters["pairs"] = double(pairs.size());
   state.counters["contacts"] = double(contacts.all().size());
-  state.counters["spheres"] = double(contacts.cost().spheres);
-  state.counters["samples"] = double(contacts.cost().samples);
-  state.counters["evaluations"] = double(contacts.cost().evaluations);
+  report(contacts.cost(), 1, state);
 }
 
 void bunnySampling(benchmark::State& state) {
@@ -107,7 +158,20 @@ void bunnySampling(benchmark::State& state) {
 BENCHMARK(bunnySampling)->Name("contacts/bunny/samples")->Unit(benchmark::kMillisecond);
 BENCHMARK(collider)->Name("contacts/bunny/collider")->Unit(benchmark::kMillisecond);
 BENCHMARK(query)->Name("contacts/bunny/query")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(bothWays, touching, Nearness::touching)->Name("contacts/touching/ours");
+BENCHMARK_CAPTURE(bothWays, apart, Nearness::apart)->Name("contacts/apart/ours");
 BENCHMARK(pileStep)->Name("contacts/pile")->Unit(benchmark::kMillisecond);
 
 }  // namespace
+
+const TriangleMesh& armadillo() {
+  static const TriangleMesh mesh = testMesh("paper/armadillo_100k.obj");
+  return mesh;
+}
+
+const std::vector<Places>& places(Nearness nearness) {
+  static const std::vector<Places> touching = findPlaces(Nearness::touching), apart = findPlaces(Nearness::apart);
+  return nearness == Nearness::touching ? touching : apart;
+}
+
 }  // namespace hpsdf::bench

@@ -43,7 +43,7 @@ SceneRequest requestOf(const Arguments& arguments) {
   if (arguments.given("body")) request.meshes = arguments.texts("body");
   if (arguments.has("cache")) request.cache = arguments.text("cache");
   request.filesAreYUp = arguments.text("up") == "y";
-  request.targetError = arguments.number("target-error");
+  if (arguments.given("target-error")) request.targetError = arguments.number("target-error");
   request.seed = std::uint64_t(arguments.whole("seed"));
   request.step = 1 / arguments.number("rate");
   request.iterations = int(arguments.whole("iterations"));
@@ -226,10 +226,15 @@ void runSimulate(Session& session, const Arguments& arguments) {
 std::vector<Parameter> lookParameters(const Registry& registry) {
   std::vector<Parameter> parameters;
   for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
-  parameters.front().help =
+  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  camera.help =
       "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
       "view, which is the default; each scene has its own direction.";
-  parameters.front().defaultText.clear();
+  camera.defaultText.clear();
+  Parameter& target = *std::ranges::find(parameters, "target", &Parameter::name);
+  target.help =
+      "The point in the picture's middle, in the scene's coordinates, z up; when left out, all of the scene is in the "
+      "middle.";
   return parameters;
 }
 
@@ -308,8 +313,7 @@ Command simulateCommand(const Registry& registry) {
                       .choices = {"y", "z"}},
                      {.name = "target-error",
                       .type = ParameterType::number,
-                      .help = "τ of the fields, as 'build' has it.",
-                      .defaultText = "1e-6",
+                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for the bowl's relief 1e-7.",
                       .minimum = 0,
                       .minimumExcluded = true},
                      {.name = "cache",

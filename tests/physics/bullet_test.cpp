@@ -10,6 +10,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
@@ -165,6 +166,52 @@ TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
   }
   EXPECT_THROW(world.add(sphere, -1, at(Vector3::Zero())), Error);
   EXPECT_THROW(World({.step = 0}), Error);
+}
+
+TEST(BulletField, AMarbleOnReliefIsFoundAsDeepAsItIs) {
+  Kind bowl("structured-bowl,bumps=4,cells=24");
+  constexpr double kRadius = 0.06;
+  btSphereShape marble(kRadius);
+  std::mt19937 random(3);
+  const auto within = [&](double lo, double hi) { return lo + (hi - lo) * double(random()) * 0x1p-32; };
+  double deepest = 0;
+  for (int trial = 0; trial < 15; ++trial) {
+    Vector3 center(within(-0.5, 0.5), within(-0.5, 0.5), 0.5);
+    while (bowl.field.value(center) > 0.95 * kRadius) center.z() -= 0.002;
+    constexpr int kAllAround = 8000;
+    std::vector<Vector3> points;
+    for (int i = 0; i < kAllAround; ++i) {
+      const double z = 1 - (2.0 * i + 1) / kAllAround, r = std::sqrt(1 - z * z), turn = 2.399963229728653 * i;
+      points.push_back(center + kRadius * Vector3(r * std::cos(turn), r * std::sin(turn), z));
+    }
+    std::vector<double> values(points.size());
+    bowl.field.values(points, values);
+    const double least = std::ranges::min(values);
+    World world;
+    world.add(bowl.shape, 0, bowl.mass.meshFromInertia);
+    world.add(marble, 1, Eigen::Isometry3d(Eigen::Translation3d(center)));
+    world.step();
+    EXPECT_NEAR(world.figures().dispatch.deepest, -least, 0.01 * kRadius) << center.transpose();
+    deepest = std::max(deepest, -least);
+  }
+  EXPECT_GT(deepest, 0.04 * kRadius);
+}
+
+TEST(BulletField, ClothThatFallsFastDoesNotPassAThinPlate) {
+  Kind plate("box,width=1,height=1,depth=0.02");
+  World world;
+  world.add(plate.shape, 0, plate.mass.meshFromInertia);
+  const auto corner = [](double x, double y) { return btVector3(0.25 * x, 0.25 * y, 0.3); };
+  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
+                                                                   corner(-1, 1), corner(1, 1), 15, 15, 0, true));
+  sheet->getCollisionShape()->setMargin(0.01);
+  sheet->setTotalMass(1, false);
+  sheet->setVelocity(btVector3(0, 0, -20));  // four times its thickness in a step
+  world.add(std::move(sheet));
+  for (int step = 0; step < 60; ++step) world.step();
+  const btSoftBody& cloth = world.softBody(0);
+  for (int node = 0; node < cloth.m_nodes.size(); ++node) EXPECT_GT(cloth.m_nodes[node].m_x.z(), 0.01 - 0.005) << node;
+  EXPECT_LT(world.figures().dispatch.deepest, 0.005);
 }
 
 TEST(BulletField, ClothRestsOnABody) {

@@ -24,8 +24,8 @@ BodyKind::BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, 
       mass(physics::massProperties(mesh)),
       shape(collider, surface, mass, margin) {}
 
-void Scene::stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh) {
-  world_.add(const_cast<physics::FieldShape&>(kind.shape), 0, worldFromMesh * kind.mass.meshFromInertia);
+void Scene::stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
+  world_.add(const_cast<physics::FieldShape&>(kind.shape), 0, worldFromMesh * kind.mass.meshFromInertia, material);
 }
 
 void Scene::admit() {

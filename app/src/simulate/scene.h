@@ -58,7 +58,7 @@ class Scene {
   double bodySize() const { return bodySize_; }
 
  protected:
-  void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh);
+  void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
   /// In the order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 

@@ -196,6 +196,15 @@ std::unique_ptr<Scene> poles(const Console& console, const SceneRequest& request
   return std::make_unique<Poles>(console, request);
 }
 
+/// Bullet has its links pull nodes into what they rest on after all contacts; here contacts have the last word.
+void contactsLast(btSoftBody& body) {
+  btAlignedObjectArray<btSoftBody::ePSolver::_>& sequence = body.m_cfg.m_psequence;
+  sequence.resize(0);
+  for (const auto solver : {btSoftBody::ePSolver::Linear, btSoftBody::ePSolver::Anchors,
+                            btSoftBody::ePSolver::SContacts, btSoftBody::ePSolver::RContacts})
+    sequence.push_back(solver);
+}
+
 std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& at, double size) {
   const TriangleMesh mesh = shapes::mesh("torus,major=0.7,minor=0.3,segments=24,sides=12");
   std::vector<btScalar> places;
@@ -207,6 +216,7 @@ std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& 
   std::unique_ptr<btSoftBody> body(
       btSoftBodyHelpers::CreateFromTriMesh(info, places.data(), corners.data(), int(mesh.triangles.size()), false));
   body->generateBendingConstraints(2);
+  contactsLast(*body);
   body->m_cfg.piterations = 4;
   body->m_cfg.kMT = 0.05;  // towards its own form
   body->m_cfg.kDF = 0.3;
@@ -255,14 +265,16 @@ std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request
       const double top = boundingBox(mesh).sizes().z();
       const BodyKind& body = addKind(to, from, mesh, from.samples);
       const BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
-      stand(body, shift({0, 0, stands}));
-      stand(table, shift({0, 0, -0.1}));
+      const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through
+      stand(body, shift({0, 0, stands}), rough);
+      stand(table, shift({0, 0, -0.1}), rough);
       const int side = std::max(2, int(std::ceil(std::sqrt(double(from.nodes)))));
       const auto corner = [&](double x, double y) { return btVector3(x * kSide / 2, y * kSide / 2, top + 0.05); };
       std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(
           world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
+      contactsLast(*sheet);
       sheet->m_cfg.piterations = 8;
-      sheet->m_cfg.kDF = 0.6;
+      sheet->m_cfg.kDF = 1;
       sheet->m_cfg.kDP = 0.05;
       sheet->getCollisionShape()->setMargin(kMargin);
       sheet->setTotalMass(1, false);

@@ -11,13 +11,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kMostContacts = 12;  // of two bodies: three of Bullet's manifolds
-constexpr int kNodes = 256;                // of a soft body that are looked up together
+constexpr std::size_t kMostContacts = SphereFeet::kMost;  // of two bodies: three of Bullet's manifolds
+constexpr int kNodes = 256;                               // of a soft body that are looked up together
+constexpr int kPieces = 64;                               // of a node's way
 
 const FieldShape* fieldOf(const btCollisionObject& object) {
   return dynamic_cast<const FieldShape*>(object.getCollisionShape());
@@ -34,21 +34,18 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-constexpr std::size_t kDirections = 128;
-constexpr double kOneSide = 0.9;  // cosine between normals
-
-/// Evenly spread, along a spiral: no direction is farther than some 0.2 radians from one of them.
-const std::array<Vector3, kDirections>& directionsAllAround() {
-  static const std::array<Vector3, kDirections> directions = [] {
-    std::array<Vector3, kDirections> made;
-    const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
-    for (std::size_t i = 0; i < kDirections; ++i) {
-      const double z = 1 - (2 * double(i) + 1) / kDirections, r = std::sqrt(1 - z * z);
-      made[i] = {r * std::cos(turn * double(i)), r * std::sin(turn * double(i)), z};
-    }
-    return made;
-  }();
-  return directions;
+/// The first point of a node's way in a step at which it is as near as this; its end where there is none. So nothing
+/// that is thin is passed.
+Vector3 whereItTouches(const Field& field, const Vector3& from, const Vector3& to, double near) {
+  const int pieces = int(std::min((to - from).norm() / near, double(kPieces - 1))) + 1;
+  if (pieces == 1) return to;
+  std::array<Vector3, kPieces> points;
+  std::array<double, kPieces> values;
+  for (int i = 0; i < pieces; ++i) points[i] = from + (to - from) * (double(i + 1) / pieces);
+  field.values({points.data(), std::size_t(pieces)}, {values.data(), std::size_t(pieces)});
+  for (int i = 0; i < pieces; ++i)
+    if (values[i] < near) return points[i];
+  return to;
 }
 
 }  // namespace
@@ -125,42 +122,13 @@ void RigidFieldAlgorithm::withSphere(const btCollisionObject& field, const btCol
   const Eigen::Isometry3d ofField = worldFromMesh(field, shape);
   const Vector3 center = ofField.inverse() * fromBullet(sphere.getWorldTransform().getOrigin());
   const double margin = std::min(shape.getMargin(), 0.1 * radius);
-  if (shape.field().lowerBoundAround(center) > radius + margin) return;
-  // the nearest point of the field's surface, and what is near the sphere elsewhere, as the other side of a groove
-  std::array<Vector3, kDirections + 1> points;
-  std::array<ValueAndGradient, kDirections + 1> answers;
-  const std::array<Vector3, kDirections>& directions = directionsAllAround();
-  for (std::size_t i = 0; i < kDirections; ++i) points[i] = center + radius * directions[i];
-  points[kDirections] = center;
-  shape.field().field().valuesAndGradients(points, answers);
-  answers[kDirections].value -= radius;
-  touching_.clear();
-  for (const ValueAndGradient& answer : answers) {
-    const double steepness = answer.gradient.norm();
-    // between directions the sphere reaches up to a tenth of its radius farther
-    if (answer.value < margin + 0.1 * radius && steepness > 0)
-      touching_.push_back({Vector3::Zero(), answer.gradient / steepness, answer.value});
-  }
-  // those of one side tell the same
-  std::ranges::stable_sort(touching_, {}, &BodyContact::distance);
-  std::size_t kept = 0;
-  for (const BodyContact& candidate : touching_) {
-    const auto end = touching_.begin() + std::ptrdiff_t(kept);
-    if (kept == kMostContacts || std::any_of(touching_.begin(), end, [&](const BodyContact& other) {
-          return other.normal.dot(candidate.normal) > kOneSide;
-        }))
-      continue;
-    touching_[kept++] = candidate;
-  }
-  for (std::size_t i = 0; i < kept; ++i) {
-    const Vector3 outwards = touching_[i].normal, foot = center - radius * outwards;
-    const double value = shape.field().field().value(foot);
-    if (value > margin) continue;
-    const Vector3 normal = ofField.linear() * outwards;
+  if (shape.field().lowerBoundAround(center) > radius + margin) return feet_.forget();
+  for (const Foot& foot : feet_.find(shape.field().field(), center, radius, margin)) {
+    const Vector3 at = center + radius * foot.direction, normal = -(ofField.linear() * foot.direction);
     if (sphereIsSecond)
-      contacts_.push_back({ofField * foot, -normal, value});
+      contacts_.push_back({ofField * at, -normal, foot.value});
     else
-      contacts_.push_back({ofField * Vector3(foot - value * outwards), normal, value});
+      contacts_.push_back({ofField * Vector3(at + foot.value * foot.direction), normal, foot.value});
   }
 }
 
@@ -234,33 +202,50 @@ void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionO
   const FieldShape& shape = *fieldOf(object);
   const btSoftBody& soft = *btSoftBody::upcast(&softObject);
   const Eigen::Isometry3d ofField = worldFromMesh(object, shape), fromWorld = ofField.inverse();
-  const double margin = soft.getCollisionShape()->getMargin();
+  const double margin = soft.getCollisionShape()->getMargin(), near = margin / 2, farthest = kPieces * near;
   const int count = soft.m_nodes.size();
   parts_.resize((count + kNodes - 1) / kNodes);
+  const bool fresh = int(outside_.size()) != count;
+  outside_.resize(std::size_t(count));
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t part) {
     std::vector<Touching>& touching = parts_[part];
     touching.clear();
-    std::array<Vector3, kNodes> points;
+    std::array<Vector3, kNodes> at, before, ends;
     std::array<ValueAndGradient, kNodes> answers;
+    std::array<double, kNodes> depths;
     const int begin = int(part) * kNodes, end = std::min(count, begin + kNodes);
-    for (int node = begin; node < end; ++node) {
-      const Vector3 x = fromWorld * fromBullet(soft.m_nodes[node].m_x);
-      if (soft.m_nodes[node].m_battach != 0 || shape.field().lowerBound(x) > margin) continue;
-      points[touching.size()] = x;
-      touching.push_back({.node = node});
+    for (int i = begin; i < end; ++i) {
+      const btSoftBody::Node& node = soft.m_nodes[i];
+      const Vector3 from = fromWorld * fromBullet(node.m_q), to = fromWorld * fromBullet(node.m_x);
+      Vector3& outside = outside_[std::size_t(i)];
+      if (fresh || (to - outside).norm() > farthest) outside = from;
+      if (node.m_battach != 0 || shape.field().lowerBound(to) > margin + (to - outside).norm()) {
+        outside = to;
+        continue;
+      }
+      at[touching.size()] = whereItTouches(shape.field().field(), outside, to, near);
+      before[touching.size()] = from;
+      ends[touching.size()] = to;
+      touching.push_back({i});
     }
-    shape.field().field().valuesAndGradients({points.data(), touching.size()}, {answers.data(), touching.size()});
+    const std::size_t all = touching.size();
+    shape.field().field().valuesAndGradients({at.data(), all}, {answers.data(), all});
+    shape.field().field().values({before.data(), all}, {depths.data(), all});
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < touching.size(); ++i) {
+    for (std::size_t i = 0; i < all; ++i) {
+      if (answers[i].value >= 0) outside_[std::size_t(touching[i].node)] = at[i];
       const double steepness = answers[i].gradient.norm();
-      if (!(answers[i].value < margin && steepness > 0)) continue;
-      touching[kept++] = {touching[i].node, ofField.linear() * (answers[i].gradient / steepness), answers[i].value};
+      if (!(steepness > 0)) continue;
+      const Vector3 normal = answers[i].gradient / steepness;
+      // past where it touches, the surface is that place's plane
+      const double distance = answers[i].value + normal.dot(ends[i] - at[i]);
+      if (distance < margin) touching[kept++] = {touching[i].node, ofField.linear() * normal, distance, -depths[i]};
     }
     touching.resize(kept);
   });
   for (const std::vector<Touching>& part : parts_) {
     findings.contacts += part.size();
-    for (const Touching& node : part) findings.add(-node.distance);
+    for (const Touching& node : part) findings.add(node.depth);
   }
 }
 
@@ -287,9 +272,14 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       contact.m_cti.m_colObj = &object;
       contact.m_cti.m_normal = toBullet(touching.normal);
       // half of the margin is the body's thickness
-      contact.m_cti.m_offset = touching.distance - margin / 2 - contact.m_cti.m_normal.dot(node.m_x);
+      const double height = touching.distance - margin / 2;
+      contact.m_cti.m_offset = height - contact.m_cti.m_normal.dot(node.m_x);
       const btVector3 arm = node.m_x - transform.getOrigin();
       const btVector3 ofBody = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
+      if (height > contact.m_cti.m_normal.dot(ofBody)) continue;
+      // The solver takes away what a node has moved towards the surface since m_q; from the surface on it is to be just
+      // what it is too deep, and what lifts it out then gives it no speed.
+      node.m_q -= (contact.m_cti.m_normal.dot(node.m_q) + contact.m_cti.m_offset) * contact.m_cti.m_normal;
       const btVector3 relative = node.m_x - node.m_q - ofBody;
       const btScalar along = relative.dot(contact.m_cti.m_normal);
       const btVector3 sliding = relative - along * contact.m_cti.m_normal;
@@ -298,7 +288,7 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       contact.m_c1 = arm;
       contact.m_c2 = node.m_im * step;
       contact.m_c3 = sliding.length() < std::abs(along) * friction ? 0 : 1 - friction;
-      contact.m_c4 = object.isStaticOrKinematicObject() ? soft.m_cfg.kKHR : soft.m_cfg.kCHR;
+      contact.m_c4 = 0;  // nothing beside that
       soft.m_rcontacts.push_back(contact);
       if (rigid != nullptr) rigid->activate();
     }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hpsdf/physics/bullet.h"
+#include "sphere_feet.h"
 #include "spread.h"
 
 class btSoftBody;
@@ -68,7 +69,8 @@ class RigidFieldAlgorithm final : public FieldAlgorithm {
   void withPlane(const btCollisionObject& field, const btCollisionObject& plane, bool planeIsSecond);
 
   ContactQuery query_;
-  std::vector<BodyContact> contacts_, touching_;
+  std::vector<BodyContact> contacts_;
+  SphereFeet feet_;  ///< of the sphere, if one is
   double size_ = 0;  ///< of the smaller body
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btManifoldPoint> before_;
@@ -83,13 +85,15 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
  private:
   struct Touching {
     int node;
-    Vector3 normal = Vector3::Zero();
-    double distance = 0;
+    Vector3 normal = Vector3::Zero();  ///< in the world
+    double distance = 0;               ///< at the end of the step, by the plane of where it touches
+    double depth = 0;                  ///< at the step's start
   };
 
   void find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) override;
   void fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) override;
 
+  std::vector<Vector3> outside_;              ///< where each node was last outside of the field, in its coordinates
   std::vector<std::vector<Touching>> parts_;  ///< of each so many nodes, in their order
 };
 
