@@ -5,18 +5,21 @@ include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/hpsdf)
 
-function(hpsdf_install_library component)
+function(hpsdf_install_library component folder)
   install(TARGETS hpsdf_${component} EXPORT hpsdf_${component})
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${component}/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(EXPORT hpsdf_${component} NAMESPACE hpsdf:: FILE hpsdf-${component}.cmake DESTINATION ${package_dir})
 endfunction()
 
-hpsdf_install_library(core)
+hpsdf_install_library(core core)
 if(TARGET hpsdf_physics)
-  hpsdf_install_library(physics)
+  hpsdf_install_library(physics physics)
+endif()
+if(TARGET hpsdf_bullet)
+  hpsdf_install_library(bullet physics/bullet)
 endif()
 if(TARGET hpsdf_render)
-  hpsdf_install_library(render)
+  hpsdf_install_library(render render)
 endif()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/hpsdfConfig.cmake.in ${PROJECT_BINARY_DIR}/hpsdfConfig.cmake

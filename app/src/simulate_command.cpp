@@ -62,6 +62,7 @@ Json jsonOf(const std::string& scene, const SceneRequest& request, const Simulat
       {"steps", figures.steps},
       {"contacts",
        {{"mean", figures.penetrating / steps}, {"max", figures.mostPenetrating}, {"last", figures.lastPenetrating}}},
+      {"touching", {{"mean", figures.touching / steps}, {"max", figures.mostTouching}, {"last", figures.lastTouching}}},
       {"penetration",
        {{"size", figures.size},
         {"max", figures.deepest},
@@ -84,8 +85,11 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
   if (figures.nodes > 0) text += fmt::format(", {} nodes of soft bodies", grouped(figures.nodes));
   text += fmt::format(", {:.4g} s in {} steps of 1/{:.4g} s\n", figures.simulated, grouped(figures.steps),
                       1 / request.step);
-  text += fmt::format("  contacts a step     {:.0f} in the mean, {} at most, {} at the end\n",
-                      figures.penetrating / steps, grouped(figures.mostPenetrating), grouped(figures.lastPenetrating));
+  const auto aStep = [&](double sum, std::size_t most, std::size_t last) {
+    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", sum / steps, grouped(most), grouped(last));
+  };
+  text += "  contacts a step     " + aStep(figures.penetrating, figures.mostPenetrating, figures.lastPenetrating) +
+          "  touching a step     " + aStep(figures.touching, figures.mostTouching, figures.lastTouching);
   text += fmt::format("  deepest             {} ({:.2g} % of {}), in the last second {} ({:.2g} %)\n",
                       shortNumber(figures.deepest), 100 * figures.deepest / figures.size, shortNumber(figures.size),
                       shortNumber(figures.deepestAtEnd), 100 * figures.deepestAtEnd / figures.size);

@@ -18,8 +18,8 @@ struct SimulationFigures {
   std::uint64_t steps = 0;
   double simulated = 0;  ///< seconds
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
-  double penetrating = 0;  ///< sum over the steps
-  std::size_t mostPenetrating = 0, lastPenetrating = 0;
+  double penetrating = 0, touching = 0;  ///< sums over the steps; touching are the solver's contacts
+  std::size_t mostPenetrating = 0, lastPenetrating = 0, mostTouching = 0, lastTouching = 0;
   double size = 0;  ///< what depths are compared with: the radius of a marble, the size of a body, a cloth's margin
   double deepest = 0, sumOfDeepest = 0, deepestAtEnd = 0;  ///< the last of the simulation's last second
   std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end

@@ -41,12 +41,15 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
   figures_ = {};
   auto& prepared = algorithms_->prepared;
   prepared.clear();
+  const auto mayBeField = [](const btCollisionObject& object) {
+    return object.getCollisionShape()->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
+  };
   btBroadphasePairArray& array = pairs->getOverlappingPairArray();
   for (int i = 0; i < array.size(); ++i) {
     btBroadphasePair& pair = array[i];
     const auto* first = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
     const auto* second = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
-    if (!needsCollision(first, second)) continue;
+    if ((!mayBeField(*first) && !mayBeField(*second)) || !needsCollision(first, second)) continue;
     if (pair.m_algorithm == nullptr) {
       const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
                                          -1);

@@ -54,7 +54,7 @@ struct DispatchFigures {
   double querySeconds = 0;      ///< of looking samples up in fields
   std::size_t pairs = 0;        ///< with a field, of which boxes overlap
   std::size_t penetrating = 0;  ///< samples, spheres and nodes of soft bodies
-  std::size_t contacts = 0;     ///< that were handed to the solver
+  std::size_t contacts = 0;     ///< for the solver: at most 12 of two bodies, and nodes that are within the margin
   double deepest = 0;           ///< penetration, world units
 };
 
