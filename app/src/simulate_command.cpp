@@ -177,7 +177,7 @@ Command simulateCommand() {
                       .choices = {"y", "z"}},
                      {.name = "target-error",
                       .type = ParameterType::number,
-                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for the bowl's relief 1e-7.",
+                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for the bowl's relief 1e-8.",
                       .minimum = 0,
                       .minimumExcluded = true},
                      {.name = "cache",

@@ -305,6 +305,21 @@ TEST(BulletField, ANodeThatBlowsUpSaysWhereAndWhen) {
   }
 }
 
+TEST(BulletField, AMarbleAtRestFallsAsleepAndStaysInTheFigures) {
+  Kind slab("box,width=1,height=1,depth=0.2");
+  btSphereShape marble(0.05);
+  World world;
+  world.add(slab.shape, 0, slab.mass.meshFromInertia);
+  const std::size_t number =
+      world.add(marble, 1, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.152)), {.restSpeed = 0.1});
+  world.step();
+  EXPECT_TRUE(world.body(number).isActive());
+  for (int step = 0; step < 720; ++step) world.step();
+  ASSERT_FALSE(world.body(number).isActive());
+  EXPECT_EQ(world.figures().dispatch.pairs, 0u) << "nothing is looked up";
+  EXPECT_EQ(world.figures().dispatch.contacts, 1u);
+}
+
 TEST(BulletField, AMarbleOnReliefIsFoundAsDeepAsItIs) {
   Kind bowl("structured-bowl,bumps=4,cells=24");
   constexpr double kRadius = 0.06;

@@ -7,7 +7,7 @@ std::span<const SceneKind> scenes() {
   static const std::vector<SceneKind> all = {
       {"bowl",
        "marbles into a bowl with relief (Fig. 1)",
-       {.bodies = 1000, .samples = 1000, .ground = "builtin:structured-bowl,cells=160", .targetError = 1e-7},
+       {.bodies = 1000, .samples = 1000, .ground = "builtin:structured-bowl,cells=160", .targetError = 1e-8},
        12},
       {"helix",
        "a marble down the groove of a bowl (Fig. 9)",

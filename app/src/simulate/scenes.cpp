@@ -86,7 +86,11 @@ class MarbleScene : public Scene {
           shapes_.front().get(),
           mass,
           shift(at),
-          {.friction = 0.4, .rollingFriction = 0.02 * bodySize_, .linearDamping = 0.05, .angularDamping = 0.1}});
+          {.friction = 0.4,
+           .rollingFriction = 0.02 * bodySize_,
+           .linearDamping = 0.05,
+           .angularDamping = 0.1,
+           .restSpeed = 0.2}});
   }
 };
 

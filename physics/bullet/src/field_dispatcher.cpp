@@ -41,6 +41,12 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
   figures_ = {};
   auto& prepared = algorithms_->prepared;
   prepared.clear();
+  const auto count = [this](const FieldAlgorithm& algorithm) {
+    const Findings& found = algorithm.findings();
+    figures_.penetrating += found.penetrating;
+    figures_.contacts += found.contacts;
+    figures_.deepest = std::max(figures_.deepest, found.deepest);
+  };
   const auto mayBeField = [](const btCollisionObject& object) {
     return object.getCollisionShape()->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
   };
@@ -49,7 +55,11 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
     btBroadphasePair& pair = array[i];
     const auto* first = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
     const auto* second = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
-    if ((!mayBeField(*first) && !mayBeField(*second)) || !needsCollision(first, second)) continue;
+    if (!mayBeField(*first) && !mayBeField(*second)) continue;
+    if (!needsCollision(first, second)) {  // asleep: as they were
+      if (const auto* algorithm = dynamic_cast<FieldAlgorithm*>(pair.m_algorithm)) count(*algorithm);
+      continue;
+    }
     if (pair.m_algorithm == nullptr) {
       const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
                                          -1);
@@ -64,12 +74,7 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
                     [&](std::size_t i) { prepared[i].algorithm->prepare(*prepared[i].first, *prepared[i].second); });
   figures_.querySeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   figures_.pairs = prepared.size();
-  for (const auto& one : prepared) {
-    const Findings& found = one.algorithm->findings();
-    figures_.penetrating += found.penetrating;
-    figures_.contacts += found.contacts;
-    figures_.deepest = std::max(figures_.deepest, found.deepest);
-  }
+  for (const auto& one : prepared) count(*one.algorithm);
   btCollisionDispatcher::dispatchAllCollisionPairs(pairs, info, dispatcher);
 }
 

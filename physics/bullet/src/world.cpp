@@ -61,6 +61,7 @@ World::World(const WorldOptions& options) : options_(options) {
   // bodies that lie in each other are moved apart without gaining speed
   info.m_splitImpulse = 1;
   info.m_splitImpulsePenetrationThreshold = 0;
+  info.m_erp2 = 0.5;
   btSoftBodyWorldInfo& soft = world.getWorldInfo();
   soft.m_gravity = toBullet(options.gravity);
   soft.m_broadphase = &parts_->broadphase;
@@ -88,6 +89,13 @@ std::size_t World::add(btCollisionShape& shape, double mass, const Eigen::Isomet
   info.m_rollingFriction = material.rollingFriction;
   info.m_linearDamping = material.linearDamping;
   info.m_angularDamping = material.angularDamping;
+  if (material.restSpeed >= 0) {
+    btVector3 center;
+    btScalar radius;
+    shape.getBoundingSphere(center, radius);
+    info.m_linearSleepingThreshold = material.restSpeed;
+    info.m_angularSleepingThreshold = material.restSpeed / radius;
+  }
   bodies_.push_back(std::make_unique<btRigidBody>(info));
   bodies_.back()->setUserIndex(int(bodies_.size()) - 1);
   parts_->world.addRigidBody(bodies_.back().get());

@@ -50,7 +50,7 @@ class FieldShape final : public btConcaveShape {
   btVector3 scaling_{1, 1, 1};
 };
 
-/// What one step's dispatch took and found.
+/// What one step's dispatch took and found; of bodies that sleep, what was found last.
 struct DispatchFigures {
   double querySeconds = 0;      ///< of looking samples up in fields
   std::size_t pairs = 0;        ///< with a field, of which boxes overlap

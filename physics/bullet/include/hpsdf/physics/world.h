@@ -23,6 +23,9 @@ struct Material {
   double restitution = 0;
   double rollingFriction = 0;
   double linearDamping = 0, angularDamping = 0;
+  /// A body that for two seconds moves slower than this, and turns slower than this over its radius, may fall asleep,
+  /// if all do that it touches; units a second. Below 0 what Bullet has for bodies of size 1: 0.8, and 1 radian.
+  double restSpeed = -1;
 };
 
 /// Of one step.
