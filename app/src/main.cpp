@@ -25,7 +25,9 @@ void occupyClosedStreams() {
 int main(int argc, char** argv) {
   occupyClosedStreams();
   hpsdf::app::installInterruptHandlers();
-  std::signal(SIGPIPE, SIG_IGN);  // a reader that went away is reported like any other failed write
+  // a reader that went away, or a file longer than allowed, is reported like any other failed write
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   const std::vector<std::string> words(argv + (argc > 0), argv + argc);

@@ -56,6 +56,7 @@ Json jsonOf(const std::string& scene, const SceneRequest& request, const Simulat
       {"scene", scene},
       {"bodies", figures.bodies},
       {"nodes", figures.nodes},
+      {"waiting", figures.waiting},
       {"lost", figures.lost},
       {"simulated_seconds", figures.simulated},
       {"step_seconds", request.step},
@@ -85,6 +86,8 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
   if (figures.nodes > 0) text += fmt::format(", {} nodes of soft bodies", grouped(figures.nodes));
   text += fmt::format(", {:.4g} s in {} steps of 1/{:.4g} s\n", figures.simulated, grouped(figures.steps),
                       1 / request.step);
+  if (figures.waiting > 0)
+    text += fmt::format("  still to come       {} bodies, which more --seconds let in\n", grouped(figures.waiting));
   const auto aStep = [&](double sum, std::size_t most, std::size_t last) {
     return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", sum / steps, grouped(most), grouped(last));
   };
@@ -308,7 +311,9 @@ Command simulateCommand(const Registry& registry) {
                       .repeatable = true},
                      {.name = "ground",
                       .type = ParameterType::text,
-                      .help = "The mesh file or shape that things fall on. For bowl, helix, run and cloth.",
+                      .help =
+                          "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where "
+                          "it is as large as it is: 2 wide suits the marbles.",
                       .valueName = "MESH"},
                      {.name = "up",
                       .type = ParameterType::choice,

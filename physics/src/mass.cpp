@@ -1,6 +1,7 @@
 #include "hpsdf/physics/mass.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "hpsdf/error.h"
@@ -8,6 +9,8 @@
 namespace hpsdf::physics {
 
 MassProperties massProperties(const TriangleMesh& mesh) {
+  for (const auto& [a, b, c] : mesh.triangles)
+    if (std::max({a, b, c}) >= mesh.vertices.size()) throw Error("a triangle refers to a vertex that does not exist");
   // about a point of the mesh, so that a body far from the origin loses nothing
   const Vector3 base = mesh.vertices.empty() ? Vector3::Zero() : mesh.vertices.front();
   double volume = 0;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -640,7 +641,8 @@ TEST_F(Cli, cubicGridsAreExportedAndMeasured) {
   expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "3,4"}}, "resolution", before);
   expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "9", "--max-bytes", "1e6"}}, "excludes",
                 before);
-  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "225"}}, "give fewer cells", before);
+  expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "225"}},
+                "takes 2148 MB as a file, of which Bullet's loader reads 2147 at most", before);
   expectRefused({{"export", field(), "-o", at("x.cdf"), "--resolution", "1e7,1e7,1e7"}}, "give fewer cells", before);
   expectRefused({{"export", field(), "-o", at("x.cdf"), "--max-bytes", "559"}}, "560 at least", before);
   expectRefused({{"export", at("none.hpsdf"), "-o", at("x.cdf")}}, "none.hpsdf", before);
@@ -1430,6 +1432,18 @@ TEST_F(Cli, aReaderThatWentAwayIsAnError) {
   EXPECT_EQ(outcome.status, 2);
   EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
   EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+}
+
+TEST_F(Cli, aFileThatMayNotBeSoLongIsAnError) {
+  rlimit before;
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit few{4096, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &few);
+  const Outcome outcome = run({{"export", field(), "-o", at("grid.cdf"), "--resolution", "9"}});
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("grid.cdf: writing failed"));
+  EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
 }
 
 // Ctrl-C

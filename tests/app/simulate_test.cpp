@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -76,6 +77,132 @@ TEST(Simulate, AMarbleFollowsTheGrooveDownwards) {
   const Json figures = Json::parse(outcome.out);
   EXPECT_EQ(figures["lost"], 0);
   EXPECT_LT(figures["penetration"]["last_second"], 0.02 * figures["penetration"]["size"].get<double>());
+}
+
+/// A cube of this side around the origin; without its last two triangles it is open.
+std::string cubeFile(const support::TemporaryDirectory& folder, const std::string& name, double side, bool open) {
+  const std::string file = (folder / name).string();
+  std::ofstream out(file);
+  for (int corner = 0; corner < 8; ++corner)
+    out << "v " << side * ((corner & 1) - 0.5) << ' ' << side * ((corner >> 1 & 1) - 0.5) << ' '
+        << side * ((corner >> 2) - 0.5) << '\n';
+  out << "f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\n";
+  if (!open) out << "f 2 4 8\nf 2 8 6\n";
+  return file;
+}
+
+TEST(Simulate, WhatFallsForeverOrDoesNotComeIsTold) {
+  const support::TemporaryDirectory folder;
+  const auto figures = [&](std::vector<std::string> words) {
+    words.push_back("--json");
+    const Outcome outcome = runHere(words);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  };
+  // steps of a second, in which cloth passes the ground and its table
+  std::vector<std::string> words = {"simulate",  "cloth", "--nodes",        "16",   "--rate",   "1",
+                                    "--seconds", "20",    "--target-error", "1e-3", "--points", "100"};
+  EXPECT_EQ(figures(words)["lost"], 1);
+  words = {"simulate",       "helix", "--bodies", "3", "--seconds", "2.5", "--ground", "builtin:helix-bowl,cells=32",
+           "--target-error", "1e-3"};
+  EXPECT_EQ(figures(words)["bodies"], 2);
+  EXPECT_EQ(figures(words)["waiting"], 1);
+  EXPECT_THAT(runHere(words).out, HasSubstr("still to come       1 bodies"));
+}
+
+TEST(Simulate, ARunHasBodiesOfAllMeshes) {
+  const support::TemporaryDirectory folder;
+  const auto state = [&](const std::vector<std::string>& bodies) {
+    std::vector<std::string> words = inSmall("run", folder.path().string());
+    words.insert(words.end(), {"--points", "300", "--json"});
+    for (const std::string& body : bodies) words.insert(words.end(), {"--body", body});
+    return Json::parse(runHere(words).out)["state"];
+  };
+  EXPECT_NE(state({"builtin:torus"}), state({"builtin:torus", "builtin:gear"}));
+}
+
+TEST(Simulate, OpenMeshesAreWarnedOf) {
+  const support::TemporaryDirectory folder;
+  const auto warning = [&](bool open) {
+    const Outcome outcome = runHere({"simulate", "cloth", "--ground", cubeFile(folder, "cube.obj", 1, open), "--nodes",
+                                     "16", "--seconds", "0.01", "--target-error", "1e-2", "--points", "50"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(warning(true), HasSubstr("cube.obj is not closed"));
+  EXPECT_THAT(warning(false), testing::Not(HasSubstr("warning")));
+}
+
+void refused(const std::vector<std::string>& words, const std::string& message) {
+  const Outcome outcome = runHere(words);
+  EXPECT_EQ(outcome.status, 2) << message;
+  EXPECT_THAT(outcome.err, HasSubstr(message));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+}
+
+TEST(Simulate, ACacheHoldsWhatIsAskedForOrIsRefused) {
+  const support::TemporaryDirectory folder;
+  const auto words = [&](const std::string& cache, const std::string& error) {
+    return std::vector<std::string>{"simulate", "cloth", "--nodes", "16",  "--seconds",      "0.01",
+                                    "--points", "50",    "--cache", cache, "--target-error", error};
+  };
+  const std::string cache = (folder / "fields").string();
+  ASSERT_EQ(runHere(words(cache, "1e-2")).status, 0);
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(cache)) files.push_back(entry.path());
+  ASSERT_EQ(files.size(), 2u);  // ground and table
+  // another target error, however near, is another field
+  ASSERT_EQ(runHere(words(cache, "1.0000001e-2")).status, 0);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(cache), {}), 4);
+
+  const std::uintmax_t size = std::filesystem::file_size(files[0]);
+  std::filesystem::copy_file(files[0], folder / "good");
+  std::filesystem::resize_file(files[0], size / 2);
+  refused(words(cache, "1e-2"), files[0].string() + ": the field file is damaged");
+  refused(words(cache, "1e-2"), "remove the file");
+  const auto overwrite = std::filesystem::copy_options::overwrite_existing;
+  std::filesystem::copy_file(files[1], files[0], overwrite);
+  refused(words(cache, "1e-2"), files[0].string() + ": is the field of another mesh");
+  // of the same mesh, but coarser
+  const std::string coarse = (folder / "coarse").string();
+  ASSERT_EQ(runHere(words(coarse, "1")).status, 0);
+  const std::string print = files[0].filename().string().substr(0, 16);
+  for (const auto& entry : std::filesystem::directory_iterator(coarse))
+    if (entry.path().filename().string().starts_with(print)) std::filesystem::copy_file(entry, files[0], overwrite);
+  refused(words(cache, "1e-2"), "of another target error");
+  std::filesystem::copy_file(folder / "good", files[0], overwrite);
+  EXPECT_EQ(runHere(words(cache, "1e-2")).status, 0);
+
+  refused(words((folder / "good").string(), "1e-2"), "good: is no folder for fields");
+  refused(words("/sys", "1e-2"), "cannot be written");
+}
+
+/// Ends the work as soon as it is at something.
+struct CancelsWhile final : WorkListener {
+  explicit CancelsWhile(std::string of) : task(std::move(of)) {}
+  void report(std::string_view now, double) override { reached = reached || now == task; }
+  bool wantsCancel() override { return reached; }
+  void ended() override {}
+
+  std::string task;
+  std::atomic<bool> reached = false;
+};
+
+TEST(Simulate, WhatIsCancelledLeavesNothing) {
+  const support::TemporaryDirectory folder;
+  std::istringstream in;
+  for (const std::string task : {"refining", "simulating"}) {
+    const std::string cache = (folder / task).string();
+    std::ostringstream out, err;
+    CancelsWhile listener(task);
+    const std::vector<std::string> words = {"simulate", "cloth", "--nodes",        "100",  "--seconds", "60",
+                                            "--points", "50",    "--target-error", "1e-5", "--cache",   cache};
+    EXPECT_EQ(runProgram(words, Console{in, out, err, false, &listener}), 130) << task;
+    EXPECT_EQ(out.str(), "");
+    EXPECT_THAT(err.str(), testing::EndsWith("hpsdf: cancelled; nothing was written\n"));
+    const auto kept = std::distance(std::filesystem::directory_iterator(cache), {});
+    EXPECT_EQ(kept, task == "refining" ? 0 : 2) << "fields that are whole are kept";
+  }
 }
 
 // Pictures
@@ -179,17 +306,18 @@ TEST(Simulate, OneThatIsBrokenOffLeavesNoPictures) {
 }
 
 TEST(Simulate, MistakesAreToldInALine) {
-  const auto refused = [](const std::vector<std::string>& words, const std::string& message) {
-    const Outcome outcome = runHere(words);
-    EXPECT_EQ(outcome.status, 2) << message;
-    EXPECT_THAT(outcome.err, HasSubstr(message));
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  };
+  const support::TemporaryDirectory folder;
   refused({"simulate", "bowl", "--bodies", "0"}, "bodies");
   refused({"simulate", "bowls"}, "bowl");
   refused({"simulate", "poles", "--body", "none.obj", "--bodies", "1"}, "none.obj");
   refused({"simulate", "poles", "--ground", "builtin:torus"}, "ground: is not for the scene poles");
   refused({"simulate", "cloth", "--bodies", "3"}, "bodies: is not for the scene cloth");
+  refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
+          "builtin:torus,major=0.3,minor=0.1: nothing lies below");
+  for (const double side : {0.01, 100.0})
+    refused({"simulate", "bowl", "--ground", cubeFile(folder, "cube.obj", side, false)}, "for marbles of radius 0.03");
+  std::ofstream(folder / "flat.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  refused({"simulate", "poles", "--body", (folder / "flat.obj").string()}, "flat.obj: a body needs a closed surface");
   refused({"simulate", "poles", "--size", "64x48"}, "size: is for pictures: give output");
   refused({"simulate", "poles", "--fps", "10"}, "fps: is for pictures: give output");
   refused({"simulate", "poles", "-o", "x.png", "--fps", "10"}, "fps: is for films");
@@ -199,8 +327,6 @@ TEST(Simulate, MistakesAreToldInALine) {
   refused({"simulate", "poles", "-o", "x.gif"}, "x.gif");
   // before anything is built: the mesh is not even looked for
   refused({"simulate", "poles", "-o", "none/x.png", "--body", "none.obj"}, "none/x.png");
-  refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
-          "nothing lies below");
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Fields as shapes of Bullet.
 
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletSoftBody/btSoftBody.h>
@@ -71,6 +72,8 @@ TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
   EXPECT_NEAR((mass.inertia - Vector3(2 * 2 + 1, 2 * 2 + 0.25, 1 + 0.25) / 12).cwiseAbs().maxCoeff(), 0, 1e-9);
   EXPECT_NEAR(mass.meshFromInertia.linear().determinant(), 1, 1e-12);
   EXPECT_THROW(massProperties(TriangleMesh{}), Error);
+  mesh.triangles.front()[1] = 1'000'000'000;
+  EXPECT_THROW(massProperties(mesh), Error);
 }
 
 TEST(Spread, KeepsTheDeepestAndWhatSurroundsIt) {
@@ -127,6 +130,104 @@ TEST(BulletField, ABodyComesToRestOnAPlaneAndOnAnother) {
   EXPECT_LT(world.body(onSlab).getLinearVelocity().length(), 0.01);
 }
 
+/// Whichever body Bullet has first.
+TEST(BulletField, TheOrderOfBodiesChangesNothing) {
+  Kind box("box,width=1,height=0.8,depth=0.4"), slab("box,width=4,height=4,depth=0.5");
+  btSphereShape sphere(0.1);
+  btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
+  const auto restsAt = [](btCollisionShape& ground, const Eigen::Isometry3d& groundAt, btCollisionShape& body,
+                          const Eigen::Isometry3d& bodyAt, bool groundIsFirst) {
+    World world;
+    if (groundIsFirst) world.add(ground, 0, groundAt);
+    const std::size_t number = world.add(body, 1, bodyAt);
+    if (!groundIsFirst) world.add(ground, 0, groundAt);
+    for (int step = 0; step < 480; ++step) world.step();
+    return world.worldFromBody(number).translation().z();
+  };
+  const Eigen::Isometry3d below = at({0, 0, -0.25}) * slab.mass.meshFromInertia;
+  for (const bool first : {true, false}) {
+    EXPECT_NEAR(restsAt(slab.shape, below, box.shape, at({0, 0, 0.3}) * box.mass.meshFromInertia, first), 0.2, 1e-3);
+    EXPECT_NEAR(restsAt(slab.shape, below, sphere, at({0, 0, 0.2}), first), 0.1, 1e-3);
+    EXPECT_NEAR(restsAt(plane, at({0, 0, 0}), box.shape, at({0, 0, 0.3}) * box.mass.meshFromInertia, first), 0.2, 1e-3);
+  }
+}
+
+TEST(BulletField, ASphereInsideComesOutOnTheNearerSide) {
+  Kind slab("box,width=3,height=3,depth=1");
+  btSphereShape sphere(0.1);
+  for (const double height : {0.3, 0.1, -0.2}) {
+    World world({.gravity = {0, 0, 0}});
+    world.add(slab.shape, 0, slab.mass.meshFromInertia);
+    world.add(sphere, 1, at({0.1, 0.2, height}));
+    for (int step = 0; step < 240; ++step) world.step();
+    EXPECT_NEAR(world.worldFromBody(1).translation().z(), height > 0 ? 0.6 : -0.6, 0.002) << height;
+  }
+}
+
+TEST(BulletField, BodiesFallAsleepAndWakeWhenHit) {
+  Kind box("box,width=0.6,height=0.6,depth=0.4");
+  btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
+  btSphereShape sphere(0.1);
+  World world;
+  world.add(plane, 0, at({0, 0, 0}));
+  const std::size_t body = world.add(box.shape, 1, at({0, 0, 0.21}) * box.mass.meshFromInertia);
+  for (int step = 0; step < 1000; ++step) world.step();
+  EXPECT_FALSE(world.body(body).isActive());
+  const Vector3 asleep = world.worldFromBody(body).translation();
+  EXPECT_NEAR(asleep.z(), 0.2, 1e-3);
+  const std::size_t ball = world.add(sphere, 1, at({-1, 0, 0.3}));
+  world.body(ball).setLinearVelocity(btVector3(8, 0, 0));
+  for (int step = 0; step < 120; ++step) world.step();
+  EXPECT_GT(world.worldFromBody(body).translation().x() - asleep.x(), 0.1);
+}
+
+/// A table that goes up half a unit by itself.
+TEST(BulletField, AMovingFieldLiftsABodyAndCloth) {
+  Kind slab("box,width=3,height=3,depth=0.4"), box("box,width=0.6,height=0.6,depth=0.4");
+  World world;
+  btRigidBody& table = world.body(world.add(slab.shape, 0, at({0, 0, -0.2}) * slab.mass.meshFromInertia));
+  table.setCollisionFlags(table.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+  table.setActivationState(DISABLE_DEACTIVATION);
+  const std::size_t body = world.add(box.shape, 1, at({0.6, 0, 0.2}) * box.mass.meshFromInertia);
+  const auto corner = [](double x, double y) { return btVector3(0.2 * x - 0.6, 0.2 * y, 0.02); };
+  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
+                                                                   corner(-1, 1), corner(1, 1), 9, 9, 0, true));
+  sheet->getCollisionShape()->setMargin(0.01);
+  sheet->setTotalMass(1, false);
+  world.add(std::move(sheet));
+  constexpr double kSpeed = 0.5;
+  for (int step = 0; step < 480; ++step) {
+    const btVector3 velocity(0, 0, step < 240 ? kSpeed : 0);
+    btTransform place = table.getWorldTransform();
+    place.setOrigin(place.getOrigin() + velocity / 240);
+    table.setWorldTransform(place);
+    table.setLinearVelocity(velocity);
+    world.step();
+  }
+  EXPECT_NEAR(world.worldFromBody(body).translation().z(), kSpeed + 0.2, 0.002);
+  const btSoftBody& cloth = world.softBody(0);
+  for (int node = 0; node < cloth.m_nodes.size(); ++node)
+    EXPECT_NEAR(cloth.m_nodes[node].m_x.z(), kSpeed + 0.005, 0.006) << node;
+}
+
+/// Bullet hands a compound's parts to the algorithm with the compound in their place.
+TEST(BulletField, AsAPartOfACompoundItCollidesWithNothing) {
+  Kind plate("box,width=1,height=1,depth=0.2");
+  btCompoundShape compound;
+  compound.addChildShape(toBullet(plate.mass.meshFromInertia), &plate.shape);
+  btSphereShape sphere(0.1);
+  World world;
+  world.add(compound, 0, at({0, 0, 0}));
+  world.add(sphere, 1, at({0, 0, 0.3}));
+  world.add(plate.shape, 1, at({0, 0, 0.6}) * plate.mass.meshFromInertia);
+  const auto corner = [](double x, double y) { return btVector3(0.4 * x, 0.4 * y, 0.15); };
+  world.add(std::unique_ptr<btSoftBody>(btSoftBodyHelpers::CreatePatch(
+      world.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), 5, 5, 0, true)));
+  for (int step = 0; step < 120; ++step) world.step();
+  EXPECT_LT(world.worldFromBody(1).translation().z(), -0.5);
+  EXPECT_LT(world.softBody(0).m_nodes[12].m_x.z(), -0.5);
+}
+
 TEST(BulletField, ThreadsAndRepetitionsChangeNothing) {
   Kind gear("gear"), slab("box,width=6,height=6,depth=0.5");
   const auto end = [&](int threads) {
@@ -165,7 +266,43 @@ TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
     EXPECT_THAT(error.what(), testing::HasSubstr("step 2: body 1"));
   }
   EXPECT_THROW(world.add(sphere, -1, at(Vector3::Zero())), Error);
+  Eigen::Isometry3d scaled = at(Vector3::Zero());
+  scaled.linear() *= 2;
+  EXPECT_THROW(world.add(sphere, 1, scaled), Error);
   EXPECT_THROW(World({.step = 0}), Error);
+}
+
+/// Bullet leaves it where it is, and says nothing.
+TEST(BulletField, WhatIsThrownOutOfTheWorldBlowsUpToo) {
+  btSphereShape sphere(0.1);
+  World world;
+  world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
+  world.add(sphere, 1, at(Vector3::Zero()));
+  world.body(1).setLinearVelocity(btVector3(0, 1e100, 0));
+  try {
+    world.step();
+    ADD_FAILURE() << "it is left where it was: " << world.worldFromBody(1).translation().transpose();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("step 1: body 1"));
+  }
+}
+
+TEST(BulletField, ANodeThatBlowsUpSaysWhereAndWhen) {
+  World world;
+  world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
+  const auto corner = [](double x, double y) { return btVector3(0.2 * x, 0.2 * y, 0); };
+  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
+                                                                   corner(-1, 1), corner(1, 1), 4, 4, 0, true));
+  world.add(std::move(sheet));
+  world.step();
+  world.softBody(0).m_nodes[5].m_x.setX(std::numeric_limits<double>::quiet_NaN());
+  try {
+    world.step();
+    ADD_FAILURE() << "a place that is no number goes on";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("of soft body 0"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("step 2"));
+  }
 }
 
 TEST(BulletField, AMarbleAtRestFallsAsleepAndStaysInTheFigures) {

@@ -1,6 +1,8 @@
 #include "simulate/scene.h"
 
+#include <BulletSoftBody/btSoftBody.h>
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +10,38 @@
 
 #include "building.h"
 #include "hpsdf/build.h"
+#include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/output_file.h"
 #include "hpsdf/shapes.h"
 #include "long_work.h"
 
 namespace hpsdf::app {
+namespace {
+
+/// Made if it is not there.
+const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Error(fmt::format("{}: is no folder for fields ({})", folder.string(), error.message()));
+  return folder;
+}
+
+Field keptField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
+  try {
+    Field field = load(file);
+    const FieldMetadata& metadata = field.metadata();
+    if (metadata.source.fingerprint == print && metadata.targetError == targetError) return field;
+    throw Error(file.string() + ": is the field of another mesh, or of another target error");
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}; or remove the file, and it is built anew", error.what()));
+  }
+}
+
+}  // namespace
 
 BodyKind::BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, double margin)
     : mesh(std::move(bodyMesh)),
@@ -42,6 +69,11 @@ std::size_t Scene::lost() const {
     const btRigidBody& body = world_.body(n);
     count += !body.isStaticObject() && body.getWorldTransform().getOrigin().z() < floor_;
   }
+  for (std::size_t n = 0; n < world_.softBodies(); ++n) {
+    const btSoftBody::tNodeArray& nodes = world_.softBody(n).m_nodes;
+    count += std::any_of(&nodes[0], &nodes[0] + nodes.size(),
+                         [&](const btSoftBody::Node& node) { return node.m_x.z() < floor_; });
+  }
   return count;
 }
 
@@ -51,8 +83,16 @@ std::size_t Scene::moving() const {
   return count;
 }
 
-TriangleMesh sceneMesh(const std::string& name, bool fileIsYUp, double size) {
+TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size) {
   TriangleMesh mesh = loadMesh(name);
+  try {
+    physics::massProperties(mesh);
+  } catch (const Error& error) {
+    throw Error(name + ": " + error.what());
+  }
+  if (!inspect(mesh).closed())
+    console.err << "hpsdf: warning: " << name << " is not closed: beside its holes bodies may pass, or be pushed inside"
+                << std::endl;
   const bool turns = fileIsYUp && !isShape(name);
   if (turns)
     for (Vector3& x : mesh.vertices) x = Vector3(x.x(), -x.z(), x.y());
@@ -67,17 +107,15 @@ Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRe
   const std::uint64_t print = fingerprint(mesh);
   std::filesystem::path file;
   if (request.cache) {
-    std::filesystem::create_directories(*request.cache);
-    file = *request.cache / fmt::format("{:016x}-{:g}.hpsdf", print, request.targetError);
-    if (std::filesystem::exists(file)) {
-      Field field = load(file);
-      if (field.metadata().source.fingerprint == print) return field;
-      throw Error(file.string() + ": is the field of another mesh: remove it");
-    }
+    file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
+    std::error_code unknown;
+    if (std::filesystem::exists(file, unknown)) return keptField(file, print, request.targetError);
+    checkWritable(file);  // before long work
   }
+  const int threads = tbb::this_task_arena::max_concurrency();
   Field field = withProgress(console, [&](const Progress& progress) {
-    const ExactDistance distance(mesh);
-    return build(distance, domainAround(mesh), {.targetError = request.targetError}, progress);
+    const ExactDistance distance(mesh, threads);
+    return build(distance, domainAround(mesh), {.targetError = request.targetError, .threads = threads}, progress);
   });
   if (request.cache) save(field, file);
   return field;

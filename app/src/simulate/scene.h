@@ -51,9 +51,9 @@ class Scene {
   const std::deque<BodyKind>& kinds() const { return kinds_; }
   /// Below this height a body is lost.
   double floor() const { return floor_; }
-  std::size_t lost() const;
-  std::size_t moving() const;  ///< bodies that are in, and move or may move
-  bool complete() const { return drops_.empty(); }
+  std::size_t lost() const;                              ///< bodies, and soft bodies of which some node is
+  std::size_t moving() const;                            ///< bodies that are in, and move or may move
+  std::size_t waiting() const { return drops_.size(); }  ///< bodies that come later
   /// What bodies are compared with: a marble's radius, or the size of a body.
   double bodySize() const { return bodySize_; }
 
@@ -74,11 +74,12 @@ class Scene {
 /// Throws `Error` for what cannot be made, naming it.
 std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request);
 
-/// The mesh of a file or shape, z up, its middle at the origin and its longest side `size`, or as it is for 0. Throws
-/// `Error` naming it.
-TriangleMesh sceneMesh(const std::string& name, bool fileIsYUp, double size);
+/// The mesh of a file or shape, z up, its middle at the origin and its longest side `size`, or as it is for 0. Warns of
+/// one that is not closed. Throws `Error` naming it, also where it has no volume.
+TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size);
 
-/// The field of a mesh: from the cache's folder if it is there and of this mesh, or else built, and kept there.
+/// The field of a mesh: from the cache's folder if it is there, or else built, by the threads of the caller's TBB
+/// arena, and kept there. Throws `Error` for a folder that cannot be used and for a file in it that is not this field.
 Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRequest& request);
 
 /// What stands upright around the axis z, its middle at the origin.

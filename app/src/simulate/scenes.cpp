@@ -37,23 +37,37 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// Where a marble's centre is when it is let down onto a field from above.
-Vector3 above(const Field& field, double x, double y, double radius) {
+/// Where a marble's centre is when it is let down onto a field from above. `name` is the field's, for the error.
+Vector3 above(const Field& field, const std::string& name, double x, double y, double radius) {
   Vector3 at(x, y, field.domain().max().z() + radius);
   for (int step = 0; step < 10000; ++step) {
     const double gap = field.value(at) - radius;
     if (gap < 1e-4 * radius) break;
     at.z() -= 0.5 * gap;
-    if (at.z() < field.domain().min().z()) throw Error("nothing lies below the marble's start");
+    if (at.z() < field.domain().min().z())
+      throw Error(fmt::format("{}: nothing lies below the marble's start at x = {:g}, y = {:g}", name, x, y));
   }
   return at;
+}
+
+/// Marbles have a size of their own. On ground that is too small there is no room for them; on what is too large they
+/// become so fast that they pass through it in a step.
+void requireFitting(const TriangleMesh& ground, const std::string& name, double radius) {
+  constexpr double kLeast = 10, kMost = 400;  // radii
+  const double width = boundingBox(ground).sizes().head<2>().minCoeff();
+  if (width < kLeast * radius || boundingBox(ground).sizes().maxCoeff() > kMost * radius)
+    throw Error(
+        fmt::format("{}: is {:.3g} wide and {:.3g} high, for marbles of radius {:g}: bring it to {:g} to {:g}; "
+                    "2 suits them",
+                    name, width, boundingBox(ground).sizes().z(), radius, kLeast * radius, kMost * radius));
 }
 
 /// Marbles over something that is open upwards.
 class MarbleScene : public Scene {
  public:
   MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request) {
-    TriangleMesh mesh = sceneMesh(request.ground, request.filesAreYUp, 0);
+    TriangleMesh mesh = sceneMesh(console, request.ground, request.filesAreYUp, 0);
+    requireFitting(mesh, request.ground, radius);
     Field field = sceneField(console, mesh, request);
     kinds_.emplace_back(std::move(mesh), std::move(field), request.samples, radius / 10);
     stand(kinds_.front(), Eigen::Isometry3d::Identity());
@@ -107,7 +121,8 @@ std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request
   struct Helix final : MarbleScene {
     Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
       // where the shape's groove is at y = 0, next to the rim
-      for (std::size_t n = 0; n < from.bodies; ++n) dropMarble(2.0 * double(n), above(ground(), 0.75, 0, bodySize_));
+      for (std::size_t n = 0; n < from.bodies; ++n)
+        dropMarble(2.0 * double(n), above(ground(), from.ground, 0.75, 0, bodySize_));
     }
   };
   return std::make_unique<Helix>(console, request);
@@ -121,21 +136,25 @@ std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) 
       floor_ = table - 1;
       shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
       world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
-      dropMarble(0, above(ground(), 0.92, -0.05, bodySize_));
+      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_));
       constexpr double kPin = 0.2;
-      TriangleMesh mesh = sceneMesh(from.meshes.front(), from.filesAreYUp, kPin);
-      Field field = sceneField(to, mesh, from);
-      kinds_.emplace_back(std::move(mesh), std::move(field), from.samples, 0.01 * kPin);
-      const BodyKind& pin = kinds_.back();
-      const double stands = table - boundingBox(pin.mesh).min().z();
+      std::vector<const BodyKind*> pins;
+      for (const std::string& name : from.meshes) {
+        TriangleMesh mesh = sceneMesh(to, name, from.filesAreYUp, kPin);
+        Field field = sceneField(to, mesh, from);
+        pins.push_back(&kinds_.emplace_back(std::move(mesh), std::move(field), from.samples, 0.01 * kPin));
+      }
       std::size_t left = from.bodies;
       for (int row = 0; left > 0; ++row)
-        for (int i = 0; i <= row && left > 0; ++i, --left)
+        for (int i = 0; i <= row && left > 0; ++i, --left) {
+          const BodyKind& pin = *pins[(from.bodies - left) % pins.size()];
+          const double stands = table - boundingBox(pin.mesh).min().z();
           drop({0,
                 const_cast<physics::FieldShape*>(&pin.shape),
                 200 * pin.mass.volume,
                 shift({0.92 + 1.2 * kPin * (i - 0.5 * row), -0.6 - kPin * row, stands}) * pin.mass.meshFromInertia,
                 {.friction = 0.5}});
+        }
     }
   };
   return std::make_unique<Run>(console, request);
@@ -157,7 +176,7 @@ class PileScene : public Scene {
     bodySize_ = size;
     std::vector<const BodyKind*> made;
     for (const std::string& name : request.meshes)
-      made.push_back(&addKind(console, request, sceneMesh(name, request.filesAreYUp, size), request.samples));
+      made.push_back(&addKind(console, request, sceneMesh(console, name, request.filesAreYUp, size), request.samples));
     return made;
   }
 
@@ -264,7 +283,7 @@ std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request
   struct Cloth final : PileScene {
     Cloth(const Console& to, const SceneRequest& from) : PileScene(from) {
       constexpr double kMargin = 0.01, kSide = 1.6;
-      const TriangleMesh mesh = sceneMesh(from.ground, from.filesAreYUp, 1);
+      const TriangleMesh mesh = sceneMesh(to, from.ground, from.filesAreYUp, 1);
       const double stands = -boundingBox(mesh).min().z();
       const double top = boundingBox(mesh).sizes().z();
       const BodyKind& body = addKind(to, from, mesh, from.samples);

@@ -1,6 +1,7 @@
 #include "simulate/simulation.h"
 
 #include <BulletSoftBody/btSoftBody.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #define XXH_INLINE_ALL
@@ -86,6 +87,7 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
   figures.steps = steps;
   figures.simulated = scene.world().seconds();
   figures.bodies = scene.moving();
+  figures.waiting = scene.waiting();
   figures.lost = scene.lost();
   for (std::size_t n = 0; n < scene.world().softBodies(); ++n)
     figures.nodes += std::size_t(scene.world().softBody(n).m_nodes.size());
@@ -97,7 +99,9 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
 
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
                            double seconds, int threads, const SimulationCamera* camera) {
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  // asked for more than it may have, TBB would complain on stderr
+  const int most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  tbb::task_arena arena(threads > 0 ? std::min(threads, most) : tbb::task_arena::automatic);
   return arena.execute([&] {
     const auto start = std::chrono::steady_clock::now();
     const std::unique_ptr<Scene> made = makeScene(console, scene, request);

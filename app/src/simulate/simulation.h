@@ -14,6 +14,7 @@ namespace hpsdf::app {
 /// Of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
 struct SimulationFigures {
   std::size_t bodies = 0, nodes = 0;  ///< that move
+  std::size_t waiting = 0;            ///< bodies that would have come later
   std::size_t lost = 0;               ///< at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< seconds

@@ -123,7 +123,8 @@ void checkResolution(const GridResolution& resolution) {
   if (bytes <= double(kMostCubicGridBytes)) return;
   std::ostringstream message;
   message << "a grid of " << resolution[0] << " x " << resolution[1] << " x " << resolution[2] << " cells takes "
-          << std::uint64_t(std::min(bytes / 1e6, 1e18)) << " MB as a file, of which Bullet's loader reads 2147 at most;"
+          << std::uint64_t(std::min(std::ceil(bytes / 1e6), 1e18))
+          << " MB as a file, of which Bullet's loader reads 2147 at most;"
           << " give fewer cells";
   throw Error(message.str());
 }

@@ -37,7 +37,8 @@ double sizeOf(const btCollisionObject& object) {
 /// The first point of a node's way in a step at which it is as near as this; its end where there is none. So nothing
 /// that is thin is passed.
 Vector3 whereItTouches(const Field& field, const Vector3& from, const Vector3& to, double near) {
-  const int pieces = int(std::min((to - from).norm() / near, double(kPieces - 1))) + 1;
+  // of a way that is no number, as of any that is too long, the most
+  const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;
   if (pieces == 1) return to;
   std::array<Vector3, kPieces> points;
   std::array<double, kPieces> values;
@@ -59,6 +60,7 @@ void Findings::add(double depth) {
 void FieldAlgorithm::prepare(const btCollisionObject& first, const btCollisionObject& second) noexcept {
   try {
     findings_ = {};
+    failure_ = nullptr;
     find(first, second, findings_);
   } catch (...) {
     failure_ = std::current_exception();
@@ -198,6 +200,7 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
 
 void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) {
   const btCollisionObject& object = fieldOf(first) != nullptr ? first : second;
+  if (fieldOf(object) == nullptr) return;  // a part of a compound
   const btCollisionObject& softObject = &object == &first ? second : first;
   const FieldShape& shape = *fieldOf(object);
   const btSoftBody& soft = *btSoftBody::upcast(&softObject);
@@ -250,6 +253,7 @@ void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionO
 }
 
 void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
+  if (parts_.empty()) return;
   // what btSoftBody's solver of rigid contacts asks for
   const bool fieldIsFirst = fieldOf(*first.getCollisionObject()) != nullptr;
   const btCollisionObject& object = *(fieldIsFirst ? first : second).getCollisionObject();

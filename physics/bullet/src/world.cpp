@@ -18,7 +18,10 @@ using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+constexpr double kFarthest = 1e6;  // in a step: Bullet leaves out what goes farther, where it was, without a word
+
 bool finite(const btVector3& v) { return std::isfinite(v.x() + v.y() + v.z()); }
+bool sane(const btVector3& velocity, double step) { return velocity.length() * step < kFarthest; }
 
 /// Bullet's solver of constraints, and the time that it takes.
 class TimedSolver final : public btSequentialImpulseConstraintSolver {
@@ -75,6 +78,8 @@ std::size_t World::add(btCollisionShape& shape, double mass, const Eigen::Isomet
                        const Material& material) {
   if (!(mass >= 0) || !std::isfinite(mass)) throw Error("world: a body's mass must be a number, 0 or more");
   if (!worldFromBody.matrix().allFinite()) throw Error("world: a body's transform is not finite");
+  if (!worldFromBody.linear().isUnitary(1e-6) || worldFromBody.linear().determinant() < 0)
+    throw Error("world: a body's transform is not rigid: give a rotation and a shift");
   btVector3 inertia(0, 0, 0);
   if (mass > 0) shape.calculateLocalInertia(mass, inertia);
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, &shape, inertia);
@@ -122,12 +127,12 @@ void World::checkFinite() const {
   for (std::size_t n = 0; n < bodies_.size(); ++n) {
     const btTransform& at = bodies_[n]->getWorldTransform();
     if (!finite(at.getOrigin()) || !finite(at.getBasis()[0] + at.getBasis()[1] + at.getBasis()[2]) ||
-        !finite(bodies_[n]->getLinearVelocity()) || !finite(bodies_[n]->getAngularVelocity()))
+        !sane(bodies_[n]->getLinearVelocity(), options_.step) || !finite(bodies_[n]->getAngularVelocity()))
       fail("body " + std::to_string(n));
   }
   for (std::size_t n = 0; n < softBodies_.size(); ++n)
     for (int node = 0; node < softBodies_[n]->m_nodes.size(); ++node)
-      if (!finite(softBodies_[n]->m_nodes[node].m_x) || !finite(softBodies_[n]->m_nodes[node].m_v))
+      if (!finite(softBodies_[n]->m_nodes[node].m_x) || !sane(softBodies_[n]->m_nodes[node].m_v, options_.step))
         fail("node " + std::to_string(node) + " of soft body " + std::to_string(n));
 }
 

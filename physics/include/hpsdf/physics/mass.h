@@ -16,7 +16,8 @@ struct MassProperties {
 };
 
 /// By the divergence theorem, over the tetrahedra of the faces and the origin (Tonon 2004 gives their moments). Throws
-/// `Error` for a mesh without volume; one that is open gives the figures of some closed one.
+/// `Error` for a mesh without volume, with indices out of range or coordinates that are not finite; one that is open
+/// gives the figures of some closed one.
 MassProperties massProperties(const TriangleMesh& mesh);
 
 }  // namespace hpsdf::physics

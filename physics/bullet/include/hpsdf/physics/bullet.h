@@ -21,7 +21,8 @@ inline Vector3 fromBullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 inline btVector3 toBullet(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
 /// A field, and the samples that stand for its surface in other fields, as the shape of any number of bodies. Refers to
-/// both, which must outlive it. A body's frame is that of `MassProperties`: its origin the centre of mass.
+/// both, which must outlive it. A body's frame is that of `MassProperties`: its origin the centre of mass. Not a part
+/// for compounds, in which it collides with nothing.
 class FieldShape final : public btConcaveShape {
  public:
   /// The samples are those of the field's own mesh, in its units, which are the world's. `margin`: of what is outside

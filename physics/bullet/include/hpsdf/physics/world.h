@@ -47,7 +47,7 @@ class World {
 
   /// A rigid body, static where its mass is 0. Refers to the shape, which must outlive the world. Its frame is the
   /// shape's (of a `FieldShape` that of its inertia). Returns its number, from 0 in the order in which bodies were
-  /// added. Throws `Error` for a mass below 0 or not finite and for a transform that is not finite.
+  /// added. Throws `Error` for a mass below 0 or not finite and for a transform that is not finite or not rigid.
   std::size_t add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                   const Material& material = {});
 
@@ -56,8 +56,8 @@ class World {
   /// Takes a soft body over. Returns its number, by itself from 0.
   std::size_t add(std::unique_ptr<btSoftBody> body);
 
-  /// Throws `Error` where a body's place or speed is no longer finite, naming step and body; the world is of no use
-  /// then.
+  /// Throws `Error` where a body's place or speed is no longer finite, or where it would go a million units in a step
+  /// (Bullet leaves such a body where it was, without a word), naming step and body; the world is of no use then.
   void step();
 
   std::uint64_t steps() const { return steps_; }
