@@ -79,7 +79,8 @@ class MarbleScene : public Scene {
  protected:
   const Field& ground() const { return kinds_.front().field; }
 
-  void dropMarble(double seconds, const Vector3& at) {
+  /// In a pile marbles are slowed down, and may fall asleep; alone they roll long.
+  void dropMarble(double seconds, const Vector3& at, bool inPile) {
     constexpr double kDensity = 2500;
     const double mass = kDensity * 4 / 3 * std::numbers::pi * std::pow(bodySize_, 3);
     drop({seconds,
@@ -87,10 +88,10 @@ class MarbleScene : public Scene {
           mass,
           shift(at),
           {.friction = 0.4,
-           .rollingFriction = 0.02 * bodySize_,
-           .linearDamping = 0.05,
-           .angularDamping = 0.1,
-           .restSpeed = 0.2}});
+           .rollingFriction = (inPile ? 0.02 : 0.002) * bodySize_,
+           .linearDamping = inPile ? 0.05 : 0.01,
+           .angularDamping = inPile ? 0.1 : 0.01,
+           .restSpeed = inPile ? 0.2 : 0.0}});
   }
 };
 
@@ -108,8 +109,10 @@ std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request)
           for (double x = -reach; x <= reach && left > 0; x += apart) {
             if (std::hypot(x, y) > reach) continue;
             const Vector3 jitter(random.within(-1, 1), random.within(-1, 1), random.within(-1, 1));
-            dropMarble(0.2 * layer, Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) +
-                                        0.2 * bodySize_ * jitter);
+            dropMarble(
+                0.2 * layer,
+                Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) + 0.2 * bodySize_ * jitter,
+                true);
             --left;
           }
     }
@@ -120,9 +123,9 @@ std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request)
 std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request) {
   struct Helix final : MarbleScene {
     Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
-      // where the shape's groove is at y = 0, next to the rim
+      // where the groove of three turns is at y = 0, away from the rim
       for (std::size_t n = 0; n < from.bodies; ++n)
-        dropMarble(2.0 * double(n), above(ground(), from.ground, 0.75, 0, bodySize_));
+        dropMarble(2.0 * double(n), above(ground(), from.ground, 2.0 / 3, 0, bodySize_), false);
     }
   };
   return std::make_unique<Helix>(console, request);
@@ -132,11 +135,11 @@ std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request
 std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) {
   struct Run final : MarbleScene {
     Run(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.045) {
-      const double table = ground().domain().min().z() - 0.02;
+      const double table = boundingBox(kinds_.front().mesh).min().z() - 0.02;
       floor_ = table - 1;
       shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
       world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
-      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_));
+      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_), false);
       constexpr double kPin = 0.2;
       std::vector<const BodyKind*> pins;
       for (const std::string& name : from.meshes) {
