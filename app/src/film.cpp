@@ -69,6 +69,20 @@ void Film::encode(double framesPerSecond, const Progress& progress) {
                           lastLine(readTextFile((work_.path() / kLog).string()))));
 }
 
+Json Film::about(const render::Image& last, const std::string& renderer, Json rows) const {
+  for (std::size_t frame = 0; frame < rows.size(); ++frame) rows[frame]["file"] = frameName(frame);
+  return {{"output", output_.string()},
+          {"width", last.width},
+          {"height", last.height},
+          {"renderer", renderer},
+          {"frames", std::move(rows)}};
+}
+
+std::string Film::line(const Json& about) {
+  return fmt::format("{}: {} frames, {}x{}, {}\n", about["output"].get<std::string>(), about["frames"].size(),
+                     about["width"].get<int>(), about["height"].get<int>(), about["renderer"].get<std::string>());
+}
+
 void Film::publish(const Json& about) {
   if (folder_) return publishFolder(about);
   copyFile(work_.path() / kMovie, output_);

@@ -27,12 +27,17 @@ class Film {
   /// After the last frame: makes the MP4, if it is to be one. Throws `Error` with ffmpeg's last line when that fails.
   void encode(double framesPerSecond, const Progress& progress);
 
+  /// What is told of it: each frame has a row of `rows`, whose "file" is filled in; `last` is any of the frames.
+  Json about(const render::Image& last, const std::string& renderer, Json rows) const;
+
+  /// The same in a line, of what `about` returned.
+  static std::string line(const Json& about);
+
   /// Puts everything in its place; beside the frames of a folder a file frames.json that tells what they show.
   void publish(const Json& about);
 
-  static std::string frameName(std::size_t frame);
-
  private:
+  static std::string frameName(std::size_t frame);
   void publishFolder(const Json& about);
 
   std::filesystem::path output_;

@@ -61,17 +61,10 @@ void step(const Progress& progress, std::size_t done, std::size_t all) {
 
 /// What the commands report, and a folder's frames.json holds; a frame a row of `rows`.
 void publish(Session& session, const Arguments& arguments, Film& film, const render::Image& image, Json rows) {
-  const std::string output = arguments.text("output");
-  for (std::size_t frame = 0; frame < rows.size(); ++frame) rows[frame]["file"] = Film::frameName(frame);
-  const Json about = {{"output", output},
-                      {"width", image.width},
-                      {"height", image.height},
-                      {"renderer", session.lastRenderer()},
-                      {"frames", rows}};
+  const Json about = film.about(image, session.lastRenderer(), std::move(rows));
   film.publish(about);
   if (session.wantsJson(arguments)) return printJson(session.console().out, about);
-  session.console().out << fmt::format("{}: {} frames, {}x{}, {}\n", output, film.frames(), image.width, image.height,
-                                       session.lastRenderer());
+  session.console().out << Film::line(about);
 }
 
 // turntable

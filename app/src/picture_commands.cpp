@@ -446,22 +446,32 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain)
   return picture;
 }
 
-render::SurfacePicture surfacePicture(const Arguments& arguments) {
+render::SurfacePicture cameraPicture(const Arguments& arguments) {
   render::SurfacePicture picture;
-  const auto camera = arguments.numbers("camera");
-  if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
-  if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0, in domain diagonals");
-  picture.camera.azimuthDegrees = camera[0];
-  picture.camera.elevationDegrees = camera[1];
-  picture.camera.distance = camera[2];
+  if (arguments.has("camera")) {
+    const auto camera = arguments.numbers("camera");
+    if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+    if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0");
+    picture.camera.azimuthDegrees = camera[0];
+    picture.camera.elevationDegrees = camera[1];
+    picture.camera.distance = camera[2];
+  }
   if (arguments.given("view")) {
     if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
     turnTo(picture.camera, arguments.text("view"));
   }
   if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
-  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                              : render::Projection::perspective;
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const Arguments& arguments) {
+  render::SurfacePicture picture = cameraPicture(arguments);
+  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
   if (arguments.given("clip"))
     picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
@@ -473,9 +483,6 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
   picture.arrows = arguments.whole("arrows");
   return picture;
 }

@@ -45,6 +45,10 @@ Vector3 pointOf(const Arguments& arguments, const char* name);
 render::SlicePicture slicePicture(const Arguments& arguments);
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
 
+/// What any picture before a camera takes: camera, view, target, projection, size and samples. Throws `Error` for a
+/// camera out of range.
+render::SurfacePicture cameraPicture(const Arguments& arguments);
+
 /// Throws `Error` for a camera out of range, or options that exclude or need each other. Its plane is the one asked
 /// for, or, in a domain, lies where nobody said otherwise.
 render::SurfacePicture surfacePicture(const Arguments& arguments);

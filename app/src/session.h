@@ -102,6 +102,8 @@ class Session {
   /// The last picture drawn of the current field. Throws `Error` when there is none.
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
+  /// For pictures that are not drawn by `renderer`.
+  void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
   /// Made when first asked for.
   Explorer& explorer();

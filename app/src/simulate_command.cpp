@@ -2,10 +2,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
+#include <optional>
 
 #include "building.h"
 #include "commands.h"
+#include "film.h"
+#include "hpsdf/output_file.h"
 #include "long_work.h"
+#include "pictures.h"
 #include "session.h"
 #include "simulate/scene_request.h"
 #include "simulate/simulation.h"
@@ -32,7 +38,7 @@ SceneRequest requestOf(const Arguments& arguments) {
   refuse(arguments, "body", !request.meshes.empty());
   if (arguments.given("bodies")) request.bodies = std::size_t(arguments.whole("bodies"));
   if (arguments.given("nodes")) request.nodes = std::size_t(arguments.whole("nodes"));
-  if (arguments.given("samples")) request.samples = std::size_t(arguments.whole("samples"));
+  if (arguments.given("points")) request.samples = std::size_t(arguments.whole("points"));
   if (arguments.given("ground")) request.ground = arguments.text("ground");
   if (arguments.given("body")) request.meshes = arguments.texts("body");
   if (arguments.has("cache")) request.cache = arguments.text("cache");
@@ -98,17 +104,148 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
   return text;
 }
 
-void runSimulate(Session& session, const Arguments& arguments) {
-  const Console& console = session.console();
-  const SceneRequest request = requestOf(arguments);
-  const double seconds = arguments.given("seconds") ? arguments.number("seconds") : kindOf(arguments).seconds;
-  const std::string scene = arguments.text("scene");
-  const SimulationFigures figures = simulate(console, scene, request, seconds, int(arguments.whole("threads")));
-  if (session.wantsJson(arguments)) return printJson(console.out, jsonOf(scene, request, figures));
-  console.out << textOf(scene, request, figures);
+// Pictures
+
+/// What they share with those of `render`.
+constexpr const char* kLooks[] = {"camera", "view", "target", "projection", "size", "samples", "cpu", "gl"};
+
+bool isStill(const Arguments& arguments) { return lowerExtension(arguments.text("output")) == ".png"; }
+
+double framesPerSecond(const Arguments& arguments) { return isStill(arguments) ? 0 : arguments.number("fps"); }
+
+double secondsOf(const Arguments& arguments) {
+  return arguments.given("seconds") ? arguments.number("seconds") : kindOf(arguments).seconds;
 }
 
-Command simulateCommand() {
+void checkFilm(const Arguments& arguments) {
+  if (isStill(arguments)) {
+    if (arguments.given("fps")) throw Error("fps: is for films; a .png shows the end");
+    return;
+  }
+  constexpr double kMostFrames = 10000;
+  const double fps = arguments.number("fps"), rate = arguments.number("rate");
+  if (fps > rate)
+    throw Error(fmt::format("fps: {:g} frames a second need as many steps; there are {:g}: give rate", fps, rate));
+  if (secondsOf(arguments) * fps >= kMostFrames)
+    throw Error(fmt::format("fps: {:g} s of {:g} frames are more than {:g} frames: give fewer a second",
+                            secondsOf(arguments), fps, kMostFrames));
+}
+
+void checkSimulate(const Arguments& arguments) {
+  if (arguments.given("output")) {
+    cameraPicture(arguments);
+    backend(arguments);
+    return checkFilm(arguments);
+  }
+  if (arguments.given("fps")) throw Error("fps: is for pictures: give output");
+  for (const char* name : kLooks)
+    if (arguments.given(name)) throw Error(fmt::format("{}: is for pictures: give output", name));
+}
+
+SimulationFigures simulateAs(const Console& console, const Arguments& arguments, const SceneRequest& request,
+                             const SimulationCamera* camera = nullptr) {
+  return simulate(console, arguments.text("scene"), request, secondsOf(arguments), int(arguments.whole("threads")),
+                  camera);
+}
+
+/// The scene's own camera where nothing else is said.
+SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
+  render::SurfacePicture look = cameraPicture(arguments);
+  const auto& [azimuth, elevation] = kindOf(arguments).view;
+  if (!arguments.given("camera")) look.camera.distance = 1;
+  if (!arguments.given("camera") && !arguments.given("view")) {
+    look.camera.azimuthDegrees = azimuth;
+    look.camera.elevationDegrees = elevation;
+  }
+  return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
+}
+
+/// What came of a simulation and its pictures.
+struct Outcome {
+  SimulationFigures figures;
+  Json pictures = {};     // null without any
+  std::string line = {};  // the same
+};
+
+/// The field that it shows becomes the current one, of which it is the picture.
+Outcome runStill(Session& session, const Arguments& arguments, const SceneRequest& request) {
+  const std::string file = arguments.text("output");
+  checkWritable(file);
+  std::optional<CurrentField> shown;
+  std::optional<render::Drawn> drawn;
+  const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
+    shown.emplace(shot.field, shot.field.metadata().source.name);
+    drawn = std::move(shot.drawn);
+    session.setLastRenderer(shot.renderer);
+  });
+  const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
+  const int width = drawn->image.width, height = drawn->image.height;
+  savePng(drawn->image, file);
+  session.setField(std::move(*shown));
+  session.setPicture(std::move(*drawn));
+  return {figures,
+          {{"output", file}, {"width", width}, {"height", height}, {"renderer", session.lastRenderer()}},
+          fmt::format("{}: {}x{}, {}\n", file, width, height, session.lastRenderer())};
+}
+
+Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
+  Film film(arguments.text("output"));
+  const InterruptGuard guard;  // until all is in its place
+  Json rows = Json::array();
+  render::Image last;
+  const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
+    last = std::move(shot.drawn.image);
+    film.add(last);
+    rows.push_back({{"file", ""}, {"seconds", shot.seconds}, {"contacts", shot.contacts}});
+    session.setLastRenderer(shot.renderer);
+  });
+  const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
+  withProgress(session.console(), [&](const Progress& progress) {
+    film.encode(framesPerSecond(arguments), progress);
+    return true;
+  });
+  const Json about = film.about(last, session.lastRenderer(), std::move(rows));
+  film.publish(about);
+  return {figures, about, Film::line(about)};
+}
+
+Outcome runScene(Session& session, const Arguments& arguments) {
+  const SceneRequest request = requestOf(arguments);
+  if (!arguments.given("output")) return {simulateAs(session.console(), arguments, request)};
+  return isStill(arguments) ? runStill(session, arguments, request) : runFilm(session, arguments, request);
+}
+
+void runSimulate(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const Outcome outcome = runScene(session, arguments);
+  const std::string scene = arguments.text("scene");
+  const SceneRequest request = requestOf(arguments);
+  if (!session.wantsJson(arguments)) {
+    console.out << textOf(scene, request, outcome.figures) << outcome.line;
+    return;
+  }
+  Json json = jsonOf(scene, request, outcome.figures);
+  if (!outcome.pictures.is_null()) json["pictures"] = outcome.pictures;
+  printJson(console.out, json);
+}
+
+/// Those of `render` that simulations take too.
+std::vector<Parameter> lookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters;
+  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
+  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  camera.help =
+      "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
+      "view, which is the default; each scene has its own direction.";
+  camera.defaultText.clear();
+  Parameter& target = *std::ranges::find(parameters, "target", &Parameter::name);
+  target.help =
+      "The point in the picture's middle, in the scene's coordinates, z up; when left out, all of the scene is in the "
+      "middle.";
+  return parameters;
+}
+
+Command simulateCommand(const Registry& registry) {
   std::string kinds;
   std::vector<std::string> names;
   for (const SceneKind& kind : scenes()) {
@@ -117,7 +254,7 @@ Command simulateCommand() {
         fmt::format("{}: {}{}; {:g} s.\n", kind.name, kind.help,
                     kind.defaults.bodies > 1 ? fmt::format(", {} by default", kind.defaults.bodies) : "", kind.seconds);
   }
-  return {
+  Command command{
       .name = "simulate",
       .summary = "Let things fall onto each other, their fields as colliders: the paper's scenes, by Bullet.",
       .help = "SCENE is one of\n" + kinds +
@@ -127,9 +264,17 @@ Command simulateCommand() {
               "9.81. Tells how many samples lay in other bodies, how deep, and what a step took. The same scene, "
               "settings and seed end in the same state, whatever the number of threads.\n"
               "\n"
+              "With --output it is drawn, which changes nothing of it: bodies in colours of their own, what stands in "
+              "clay, what has yet to come not at all. The field of one standing body is traced; in a script a still is "
+              "its picture, and it becomes the current field. All else are meshes, whose vertices within a pixel of "
+              "each other are drawn as one. Without a graphics card a frame takes some tenths of a second, with "
+              "hundreds of bodies of 100,000 triangles several seconds.\n"
+              "\n"
               "The paper's meshes are not part of the program: give your own with --body and --ground.",
       .examples = {"hpsdf simulate bowl", "hpsdf simulate poles --body bunny.obj --body dragon.obj --cache fields",
-                   "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json"},
+                   "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json",
+                   "hpsdf simulate bowl --bodies 300 --seconds 2 -o bowl.png --samples 2",
+                   "hpsdf simulate slope -o slope.mp4 --view front --size 960x540"},
       .parameters = {{.name = "scene",
                       .type = ParameterType::choice,
                       .help = "Which scene.",
@@ -153,7 +298,7 @@ Command simulateCommand() {
                       .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
                       .minimum = 4,
                       .maximum = 1e6},
-                     {.name = "samples",
+                     {.name = "points",
                       .type = ParameterType::wholeNumber,
                       .help = "Points on the surface of each kind of body.",
                       .minimum = 1,
@@ -202,12 +347,28 @@ Command simulateCommand() {
                       .defaultText = "1",
                       .minimum = 0,
                       .maximum = 1e9},
-                     threadsParameter("The simulation is")},
-      .action = runSimulate};
+                     threadsParameter("The simulation is"),
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as "
+                              "'turntable' has it; or *.mp4, for which ffmpeg must be installed. Without it nothing is "
+                              "drawn.",
+                      .valueName = "FILE.png|FOLDER|FILE.mp4",
+                      .alias = 'o'},
+                     {.name = "fps",
+                      .type = ParameterType::number,
+                      .help = "Frames a simulated second, at which an .mp4 plays.",
+                      .defaultText = "30",
+                      .minimum = 0.1,
+                      .maximum = 10000}},
+      .action = runSimulate,
+      .check = checkSimulate};
+  std::ranges::move(lookParameters(registry), std::back_inserter(command.parameters));
+  return command;
 }
 
 }  // namespace
 
-void addSimulateCommand(Registry& registry) { registry.add(simulateCommand()); }
+void addSimulateCommand(Registry& registry) { registry.add(simulateCommand(registry)); }
 
 }  // namespace hpsdf::app

@@ -392,6 +392,7 @@ class SurfaceShader {
 }  // namespace
 
 Color paperColor() { return kPaper; }
+Color surfaceColor() { return kClay; }
 
 LinearColor backdropColor(double fromTop) {
   return fromOklab({0.975 - 0.06 * fromTop * fromTop, -0.003, -0.006 - 0.004 * fromTop});

@@ -52,6 +52,14 @@ Frame frameOf(const Picture& picture) {
   return result;
 }
 
+Frame frameOfSurface(const SurfacePicture& picture) {
+  Frame result = frameOf(picture);
+  if (!picture.caption || picture.color != ColorBy::normal) return result;
+  result.view.x1 = picture.width;
+  result.panel = {};
+  return result;
+}
+
 double lineWidthOf(const Frame& frame) { return std::max(0.7, frame.textSize / 15); }
 
 // Where a slice shows the domain, in pixels.
@@ -304,6 +312,11 @@ ViewSize viewSize(int pictureWidth, int pictureHeight) {
   return {view.width(), view.height()};
 }
 
+ViewSize viewSize(const SurfacePicture& picture) {
+  const PixelRect view = frameOfSurface(picture).view;
+  return {view.width(), view.height()};
+}
+
 namespace {
 
 SliceView wholeSection(const Box& domain, const Plane& plane, int width, int height) {
@@ -444,7 +457,7 @@ Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture
 }
 
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence) {
-  const Frame frame = frameOf(picture);
+  const Frame frame = frameOfSurface(picture);
   checkColor(picture.color, ColorBy::distance, evidence);
   checkArrows(picture.arrows);
   checkOffset(picture.offset);
@@ -506,10 +519,11 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     details.push_back(std::string("cut at ") + "xyz"[picture.clip->axis] + " = " + formatNumber(picture.clip->offset));
   details.push_back(formatCount(figures.leaves) + " cells");
   details.push_back(describeTarget(field));
-  addCaption(furniture, frame, describeSource(field), details);
+  const Caption caption = picture.caption.value_or(Caption{describeSource(field), std::move(details)});
+  addCaption(furniture, frame, caption.name, caption.details);
   paint(image, furniture);
   const bool seen = scene.seen();
-  return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), std::move(details),
+  return {std::move(image), view, std::move(buffers), samples, seen, std::move(legend), caption.details,
           std::move(drawn)};
 }
 

@@ -323,6 +323,26 @@ TEST(Picture, ABarePictureIsTheViewAloneAndItsLegendComesWithIt) {
   EXPECT_NEAR(bar.marks[1].place, 1 / 3.0, 1e-12);
 }
 
+TEST(Picture, ACaptionOfOnesOwnStandsInPlaceOfWhatIsKnownOfTheField) {
+  const Field field = planeField();
+  FakeRenderer renderer(field);
+  SurfacePicture picture{.camera = {}, .width = 400, .height = 240};
+  const Drawn plain = drawSurface(renderer, field, picture);
+  EXPECT_EQ(viewSize(picture).width, plain.buffers.width);
+  picture.caption = Caption{"a scene", {"t = 1 s"}};
+  const Drawn drawn = drawSurface(renderer, field, picture);
+  EXPECT_EQ(drawn.details, std::vector<std::string>{"t = 1 s"});
+  EXPECT_EQ(drawn.buffers.width, 400) << "no legend: the view has its room";
+  EXPECT_EQ(drawn.buffers.height, plain.buffers.height);
+  EXPECT_EQ(viewSize(picture).width, 400);
+  picture.caption->details = {"t = 2 s"};
+  EXPECT_NE(drawSurface(renderer, field, picture).image.pixels, drawn.image.pixels);
+  picture.color = ColorBy::degree;
+  EXPECT_EQ(drawSurface(renderer, field, picture).buffers.width, plain.buffers.width) << "its colours have a legend";
+  picture.bare = true;
+  EXPECT_EQ(viewSize(picture).height, 240);
+}
+
 TEST(Picture, ASliceIsZoomedAboutItsTargetWithinItsPlane) {
   const Field field = planeField();
   SlicePicture picture{AxisPlane{2, 0.5}, ColorBy::degree, 320, 240};

@@ -3,7 +3,8 @@
 
 namespace hpsdf::app {
 
-SimulationFigures simulate(const Console&, const std::string&, const SceneRequest&, double, int) {
+SimulationFigures simulate(const Console&, const std::string&, const SceneRequest&, double, int,
+                           const SimulationCamera*) {
   throw Error("simulate: this program was built without Bullet: install libbullet-dev, and build it anew");
 }
 

@@ -55,13 +55,12 @@ void Scene::stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, 
   world_.add(const_cast<physics::FieldShape&>(kind.shape), 0, worldFromMesh * kind.mass.meshFromInertia, material);
 }
 
-void Scene::step() {
+void Scene::admit() {
   while (!drops_.empty() && drops_.front().seconds <= world_.seconds()) {
     const Drop& next = drops_.front();
     world_.add(*next.shape, next.mass, next.worldFromBody, next.material);
     drops_.pop_front();
   }
-  world_.step();
 }
 
 std::size_t Scene::lost() const {

@@ -35,8 +35,20 @@ class Scene {
   virtual ~Scene() = default;
 
   physics::World& world() { return world_; }
-  /// Adds what is due, and steps.
-  void step();
+  const physics::World& world() const { return world_; }
+  /// Lets in what is due, before each step.
+  void admit();
+
+  /// A body that comes at some time.
+  struct Drop {
+    double seconds;
+    btCollisionShape* shape;
+    double mass;
+    Eigen::Isometry3d worldFromBody;
+    physics::Material material;
+  };
+  const std::deque<Drop>& drops() const { return drops_; }  ///< still to come
+  const std::deque<BodyKind>& kinds() const { return kinds_; }
   /// Below this height a body is lost.
   double floor() const { return floor_; }
   std::size_t lost() const;                              ///< bodies, and soft bodies of which some node is
@@ -46,15 +58,6 @@ class Scene {
   double bodySize() const { return bodySize_; }
 
  protected:
-  /// A body that comes at some time.
-  struct Drop {
-    double seconds;
-    btCollisionShape* shape;
-    double mass;
-    Eigen::Isometry3d worldFromBody;
-    physics::Material material;
-  };
-
   void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
   /// In the order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }

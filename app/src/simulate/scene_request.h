@@ -1,6 +1,7 @@
 #pragma once
 // The paper's simulations (sec. 4, Figs. 1, 7, 8, 9), as far as they can be asked for without Bullet at hand.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -29,6 +30,7 @@ struct SceneKind {
   std::string help;
   SceneRequest defaults;
   double seconds;
+  std::array<double, 2> view;  ///< azimuth and elevation in degrees, from where one sees what happens
 };
 
 /// All of them.

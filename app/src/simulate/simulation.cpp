@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "long_work.h"
 #include "simulate/scene.h"
+#include "simulate/studio.h"
 
 namespace hpsdf::app {
 namespace {
@@ -46,14 +48,42 @@ void addStep(const physics::StepFigures& step, double size, bool lastSecond, Sim
   if (lastSecond) figures.deepestAtEnd = std::max(figures.deepestAtEnd, step.dispatch.deepest);
 }
 
-SimulationFigures run(Scene& scene, std::uint64_t steps, double rate, const Progress& progress) {
+/// Takes the pictures that are due, where there is a camera.
+class Photographer {
+ public:
+  Photographer(const Scene& scene, const std::string& name, const SimulationCamera* camera, double rate)
+      : camera_(camera) {
+    if (camera == nullptr) return;
+    studio_.emplace(scene, name, camera->look, camera->backend);
+    if (camera->framesPerSecond > 0) stepsAFrame_ = rate / camera->framesPerSecond;
+  }
+
+  void after(std::uint64_t steps, bool last) {
+    if (!studio_ || (stepsAFrame_ > 0 ? double(steps) < std::round(stepsAFrame_ * double(frames_)) : !last)) return;
+    camera_->take(studio_->shot());
+    ++frames_;
+  }
+
+ private:
+  const SimulationCamera* camera_;
+  std::optional<Studio> studio_;
+  double stepsAFrame_ = 0;  // 0: none but the last
+  std::uint64_t frames_ = 0;
+};
+
+SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps, double rate,
+                      const SimulationCamera* camera, const Progress& progress) {
   SimulationFigures figures;
+  Photographer photographer(scene, name, camera, rate);
   for (std::uint64_t step = 0; step < steps; ++step) {
     if (progress.cancelled()) throw Cancelled();
     progress.report("simulating", double(step) / double(steps));
-    scene.step();
+    scene.admit();
+    photographer.after(step, false);
+    scene.world().step();
     addStep(scene.world().figures(), scene.bodySize(), double(steps - step) <= rate, figures);
   }
+  photographer.after(steps, true);
   figures.steps = steps;
   figures.simulated = scene.world().seconds();
   figures.bodies = scene.moving();
@@ -68,7 +98,7 @@ SimulationFigures run(Scene& scene, std::uint64_t steps, double rate, const Prog
 }  // namespace
 
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
-                           double seconds, int threads) {
+                           double seconds, int threads, const SimulationCamera* camera) {
   // asked for more than it may have, TBB would complain on stderr
   const int most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   tbb::task_arena arena(threads > 0 ? std::min(threads, most) : tbb::task_arena::automatic);
@@ -77,8 +107,9 @@ SimulationFigures simulate(const Console& console, const std::string& scene, con
     const std::unique_ptr<Scene> made = makeScene(console, scene, request);
     const double setUpSeconds = secondsSince(start);
     const auto steps = std::max<std::uint64_t>(1, std::uint64_t(std::llround(seconds / request.step)));
-    SimulationFigures figures =
-        withProgress(console, [&](const Progress& progress) { return run(*made, steps, 1 / request.step, progress); });
+    SimulationFigures figures = withProgress(console, [&](const Progress& progress) {
+      return run(*made, scene, steps, 1 / request.step, camera, progress);
+    });
     figures.setUpSeconds = setUpSeconds;
     return figures;
   });

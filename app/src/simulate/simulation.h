@@ -1,8 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
+#include "hpsdf/field.h"
+#include "hpsdf/render/picture.h"
 #include "session.h"
 #include "simulate/scene_request.h"
 
@@ -23,9 +26,28 @@ struct SimulationFigures {
   std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end
 };
 
-/// Runs a scene. Throws `Error` for what cannot be made or simulated, and in a program that was built without Bullet;
-/// `Cancelled` after Ctrl-C.
+/// A picture of a simulation.
+struct SimulationShot {
+  render::Drawn drawn;
+  const Field& field;  ///< whose surface and coordinates it has; good while it is taken
+  const std::string& renderer;
+  double seconds;  ///< simulated
+  std::size_t contacts;
+};
+
+/// How a simulation is drawn: it goes on as if it were not.
+struct SimulationCamera {
+  /// Camera, size and samples. The camera's distance is a multiple of that at which all of the scene is just in view,
+  /// and it circles the scene's middle where it has no target.
+  render::SurfacePicture look;
+  Backend backend;
+  double framesPerSecond = 0;  ///< simulated ones, the start first; 0: one picture, of the end
+  std::function<void(SimulationShot)> take;
+};
+
+/// Runs a scene, and takes pictures of it where there is a camera. Throws `Error` for what cannot be made or simulated,
+/// and in a program that was built without Bullet; `Cancelled` after Ctrl-C.
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
-                           double seconds, int threads);
+                           double seconds, int threads, const SimulationCamera* camera = nullptr);
 
 }  // namespace hpsdf::app

@@ -18,6 +18,9 @@ namespace hpsdf::render {
 /// A colour for the body of this index: neighbours differ, and none is near the clay of a field's surface.
 Color bodyColor(std::size_t index);
 
+/// The clay of a field's surface where colours mean nothing, for bodies that are to look like one.
+Color surfaceColor();
+
 /// A mesh somewhere in the world.
 struct Body {
   std::uint32_t mesh = 0;  ///< index among those of the renderer

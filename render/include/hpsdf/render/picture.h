@@ -99,6 +99,12 @@ struct ShownBodies {
   std::string note = {};  ///< what the caption says of them, e.g. "t = 2.5 s"
 };
 
+/// A caption of one's own.
+struct Caption {
+  std::string name = {};
+  std::vector<std::string> details = {};  ///< those that fit are taken, the most important first
+};
+
 struct SurfacePicture {
   OrbitCamera camera;
   double offset = 0;
@@ -115,6 +121,9 @@ struct SurfacePicture {
   ShownCells cells = {};
   int arrows = 0;  ///< as in slices
   ShownBodies bodies = {};
+  /// In place of what is known of the field, which is but a part of what is shown: as caption, and, where the colours
+  /// mean nothing, beside the view, which takes that room.
+  std::optional<Caption> caption = {};
 };
 
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
@@ -191,6 +200,8 @@ struct ViewSize {
   int height = 0;
 };
 ViewSize viewSize(int pictureWidth, int pictureHeight);
+/// The same of a picture that may be bare or have a caption of its own.
+ViewSize viewSize(const SurfacePicture& picture);
 
 /// The slice's view in the picture: what `draw` colours. Its pixels are square at `viewSize`.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
