@@ -28,13 +28,16 @@ MassProperties massProperties(const TriangleMesh& mesh) {
   const Vector3 center = first / volume;
   const Eigen::Matrix3d covariance = second / volume - center * center.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-  MassProperties properties{volume, Eigen::Isometry3d::Identity(), Vector3::Zero()};
+  MassProperties properties{volume, Eigen::Isometry3d::Identity(), Vector3::Zero(), Box()};
   Eigen::Matrix3d rotation = axes.eigenvectors();
   if (rotation.determinant() < 0) rotation.col(2) = -rotation.col(2);
   properties.meshFromInertia.linear() = rotation;
   properties.meshFromInertia.translation() = base + center;
   const Vector3 along = axes.eigenvalues().cwiseMax(0);
   properties.inertia = Vector3::Constant(along.sum()) - along;
+  const Eigen::Isometry3d inertiaFromMesh = properties.meshFromInertia.inverse();
+  for (const auto& face : mesh.triangles)
+    for (const std::uint32_t vertex : face) properties.box.extend(inertiaFromMesh * mesh.vertices[vertex]);
   return properties;
 }
 

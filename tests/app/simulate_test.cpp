@@ -79,6 +79,106 @@ TEST(Simulate, AMarbleFollowsTheGrooveDownwards) {
   EXPECT_LT(figures["penetration"]["last_second"], 0.02 * figures["penetration"]["size"].get<double>());
 }
 
+// Pictures
+
+std::string readFile(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<std::string> joined(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST(Simulate, AFilmShowsItAndChangesNothing) {
+  const support::TemporaryDirectory folder;
+  const std::string cache = folder.path() / "cache";
+  const auto at = [&](const std::string& name) { return (folder.path() / name).string(); };
+  for (const char* scene : {"bowl", "slope", "cloth"}) {
+    std::vector<std::string> words = {"simulate", scene,       "--target-error", "1e-4",  "--cache",
+                                      cache,      "--seconds", "0.75",           "--json"};
+    if (scene == std::string("bowl"))
+      words = joined(words, {"--ground", "builtin:structured-bowl,cells=24,bumps=4", "--bodies", "300"});
+    else
+      words = joined(words, {"--points", "500"});
+    if (scene == std::string("slope")) words = joined(words, {"--bodies", "8"});
+    if (scene == std::string("cloth")) words = joined(words, {"--nodes", "400"});
+    const std::vector<std::string> look = {"--cpu", "--size", "96x64"};
+    const Json undrawn = Json::parse(runHere(words).out);
+    const Outcome outcome = runHere(joined(joined(words, look), {"--fps", "8", "-o", at(scene)}));
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json film = Json::parse(outcome.out);
+    EXPECT_EQ(film["state"], undrawn["state"]) << scene;
+    EXPECT_EQ(film["pictures"], Json::parse(readFile(at(scene) + "/frames.json")));
+    ASSERT_EQ(film["pictures"]["frames"].size(), 7u);
+    std::set<std::string> different;
+    for (std::size_t frame = 0; frame < 7; ++frame) {
+      EXPECT_EQ(film["pictures"]["frames"][frame]["seconds"], double(frame) / 8);
+      different.insert(readFile(at(scene) + "/frame-000" + std::to_string(frame) + ".png"));
+    }
+    EXPECT_EQ(different.size(), 7u) << "what moves is seen to move";
+
+    // on one thread, and the last frame alone
+    ASSERT_EQ(runHere(joined(joined(words, look), {"--fps", "8", "-o", at("again"), "--threads", "1"})).status, 0);
+    for (int frame = 0; frame < 7; ++frame) {
+      const std::string name = "/frame-000" + std::to_string(frame) + ".png";
+      EXPECT_TRUE(readFile(at("again") + name) == readFile(at(scene) + name)) << scene << name;
+    }
+    const Outcome still = runHere(joined(joined(words, look), {"-o", at("end.png")}));
+    ASSERT_EQ(still.status, 0) << still.err;
+    EXPECT_EQ(Json::parse(still.out)["state"], undrawn["state"]) << scene;
+    EXPECT_EQ(Json::parse(still.out)["pictures"]["renderer"], "CPU, double precision");
+    EXPECT_TRUE(readFile(at("end.png")) == readFile(at(scene) + "/frame-0006.png")) << scene;
+  }
+}
+
+TEST(Simulate, AStillIsThePictureOfAScript) {
+  const support::TemporaryDirectory folder;
+  const std::string still =
+      "simulate helix ground=builtin:helix-bowl,cells=32 target-error=1e-4 seconds=0.1 cpu=true "
+      "size=96x64 output=\"" +
+      (folder.path() / "s.png").string() + "\"";
+  const auto script = [&](const std::string& more) { return runHere({"run", "-e", still + "; " + more}); };
+  const Outcome good = script("expect pick(48,40).position.2 == 0 within 0.5; info");
+  EXPECT_EQ(good.status, 0) << good.err << good.out;
+  EXPECT_THAT(good.out, HasSubstr("helix-bowl"));
+  EXPECT_EQ(script("expect pick(48,40).position.2 > 5").status, 1);
+}
+
+struct Impatient final : WorkListener {
+  void report(std::string_view task, double fraction) override { simulating |= task == "simulating" && fraction > 0.3; }
+  bool wantsCancel() override { return simulating; }
+  void ended() override {}
+  bool simulating = false;
+};
+
+TEST(Simulate, OneThatIsBrokenOffLeavesNoPictures) {
+  const support::TemporaryDirectory folder;
+  const std::string output = folder.path() / "frames";
+  Impatient listener;
+  std::istringstream in;
+  std::ostringstream out, err;
+  const std::vector<std::string> words = {"simulate",
+                                          "helix",
+                                          "--ground",
+                                          "builtin:helix-bowl,cells=32",
+                                          "--target-error",
+                                          "1e-4",
+                                          "--seconds",
+                                          "1",
+                                          "--cpu",
+                                          "--size",
+                                          "64x48",
+                                          "--fps",
+                                          "10",
+                                          "-o",
+                                          output};
+  const int status = runProgram(words, Console{in, out, err, false, &listener});
+  EXPECT_EQ(status, kExitCancelled) << err.str();
+  EXPECT_FALSE(std::filesystem::exists(output));
+}
+
 /// A cube of this side around the origin; without its last two triangles it is open.
 std::string cubeFile(const support::TemporaryDirectory& folder, const std::string& name, double side, bool open) {
   const std::string file = (folder / name).string();
@@ -205,106 +305,6 @@ TEST(Simulate, WhatIsCancelledLeavesNothing) {
   }
 }
 
-// Pictures
-
-std::string readFile(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::vector<std::string> joined(std::vector<std::string> words, const std::vector<std::string>& more) {
-  words.insert(words.end(), more.begin(), more.end());
-  return words;
-}
-
-TEST(Simulate, AFilmShowsItAndChangesNothing) {
-  const support::TemporaryDirectory folder;
-  const std::string cache = folder.path() / "cache";
-  const auto at = [&](const std::string& name) { return (folder.path() / name).string(); };
-  for (const char* scene : {"bowl", "slope", "cloth"}) {
-    std::vector<std::string> words = {"simulate", scene,       "--target-error", "1e-4",  "--cache",
-                                      cache,      "--seconds", "0.75",           "--json"};
-    if (scene == std::string("bowl"))
-      words = joined(words, {"--ground", "builtin:structured-bowl,cells=24,bumps=4", "--bodies", "300"});
-    else
-      words = joined(words, {"--points", "500"});
-    if (scene == std::string("slope")) words = joined(words, {"--bodies", "8"});
-    if (scene == std::string("cloth")) words = joined(words, {"--nodes", "400"});
-    const std::vector<std::string> look = {"--cpu", "--size", "96x64"};
-    const Json undrawn = Json::parse(runHere(words).out);
-    const Outcome outcome = runHere(joined(joined(words, look), {"--fps", "8", "-o", at(scene)}));
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const Json film = Json::parse(outcome.out);
-    EXPECT_EQ(film["state"], undrawn["state"]) << scene;
-    EXPECT_EQ(film["pictures"], Json::parse(readFile(at(scene) + "/frames.json")));
-    ASSERT_EQ(film["pictures"]["frames"].size(), 7u);
-    std::set<std::string> different;
-    for (std::size_t frame = 0; frame < 7; ++frame) {
-      EXPECT_EQ(film["pictures"]["frames"][frame]["seconds"], double(frame) / 8);
-      different.insert(readFile(at(scene) + "/frame-000" + std::to_string(frame) + ".png"));
-    }
-    EXPECT_EQ(different.size(), 7u) << "what moves is seen to move";
-
-    // on one thread, and the last frame alone
-    ASSERT_EQ(runHere(joined(joined(words, look), {"--fps", "8", "-o", at("again"), "--threads", "1"})).status, 0);
-    for (int frame = 0; frame < 7; ++frame) {
-      const std::string name = "/frame-000" + std::to_string(frame) + ".png";
-      EXPECT_TRUE(readFile(at("again") + name) == readFile(at(scene) + name)) << scene << name;
-    }
-    const Outcome still = runHere(joined(joined(words, look), {"-o", at("end.png")}));
-    ASSERT_EQ(still.status, 0) << still.err;
-    EXPECT_EQ(Json::parse(still.out)["state"], undrawn["state"]) << scene;
-    EXPECT_EQ(Json::parse(still.out)["pictures"]["renderer"], "CPU, double precision");
-    EXPECT_TRUE(readFile(at("end.png")) == readFile(at(scene) + "/frame-0006.png")) << scene;
-  }
-}
-
-TEST(Simulate, AStillIsThePictureOfAScript) {
-  const support::TemporaryDirectory folder;
-  const std::string still =
-      "simulate helix ground=builtin:helix-bowl,cells=32 target-error=1e-4 seconds=0.1 cpu=true "
-      "size=96x64 output=\"" +
-      (folder.path() / "s.png").string() + "\"";
-  const auto script = [&](const std::string& more) { return runHere({"run", "-e", still + "; " + more}); };
-  const Outcome good = script("expect pick(48,40).position.2 == 0 within 0.5; info");
-  EXPECT_EQ(good.status, 0) << good.err << good.out;
-  EXPECT_THAT(good.out, HasSubstr("helix-bowl"));
-  EXPECT_EQ(script("expect pick(48,40).position.2 > 5").status, 1);
-}
-
-struct Impatient final : WorkListener {
-  void report(std::string_view task, double fraction) override { simulating |= task == "simulating" && fraction > 0.3; }
-  bool wantsCancel() override { return simulating; }
-  void ended() override {}
-  bool simulating = false;
-};
-
-TEST(Simulate, OneThatIsBrokenOffLeavesNoPictures) {
-  const support::TemporaryDirectory folder;
-  const std::string output = folder.path() / "frames";
-  Impatient listener;
-  std::istringstream in;
-  std::ostringstream out, err;
-  const std::vector<std::string> words = {"simulate",
-                                          "helix",
-                                          "--ground",
-                                          "builtin:helix-bowl,cells=32",
-                                          "--target-error",
-                                          "1e-4",
-                                          "--seconds",
-                                          "1",
-                                          "--cpu",
-                                          "--size",
-                                          "64x48",
-                                          "--fps",
-                                          "10",
-                                          "-o",
-                                          output};
-  const int status = runProgram(words, Console{in, out, err, false, &listener});
-  EXPECT_EQ(status, kExitCancelled) << err.str();
-  EXPECT_FALSE(std::filesystem::exists(output));
-}
-
 TEST(Simulate, MistakesAreToldInALine) {
   const support::TemporaryDirectory folder;
   refused({"simulate", "bowl", "--bodies", "0"}, "bodies");
@@ -312,12 +312,6 @@ TEST(Simulate, MistakesAreToldInALine) {
   refused({"simulate", "poles", "--body", "none.obj", "--bodies", "1"}, "none.obj");
   refused({"simulate", "poles", "--ground", "builtin:torus"}, "ground: is not for the scene poles");
   refused({"simulate", "cloth", "--bodies", "3"}, "bodies: is not for the scene cloth");
-  refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
-          "builtin:torus,major=0.3,minor=0.1: nothing lies below");
-  for (const double side : {0.01, 100.0})
-    refused({"simulate", "bowl", "--ground", cubeFile(folder, "cube.obj", side, false)}, "for marbles of radius 0.03");
-  std::ofstream(folder / "flat.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-  refused({"simulate", "poles", "--body", (folder / "flat.obj").string()}, "flat.obj: a body needs a closed surface");
   refused({"simulate", "poles", "--size", "64x48"}, "size: is for pictures: give output");
   refused({"simulate", "poles", "--fps", "10"}, "fps: is for pictures: give output");
   refused({"simulate", "poles", "-o", "x.png", "--fps", "10"}, "fps: is for films");
@@ -327,6 +321,12 @@ TEST(Simulate, MistakesAreToldInALine) {
   refused({"simulate", "poles", "-o", "x.gif"}, "x.gif");
   // before anything is built: the mesh is not even looked for
   refused({"simulate", "poles", "-o", "none/x.png", "--body", "none.obj"}, "none/x.png");
+  refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
+          "builtin:torus,major=0.3,minor=0.1: nothing lies below");
+  for (const double side : {0.01, 100.0})
+    refused({"simulate", "bowl", "--ground", cubeFile(folder, "cube.obj", side, false)}, "for marbles of radius 0.03");
+  std::ofstream(folder / "flat.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  refused({"simulate", "poles", "--body", (folder / "flat.obj").string()}, "flat.obj: a body needs a closed surface");
 }
 
 }  // namespace

@@ -71,6 +71,8 @@ TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
   EXPECT_NEAR((mass.meshFromInertia.translation() - Vector3(1000, 2000, -3000)).norm(), 0, 1e-9);
   EXPECT_NEAR((mass.inertia - Vector3(2 * 2 + 1, 2 * 2 + 0.25, 1 + 0.25) / 12).cwiseAbs().maxCoeff(), 0, 1e-9);
   EXPECT_NEAR(mass.meshFromInertia.linear().determinant(), 1, 1e-12);
+  EXPECT_NEAR((mass.box.max() - Vector3(0.25, 0.5, 1)).norm(), 0, 1e-9);  // of the least inertia the last axis
+  EXPECT_NEAR((mass.box.min() + Vector3(0.25, 0.5, 1)).norm(), 0, 1e-9);
   EXPECT_THROW(massProperties(TriangleMesh{}), Error);
   mesh.triangles.front()[1] = 1'000'000'000;
   EXPECT_THROW(massProperties(mesh), Error);
@@ -128,6 +130,20 @@ TEST(BulletField, ABodyComesToRestOnAPlaneAndOnAnother) {
   EXPECT_NEAR(world.worldFromBody(onSlab).translation().z(), 0.7, 0.005);
   EXPECT_LT(world.body(onPlane).getLinearVelocity().length(), 0.01);
   EXPECT_LT(world.body(onSlab).getLinearVelocity().length(), 0.01);
+}
+
+/// However few its samples are.
+TEST(BulletField, BoxesOfTheBroadPhaseHoldTheWholeBody) {
+  Kind ball("sphere,radius=0.5", 5);
+  btSphereShape marble(0.05);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1, 1}) {
+      World world;
+      world.add(ball.shape, 0, ball.mass.meshFromInertia);
+      world.add(marble, 1, at(side * (0.5 + 0.05 - 0.01) * Vector3::Unit(axis)));
+      world.step();
+      EXPECT_NEAR(world.figures().dispatch.deepest, 0.01, 1e-3) << axis << ", " << side;
+    }
 }
 
 /// Whichever body Bullet has first.

@@ -24,15 +24,13 @@ FieldShape::FieldShape(const FieldCollider& field, const SurfaceSamples& samples
     : field_(&field),
       samples_(&samples),
       bodyFromMesh_(mass.meshFromInertia.inverse()),
+      center_(toBullet(Vector3(mass.box.center()))),
+      halfSize_(toBullet(Vector3(mass.box.sizes() / 2))),
       inertia_(toBullet(mass.inertia)) {
   if (!(margin > 0) || !std::isfinite(margin)) throw Error("field shape: the margin must be a number above 0");
   // not CUSTOM_CONCAVE_SHAPE_TYPE, which Bullet takes for its own grids
   m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
   m_collisionMargin = margin;
-  Box box;
-  for (const Vector3& point : samples.points()) box.extend(bodyFromMesh_ * point);
-  center_ = toBullet(Vector3(box.center()));
-  halfSize_ = toBullet(Vector3(box.sizes() / 2));
 }
 
 void FieldShape::getAabb(const btTransform& worldFromBody, btVector3& lo, btVector3& hi) const {

@@ -13,6 +13,7 @@ struct MassProperties {
   double volume;                      ///< above 0
   Eigen::Isometry3d meshFromInertia;  ///< from the frame whose origin is the centre of mass, along the principal axes
   Vector3 inertia;                    ///< about these axes, of a body of mass 1: squared mesh units
+  Box box;                            ///< of the mesh, in that frame
 };
 
 /// By the divergence theorem, over the tetrahedra of the faces and the origin (Tonon 2004 gives their moments). Throws

@@ -45,7 +45,7 @@ class FieldShape final : public btConcaveShape {
   const FieldCollider* field_;
   const SurfaceSamples* samples_;
   Eigen::Isometry3d bodyFromMesh_;
-  btVector3 center_, halfSize_;  ///< of the samples' box, in the body's frame
+  btVector3 center_, halfSize_;  ///< of the mesh's box, in the body's frame
   btVector3 inertia_;            ///< of mass 1
   btVector3 scaling_{1, 1, 1};
 };
