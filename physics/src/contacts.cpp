@@ -9,20 +9,12 @@
 #include <string>
 
 #include "hpsdf/error.h"
+#include "rigid.h"
 
 namespace hpsdf::physics {
 namespace {
 
-constexpr double kRigid = 1e-6;
 constexpr std::size_t kBlock = 8;  // pairs: enough to be worth a task
-
-/// What is wrong with it; nullptr if nothing.
-const char* fault(const Eigen::Isometry3d& transform) {
-  if (!transform.matrix().allFinite()) return "transform is not finite";
-  const Eigen::Matrix3d rotation = transform.linear();
-  const bool rigid = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kRigid;
-  return rigid && rotation.determinant() > 0 ? nullptr : "transform is not rigid: give a rotation and a shift";
-}
 
 /// `where`: before the message, with the number. No text is made unless there is a fault.
 void requireValid(const BodyPair& pair, const char* where = nullptr, std::size_t number = 0) {
@@ -30,8 +22,8 @@ void requireValid(const BodyPair& pair, const char* where = nullptr, std::size_t
     throw Error((where ? where + std::to_string(number) + ": " : std::string()) + what);
   };
   if (pair.samples == nullptr || pair.field == nullptr) refuse("samples or field are missing");
-  if (const char* what = fault(pair.worldFromSamples)) refuse(std::string("the samples' ") + what);
-  if (const char* what = fault(pair.worldFromField)) refuse(std::string("the field's ") + what);
+  if (const char* what = faultOf(pair.worldFromSamples)) refuse(std::string("the samples' ") + what);
+  if (const char* what = faultOf(pair.worldFromField)) refuse(std::string("the field's ") + what);
 }
 
 void requireValid(const ContactOptions& options) {

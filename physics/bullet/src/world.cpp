@@ -10,6 +10,7 @@
 #include <string>
 
 #include "hpsdf/error.h"
+#include "rigid.h"
 
 namespace hpsdf::physics {
 namespace {
@@ -77,9 +78,7 @@ World::~World() {
 std::size_t World::add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                        const Material& material) {
   if (!(mass >= 0) || !std::isfinite(mass)) throw Error("world: a body's mass must be a number, 0 or more");
-  if (!worldFromBody.matrix().allFinite()) throw Error("world: a body's transform is not finite");
-  if (!worldFromBody.linear().isUnitary(1e-6) || worldFromBody.linear().determinant() < 0)
-    throw Error("world: a body's transform is not rigid: give a rotation and a shift");
+  if (const char* what = faultOf(worldFromBody)) throw Error(std::string("world: a body's ") + what);
   btVector3 inertia(0, 0, 0);
   if (mass > 0) shape.calculateLocalInertia(mass, inertia);
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, &shape, inertia);
