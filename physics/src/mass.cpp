@@ -1,7 +1,6 @@
 #include "hpsdf/physics/mass.h"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 
 #include "hpsdf/error.h"
@@ -9,8 +8,7 @@
 namespace hpsdf::physics {
 
 MassProperties massProperties(const TriangleMesh& mesh) {
-  for (const auto& [a, b, c] : mesh.triangles)
-    if (std::max({a, b, c}) >= mesh.vertices.size()) throw Error("a triangle refers to a vertex that does not exist");
+  requireValidIndices(mesh);
   // about a point of the mesh, so that a body far from the origin loses nothing
   const Vector3 base = mesh.vertices.empty() ? Vector3::Zero() : mesh.vertices.front();
   double volume = 0;

@@ -17,6 +17,10 @@ struct TriangleMesh {
   std::string name;  ///< for messages and the field's metadata: the file's name without its path, or the shape's spec
 };
 
+/// Throws `Error`, naming mesh, triangle and vertex, for the first triangle that refers to a vertex which does not
+/// exist.
+void requireValidIndices(const TriangleMesh& mesh);
+
 /// Smallest box around the vertices that triangles use. Empty for a mesh without triangles.
 Box boundingBox(const TriangleMesh& mesh);
 

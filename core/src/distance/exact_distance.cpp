@@ -15,8 +15,8 @@
 #include "distance/search.h"
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
-#include "mesh/mesh_checks.h"
 #include "threads.h"
+#include "mesh/message_prefix.h"
 
 namespace hpsdf {
 namespace {

@@ -14,7 +14,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_import.h"
 #include "mesh/collinear_faces.h"
-#include "mesh/mesh_checks.h"
+#include "mesh/message_prefix.h"
 
 namespace hpsdf {
 namespace {

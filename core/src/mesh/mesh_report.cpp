@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/mesh_checks.h"
-
 namespace hpsdf {
 namespace {
 

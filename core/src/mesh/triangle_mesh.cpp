@@ -11,7 +11,7 @@
 #include <new>
 
 #include "hpsdf/error.h"
-#include "mesh/mesh_checks.h"
+#include "mesh/message_prefix.h"
 
 namespace hpsdf {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// Private to the mesh room: how its messages name a mesh, and the checks that more than one file makes.
+// Private to core: how its messages name a mesh.
 
 #include <string>
 
@@ -9,8 +9,5 @@ namespace hpsdf {
 
 /// "NAME: " before a message, or "mesh: " for a mesh without a name.
 inline std::string messagePrefix(const TriangleMesh& mesh) { return (mesh.name.empty() ? "mesh" : mesh.name) + ": "; }
-
-/// Throws `Error` for the first triangle that refers to a vertex which does not exist.
-void requireValidIndices(const TriangleMesh& mesh);
 
 }  // namespace hpsdf
