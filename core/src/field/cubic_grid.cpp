@@ -1,21 +1,19 @@
 // The layout of files is described in docs/export.md.
 #include "hpsdf/cubic_grid.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <numeric>
 #include <span>
 #include <sstream>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "field/chunks.h"
 #include "field/random_points.h"
+#include "field/sums.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
@@ -129,61 +127,6 @@ void checkResolution(const GridResolution& resolution) {
   throw Error(message.str());
 }
 
-/// Reports shares of parallel work, and ends it where it is cancelled.
-class Parts {
- public:
-  Parts(const Progress& progress, std::string_view task, std::size_t count)
-      : progress_(progress), task_(task), count_(count) {}
-
-  void begin() const {
-    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-  }
-  void end() {
-    if (!progress_.report) return;
-    const std::lock_guard lock(reporting_);
-    progress_.report(task_, double(++done_) / double(count_));
-  }
-
- private:
-  const Progress& progress_;
-  std::string_view task_;
-  std::size_t count_;
-  std::mutex reporting_;
-  std::size_t done_ = 0;
-};
-
-/// work(chunk, first, count), in parallel.
-template <typename Work>
-void forEachChunk(std::size_t size, const Progress& progress, std::string_view task, const Work& work) {
-  const std::size_t chunks = (size + kChunk - 1) / kChunk;
-  Parts parts(progress, task, chunks);
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    parts.begin();
-    work(chunk, chunk * kChunk, std::min(kChunk, size - chunk * kChunk));
-    parts.end();
-  });
-}
-
-/// Sums over some points, to be added up in their order.
-struct Sums {
-  std::size_t points = 0;
-  double squares = 0, max = 0;
-
-  void add(double difference) {
-    ++points;
-    squares += difference * difference;
-    max = std::max(max, difference);
-  }
-  void add(const Sums& other) {
-    points += other.points;
-    squares += other.squares;
-    max = std::max(max, other.max);
-  }
-  GridDifference figures() const {
-    return {points, points == 0 ? 0 : std::sqrt(squares / static_cast<double>(points)), max};
-  }
-};
-
 template <typename T>
 void putAll(OutputFile& out, std::span<const T> values) {
   out.write(std::as_bytes(values));
@@ -255,11 +198,12 @@ CubicGrid sampleCubicGrid(const Field& field, const GridResolution& resolution, 
   const Vector3 lower = grid.domain.min(), cellSize = grid.cellSize();
   grid.nodes.resize(numbering.count());
   withThreads(threads, [&] {
-    forEachChunk(grid.nodes.size(), progress, "sampling", [&](std::size_t, std::size_t first, std::size_t count) {
+    const auto sample = [&](std::size_t, std::size_t first, std::size_t count) {
       std::vector<Vector3> points(count);
       for (std::size_t n = 0; n < count; ++n) points[n] = positionOf(numbering.nodeOf(first + n), lower, cellSize);
       field.values(points, std::span(grid.nodes).subspan(first, count));
-    });
+    };
+    forEachChunk(grid.nodes.size(), kChunk, progress, "sampling", sample);
   });
   return grid;
 }
@@ -270,9 +214,9 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
     Sums everywhere, nearSurface;
   };
   const double near = grid.cellSize().norm();
-  std::vector<Both> parts((points + kChunk - 1) / kChunk);
+  std::vector<Both> parts(chunksOf(points, kChunk));
   withThreads(threads, [&] {
-    forEachChunk(points, progress, "measuring", [&](std::size_t chunk, std::size_t first, std::size_t count) {
+    forEachChunk(points, kChunk, progress, "measuring", [&](std::size_t chunk, std::size_t first, std::size_t count) {
       std::vector<Vector3> at(count);
       std::vector<double> values(count);
       for (std::size_t n = 0; n < count; ++n) at[n] = Random(seed, first + n).inBox(grid.domain);
@@ -289,7 +233,8 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
     all.everywhere.add(part.everywhere);
     all.nearSurface.add(part.nearSurface);
   }
-  return {all.everywhere.figures(), all.nearSurface.figures(), near};
+  const auto figures = [](const Sums& of) { return GridDifference{of.count, of.rms(), of.max}; };
+  return {figures(all.everywhere), figures(all.nearSurface), near};
 }
 
 void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& progress) {

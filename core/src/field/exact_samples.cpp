@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 #include <sstream>
 #include <utility>
 
+#include "field/chunks.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"
-#include "hpsdf/verify.h"
 #include "threads.h"
+#include "hpsdf/verify.h"
 
 namespace hpsdf {
 namespace {
@@ -60,21 +60,14 @@ std::vector<double> distancesAt(const DistanceFunction& distance, const std::vec
                                 const Progress& progress) {
   const std::vector<std::uint32_t> order = orderAlongCurve(points, domain);
   std::vector<double> distances(points.size());
-  const std::size_t batches = (points.size() + kBatch - 1) / kBatch;
-  std::mutex reporting;
-  std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t batch) {
-    if (progress.cancelled && progress.cancelled()) throw Cancelled();
-    const std::size_t first = batch * kBatch, count = std::min(kBatch, points.size() - first);
+  const auto take = [&](std::size_t, std::size_t first, std::size_t count) {
     std::array<Vector3, kBatch> at;
     std::array<double, kBatch> found;
     for (std::size_t n = 0; n < count; ++n) at[n] = points[order[first + n]];
     distance(std::span(at).first(count), std::span(found).first(count));
     for (std::size_t n = 0; n < count; ++n) distances[order[first + n]] = found[n];
-    if (!progress.report) return;
-    const std::lock_guard lock(reporting);
-    progress.report("taking exact distances", static_cast<double>(++done) / static_cast<double>(batches));
-  });
+  };
+  forEachChunk(points.size(), kBatch, progress, "taking exact distances", take);
   for (std::size_t n = 0; n < points.size(); ++n) {
     if (std::isfinite(distances[n])) continue;
     std::ostringstream where;

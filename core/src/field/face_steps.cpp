@@ -1,10 +1,9 @@
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 
 #include "field/blend.h"
+#include "field/chunks.h"
 #include "field/evaluate.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"
@@ -55,22 +54,18 @@ FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces,
   FaceSteps all;
   if (faces.empty()) return all;
   constexpr std::size_t kChunk = 4096;
-  const std::size_t chunks = (count + kChunk - 1) / kChunk;
   std::mutex adding;
-  std::size_t done = 0;
   withThreads(threads, [&] {
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-      if (progress.cancelled && progress.cancelled()) throw Cancelled();
+    const auto step = [&](std::size_t, std::size_t first, std::size_t ofChunk) {
       FaceSteps part;
-      for (std::size_t n = chunk * kChunk; n < std::min(count, (chunk + 1) * kChunk); ++n) {
+      for (std::size_t n = first; n < first + ofChunk; ++n) {
         Random random(seed, n);
         takeIn(part, stepAcross(field, faces[random.next() % faces.size()], random));
       }
       const std::lock_guard lock(adding);
       takeIn(all, part);
-      if (progress.report)
-        progress.report("asking on both sides of faces", static_cast<double>(++done) / static_cast<double>(chunks));
-    });
+    };
+    forEachChunk(count, kChunk, progress, "asking on both sides of faces", step);
   });
   return all;
 }

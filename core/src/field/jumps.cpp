@@ -1,16 +1,14 @@
 #include "hpsdf/jumps.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <span>
 #include <variant>
 
 #include "basis/legendre.h"
 #include "field/blend.h"
+#include "field/chunks.h"
 #include "field/evaluate.h"
 #include "field/leaves.h"
 #include "hpsdf/error.h"
@@ -258,23 +256,18 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   for (int degree = 0; degree <= highest; ++degree) samples.emplace_back(degree);
 
   constexpr std::size_t kChunk = 256;
-  std::vector<std::vector<Interface>> found((leaves.size() + kChunk - 1) / kChunk);
-  std::mutex reporting;
-  std::size_t done = 0;
+  std::vector<std::vector<Interface>> found(chunksOf(leaves.size(), kChunk));
   withThreads(threads, [&] {
-    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
-      if (progress.cancelled && progress.cancelled()) throw Cancelled();
+    const auto measure = [&](std::size_t chunk, std::size_t first, std::size_t count) {
       FaceMeter meter(field, samples);
-      for (std::size_t n = chunk * kChunk; n < std::min(leaves.size(), (chunk + 1) * kChunk); ++n)
+      for (std::size_t n = first; n < first + count; ++n)
         for (int axis = 0; axis < 3; ++axis)
           for (const int step : {-1, 1})
             if (const auto beside = notSmallerBeside(data, leaves[n], axis, step))
               if (beside->depth < leaves[n].depth || step > 0)
                 found[chunk].push_back(meter.measure(leaves[n], *beside, axis, step));
-      if (!progress.report) return;
-      const std::lock_guard lock(reporting);
-      progress.report("measuring jumps", static_cast<double>(++done) / static_cast<double>(found.size()));
-    });
+    };
+    forEachChunk(leaves.size(), kChunk, progress, "measuring jumps", measure);
   });
 
   Jumps jumps;

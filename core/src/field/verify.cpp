@@ -1,6 +1,5 @@
 #include "hpsdf/verify.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -9,7 +8,9 @@
 #include <numeric>
 #include <set>
 
+#include "field/chunks.h"
 #include "field/evaluate.h"
+#include "field/sums.h"
 #include "hpsdf/error.h"
 #include "threads.h"
 
@@ -19,33 +20,9 @@ namespace {
 constexpr std::size_t kChunk = 4096;  // samples whose sums are taken together, whatever the number of threads
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-/// work(chunk, first sample, number of samples), in parallel.
-template <typename Work>
-void forEachChunk(std::size_t samples, const Work& work) {
-  tbb::parallel_for(std::size_t{0}, (samples + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    work(chunk, chunk * kChunk, std::min(kChunk, samples - chunk * kChunk));
-  });
-}
-
-/// Sums and greatest values, added up in the order of the chunks.
-struct Sums {
-  double sum = 0, squares = 0, max = 0;
-
-  void add(double x) {
-    sum += x;
-    squares += x * x;
-    max = std::max(max, x);
-  }
-  void add(const Sums& other) {
-    sum += other.sum;
-    squares += other.squares;
-    max = std::max(max, other.max);
-  }
-};
-
 Sums sumsOf(std::span<const double> values) {
-  std::vector<Sums> parts((values.size() + kChunk - 1) / kChunk);
-  forEachChunk(values.size(), [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  std::vector<Sums> parts(chunksOf(values.size(), kChunk));
+  forEachChunk(values.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     for (const double x : values.subspan(first, count)) parts[chunk].add(x);
   });
   Sums all;
@@ -63,9 +40,8 @@ ErrorFigures errorFigures(std::vector<double> errors) {
   ErrorFigures figures{.samples = errors.size()};
   if (errors.empty()) return figures;
   const Sums sums = sumsOf(errors);
-  const auto count = static_cast<double>(errors.size());
-  figures.rms = std::sqrt(sums.squares / count);
-  figures.mean = sums.sum / count;
+  figures.rms = sums.rms();
+  figures.mean = sums.mean();
   figures.max = sums.max;
   tbb::parallel_sort(errors.begin(), errors.end());
   for (const double percent : {50.0, 90.0, 99.0, 99.9}) figures.percentiles[percent] = percentile(errors, percent);
@@ -80,7 +56,7 @@ std::vector<double> errorsOf(std::span<const ValueAndGradient> found, std::span<
 
 std::vector<ValueAndGradient> fieldAt(const Field& field, std::span<const Vector3> points) {
   std::vector<ValueAndGradient> found(points.size());
-  forEachChunk(points.size(), [&](std::size_t, std::size_t first, std::size_t count) {
+  forEachChunk(points.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
     field.valuesAndGradients(points.subspan(first, count), std::span(found).subspan(first, count));
   });
   return found;
@@ -108,7 +84,7 @@ std::vector<double> anglesAt(const VerifiedSurface& surface, const ExactSamples&
   if (wanted == 0) return {};
   const std::size_t stride = std::max<std::size_t>(1, samples.points.size() / wanted);
   std::vector<double> angles((samples.points.size() + stride - 1) / stride, -1.0);
-  forEachChunk(angles.size(), [&](std::size_t, std::size_t first, std::size_t count) {
+  forEachChunk(angles.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
     if (progress.cancelled && progress.cancelled()) throw Cancelled();
     for (std::size_t n = first; n < first + count; ++n) {
       const std::size_t at = n * stride;
@@ -125,7 +101,7 @@ GradientFigures gradientFigures(const ExactSamples& samples, std::span<const Val
                                 std::vector<double> angles) {
   GradientFigures figures{.angles = angles.size()};
   std::vector<double> lengths(found.size()), deviations(found.size()), slopes(found.size(), 0.0);
-  forEachChunk(found.size(), [&](std::size_t, std::size_t first, std::size_t count) {
+  forEachChunk(found.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n) {
       lengths[n] = found[n].gradient.norm();
       deviations[n] = std::abs(lengths[n] - 1);
@@ -135,16 +111,15 @@ GradientFigures gradientFigures(const ExactSamples& samples, std::span<const Val
     }
   });
   if (!found.empty()) {
-    const auto count = static_cast<double>(found.size());
     const Sums ofLengths = sumsOf(lengths);
-    figures.meanLength = ofLengths.sum / count;
+    figures.meanLength = ofLengths.mean();
     figures.maxLength = ofLengths.max;
-    figures.lengthErrorRms = std::sqrt(sumsOf(deviations).squares / count);
+    figures.lengthErrorRms = sumsOf(deviations).rms();
     figures.maxPairSlope = sumsOf(slopes).max;
   }
   if (!angles.empty()) {
     tbb::parallel_sort(angles.begin(), angles.end());
-    figures.meanAngleDegrees = sumsOf(angles).sum / static_cast<double>(angles.size());
+    figures.meanAngleDegrees = sumsOf(angles).mean();
     figures.angle99Degrees = percentile(angles, 99);
     figures.maxAngleDegrees = angles.back();
   }
@@ -228,7 +203,7 @@ Progress part(const Progress& progress, double from, double to) {
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads) {
   return withThreads(threads, [&] {
     std::vector<double> values(samples.points.size());
-    forEachChunk(values.size(), [&](std::size_t, std::size_t first, std::size_t count) {
+    forEachChunk(values.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
       field.values(std::span(samples.points).subspan(first, count), std::span(values).subspan(first, count));
       for (std::size_t n = first; n < first + count; ++n) values[n] = std::abs(values[n] - samples.distances[n]);
     });
