@@ -1,8 +1,6 @@
 #include "simulate/simulation.h"
 
 #include <BulletSoftBody/btSoftBody.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -11,6 +9,7 @@
 #include <cmath>
 #include <optional>
 
+#include "hpsdf/threads.h"
 #include "long_work.h"
 #include "simulate/scene.h"
 #include "simulate/studio.h"
@@ -99,10 +98,7 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
 
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
                            double seconds, int threads, const SimulationCamera* camera) {
-  // asked for more than it may have, TBB would complain on stderr
-  const int most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  tbb::task_arena arena(threads > 0 ? std::min(threads, most) : tbb::task_arena::automatic);
-  return arena.execute([&] {
+  return withThreads(threads, [&] {
     const auto start = std::chrono::steady_clock::now();
     const std::unique_ptr<Scene> made = makeScene(console, scene, request);
     const double setUpSeconds = secondsSince(start);

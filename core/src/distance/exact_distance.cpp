@@ -15,7 +15,7 @@
 #include "distance/search.h"
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 #include "mesh/message_prefix.h"
 
 namespace hpsdf {

@@ -16,7 +16,7 @@
 #include "field/leaves.h"
 #include "hpsdf/error.h"
 #include "hpsdf/safe_distance.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {

@@ -23,7 +23,7 @@
 #include "field/weak_continuity.h"
 #include "field/worst_error.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {

@@ -14,7 +14,7 @@
 #include "field/nearness.h"
 #include "field/weak_continuity.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {

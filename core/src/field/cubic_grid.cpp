@@ -15,7 +15,7 @@
 #include "field/random_points.h"
 #include "field/sums.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {

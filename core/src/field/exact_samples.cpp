@@ -12,7 +12,7 @@
 #include "field/chunks.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 #include "hpsdf/verify.h"
 
 namespace hpsdf {

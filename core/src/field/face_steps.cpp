@@ -8,7 +8,7 @@
 #include "field/random_points.h"
 #include "hpsdf/error.h"
 #include "hpsdf/jumps.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {

@@ -12,7 +12,7 @@
 #include "field/evaluate.h"
 #include "field/sums.h"
 #include "hpsdf/error.h"
-#include "threads.h"
+#include "hpsdf/threads.h"
 
 namespace hpsdf {
 namespace {
