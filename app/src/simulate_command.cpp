@@ -52,31 +52,32 @@ SceneRequest requestOf(const Arguments& arguments) {
 
 Json jsonOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
   const double steps = double(figures.steps);
-  return {
-      {"scene", scene},
-      {"bodies", figures.bodies},
-      {"nodes", figures.nodes},
-      {"waiting", figures.waiting},
-      {"lost", figures.lost},
-      {"simulated_seconds", figures.simulated},
-      {"step_seconds", request.step},
-      {"steps", figures.steps},
-      {"contacts",
-       {{"mean", figures.penetrating / steps}, {"max", figures.mostPenetrating}, {"last", figures.lastPenetrating}}},
-      {"touching", {{"mean", figures.touching / steps}, {"max", figures.mostTouching}, {"last", figures.lastTouching}}},
-      {"penetration",
-       {{"size", figures.size},
-        {"max", figures.deepest},
-        {"mean_of_deepest", figures.sumOfDeepest / steps},
-        {"last_second", figures.deepestAtEnd}}},
-      {"milliseconds_a_step",
-       {{"queries", 1e3 * figures.querySeconds / steps},
-        {"solver", 1e3 * figures.solverSeconds / steps},
-        {"rest", 1e3 * (figures.seconds - figures.querySeconds - figures.solverSeconds) / steps},
-        {"all", 1e3 * figures.seconds / steps},
-        {"longest_queries", 1e3 * figures.longestQuerySeconds}}},
-      {"set_up_seconds", figures.setUpSeconds},
-      {"state", fmt::format("{:016x}", figures.state)}};
+  const auto aStep = [&](const CountAStep& of) {
+    return Json{{"mean", of.sum / steps}, {"max", of.most}, {"last", of.last}};
+  };
+  return {{"scene", scene},
+          {"bodies", figures.bodies},
+          {"nodes", figures.nodes},
+          {"waiting", figures.waiting},
+          {"lost", figures.lost},
+          {"simulated_seconds", figures.simulated},
+          {"step_seconds", request.step},
+          {"steps", figures.steps},
+          {"contacts", aStep(figures.penetrating)},
+          {"touching", aStep(figures.touching)},
+          {"penetration",
+           {{"size", figures.size},
+            {"max", figures.deepest},
+            {"mean_of_deepest", figures.sumOfDeepest / steps},
+            {"last_second", figures.deepestAtEnd}}},
+          {"milliseconds_a_step",
+           {{"queries", 1e3 * figures.querySeconds / steps},
+            {"solver", 1e3 * figures.solverSeconds / steps},
+            {"rest", 1e3 * (figures.seconds - figures.querySeconds - figures.solverSeconds) / steps},
+            {"all", 1e3 * figures.seconds / steps},
+            {"longest_queries", 1e3 * figures.longestQuerySeconds}}},
+          {"set_up_seconds", figures.setUpSeconds},
+          {"state", fmt::format("{:016x}", figures.state)}};
 }
 
 std::string textOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
@@ -88,11 +89,11 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
                       1 / request.step);
   if (figures.waiting > 0)
     text += fmt::format("  still to come       {} bodies, which more --seconds let in\n", grouped(figures.waiting));
-  const auto aStep = [&](double sum, std::size_t most, std::size_t last) {
-    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", sum / steps, grouped(most), grouped(last));
+  const auto aStep = [&](const CountAStep& of) {
+    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", of.sum / steps, grouped(of.most),
+                       grouped(of.last));
   };
-  text += "  contacts a step     " + aStep(figures.penetrating, figures.mostPenetrating, figures.lastPenetrating) +
-          "  touching a step     " + aStep(figures.touching, figures.mostTouching, figures.lastTouching);
+  text += "  contacts a step     " + aStep(figures.penetrating) + "  touching a step     " + aStep(figures.touching);
   text += fmt::format("  deepest             {} ({:.2g} % of {}), in the last second {} ({:.2g} %)\n",
                       shortNumber(figures.deepest), 100 * figures.deepest / figures.size, shortNumber(figures.size),
                       shortNumber(figures.deepestAtEnd), 100 * figures.deepestAtEnd / figures.size);
@@ -209,17 +210,16 @@ Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest
   return {figures, about, Film::line(about)};
 }
 
-Outcome runScene(Session& session, const Arguments& arguments) {
-  const SceneRequest request = requestOf(arguments);
+Outcome runScene(Session& session, const Arguments& arguments, const SceneRequest& request) {
   if (!arguments.given("output")) return {simulateAs(session.console(), arguments, request)};
   return isStill(arguments) ? runStill(session, arguments, request) : runFilm(session, arguments, request);
 }
 
 void runSimulate(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
-  const Outcome outcome = runScene(session, arguments);
-  const std::string scene = arguments.text("scene");
   const SceneRequest request = requestOf(arguments);
+  const Outcome outcome = runScene(session, arguments, request);
+  const std::string scene = arguments.text("scene");
   if (!session.wantsJson(arguments)) {
     console.out << textOf(scene, request, outcome.figures) << outcome.line;
     return;

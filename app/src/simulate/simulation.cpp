@@ -35,12 +35,8 @@ void addStep(const physics::StepFigures& step, double size, bool lastSecond, Sim
   figures.querySeconds += step.dispatch.querySeconds;
   figures.solverSeconds += step.solverSeconds;
   figures.longestQuerySeconds = std::max(figures.longestQuerySeconds, step.dispatch.querySeconds);
-  figures.penetrating += double(step.dispatch.penetrating);
-  figures.mostPenetrating = std::max(figures.mostPenetrating, step.dispatch.penetrating);
-  figures.lastPenetrating = step.dispatch.penetrating;
-  figures.touching += double(step.dispatch.contacts);
-  figures.mostTouching = std::max(figures.mostTouching, step.dispatch.contacts);
-  figures.lastTouching = step.dispatch.contacts;
+  figures.penetrating.add(step.dispatch.penetrating);
+  figures.touching.add(step.dispatch.contacts);
   figures.size = size;
   figures.deepest = std::max(figures.deepest, step.dispatch.deepest);
   figures.sumOfDeepest += step.dispatch.deepest;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -11,6 +12,18 @@
 
 namespace hpsdf::app {
 
+/// A number that each step has.
+struct CountAStep {
+  double sum = 0;
+  std::size_t most = 0, last = 0;
+
+  void add(std::size_t count) {
+    sum += double(count);
+    most = std::max(most, count);
+    last = count;
+  }
+};
+
 /// Of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
 struct SimulationFigures {
   std::size_t bodies = 0, nodes = 0;  ///< that move
@@ -19,8 +32,7 @@ struct SimulationFigures {
   std::uint64_t steps = 0;
   double simulated = 0;  ///< seconds
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
-  double penetrating = 0, touching = 0;  ///< sums over the steps; touching are the solver's contacts
-  std::size_t mostPenetrating = 0, lastPenetrating = 0, mostTouching = 0, lastTouching = 0;
+  CountAStep penetrating, touching;  ///< touching are the solver's contacts
   double size = 0;  ///< what depths are compared with: the radius of a marble, the size of a body, a cloth's margin
   double deepest = 0, sumOfDeepest = 0, deepestAtEnd = 0;  ///< the last of the simulation's last second
   std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end
