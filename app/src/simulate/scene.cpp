@@ -51,8 +51,14 @@ BodyKind::BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, 
       mass(physics::massProperties(mesh)),
       shape(collider, surface, mass, margin) {}
 
-void Scene::stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
-  world_.add(const_cast<physics::FieldShape&>(kind.shape), 0, worldFromMesh * kind.mass.meshFromInertia, material);
+BodyKind& Scene::addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples,
+                         double margin) {
+  Field field = sceneField(console, mesh, request);
+  return kinds_.emplace_back(std::move(mesh), std::move(field), samples, margin);
+}
+
+void Scene::stand(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
+  world_.add(kind.shape, 0, worldFromMesh * kind.mass.meshFromInertia, material);
 }
 
 void Scene::admit() {

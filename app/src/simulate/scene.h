@@ -58,7 +58,10 @@ class Scene {
   double bodySize() const { return bodySize_; }
 
  protected:
-  void stand(const BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
+  /// With the mesh's field, as `sceneField` has it.
+  BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples,
+                    double margin);
+  void stand(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
   /// In the order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 

@@ -68,9 +68,7 @@ class MarbleScene : public Scene {
   MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request) {
     TriangleMesh mesh = sceneMesh(console, request.ground, request.filesAreYUp, 0);
     requireFitting(mesh, request.ground, radius);
-    Field field = sceneField(console, mesh, request);
-    kinds_.emplace_back(std::move(mesh), std::move(field), request.samples, radius / 10);
-    stand(kinds_.front(), Eigen::Isometry3d::Identity());
+    stand(addKind(console, request, std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());
     shapes_.push_back(std::make_unique<btSphereShape>(radius));
     bodySize_ = radius;
     floor_ = ground().domain().min().z() - 10 * radius;
@@ -79,19 +77,28 @@ class MarbleScene : public Scene {
  protected:
   const Field& ground() const { return kinds_.front().field; }
 
-  /// In a pile marbles are slowed down, and may fall asleep; alone they roll long.
-  void dropMarble(double seconds, const Vector3& at, bool inPile) {
+  /// Slowed down, and may fall asleep.
+  Material inPile() const {
+    return {.friction = 0.4,
+            .rollingFriction = 0.02 * bodySize_,
+            .linearDamping = 0.05,
+            .angularDamping = 0.1,
+            .restSpeed = 0.2};
+  }
+
+  /// Rolls long.
+  Material alone() const {
+    return {.friction = 0.4,
+            .rollingFriction = 0.002 * bodySize_,
+            .linearDamping = 0.01,
+            .angularDamping = 0.01,
+            .restSpeed = 0};
+  }
+
+  void dropMarble(double seconds, const Vector3& at, const Material& material) {
     constexpr double kDensity = 2500;
     const double mass = kDensity * 4 / 3 * std::numbers::pi * std::pow(bodySize_, 3);
-    drop({seconds,
-          shapes_.front().get(),
-          mass,
-          shift(at),
-          {.friction = 0.4,
-           .rollingFriction = (inPile ? 0.02 : 0.002) * bodySize_,
-           .linearDamping = inPile ? 0.05 : 0.01,
-           .angularDamping = inPile ? 0.1 : 0.01,
-           .restSpeed = inPile ? 0.2 : 0.0}});
+    drop({seconds, shapes_.front().get(), mass, shift(at), material});
   }
 };
 
@@ -112,7 +119,7 @@ std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request)
             dropMarble(
                 0.2 * layer,
                 Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) + 0.2 * bodySize_ * jitter,
-                true);
+                inPile());
             --left;
           }
     }
@@ -125,7 +132,7 @@ std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request
     Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
       // where the groove of three turns is at y = 0, away from the rim
       for (std::size_t n = 0; n < from.bodies; ++n)
-        dropMarble(2.0 * double(n), above(ground(), from.ground, 2.0 / 3, 0, bodySize_), false);
+        dropMarble(2.0 * double(n), above(ground(), from.ground, 2.0 / 3, 0, bodySize_), alone());
     }
   };
   return std::make_unique<Helix>(console, request);
@@ -139,21 +146,18 @@ std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) 
       floor_ = table - 1;
       shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
       world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
-      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_), false);
+      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_), alone());
       constexpr double kPin = 0.2;
-      std::vector<const BodyKind*> pins;
-      for (const std::string& name : from.meshes) {
-        TriangleMesh mesh = sceneMesh(to, name, from.filesAreYUp, kPin);
-        Field field = sceneField(to, mesh, from);
-        pins.push_back(&kinds_.emplace_back(std::move(mesh), std::move(field), from.samples, 0.01 * kPin));
-      }
+      std::vector<BodyKind*> pins;
+      for (const std::string& name : from.meshes)
+        pins.push_back(&addKind(to, from, sceneMesh(to, name, from.filesAreYUp, kPin), from.samples, 0.01 * kPin));
       std::size_t left = from.bodies;
       for (int row = 0; left > 0; ++row)
         for (int i = 0; i <= row && left > 0; ++i, --left) {
-          const BodyKind& pin = *pins[(from.bodies - left) % pins.size()];
+          BodyKind& pin = *pins[(from.bodies - left) % pins.size()];
           const double stands = table - boundingBox(pin.mesh).min().z();
           drop({0,
-                const_cast<physics::FieldShape*>(&pin.shape),
+                &pin.shape,
                 200 * pin.mass.volume,
                 shift({0.92 + 1.2 * kPin * (i - 0.5 * row), -0.6 - kPin * row, stands}) * pin.mass.meshFromInertia,
                 {.friction = 0.5}});
@@ -169,15 +173,14 @@ class PileScene : public Scene {
   explicit PileScene(const SceneRequest& request) : Scene(request), random_(request.seed) { floor_ = -1; }
 
  protected:
-  const BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples) {
+  BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples) {
     const double size = boundingBox(mesh).sizes().minCoeff();
-    Field field = sceneField(console, mesh, request);
-    return kinds_.emplace_back(std::move(mesh), std::move(field), samples, std::min(0.005, 0.02 * size));
+    return Scene::addKind(console, request, std::move(mesh), samples, std::min(0.005, 0.02 * size));
   }
 
-  std::vector<const BodyKind*> bodyKinds(const Console& console, const SceneRequest& request, double size) {
+  std::vector<BodyKind*> bodyKinds(const Console& console, const SceneRequest& request, double size) {
     bodySize_ = size;
-    std::vector<const BodyKind*> made;
+    std::vector<BodyKind*> made;
     for (const std::string& name : request.meshes)
       made.push_back(&addKind(console, request, sceneMesh(console, name, request.filesAreYUp, size), request.samples));
     return made;
@@ -188,10 +191,10 @@ class PileScene : public Scene {
     world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.6});
   }
 
-  void dropBody(const BodyKind& kind, double seconds, const Vector3& at) {
+  void dropBody(BodyKind& kind, double seconds, const Vector3& at) {
     constexpr double kDensity = 1000;
     drop({seconds,
-          const_cast<physics::FieldShape*>(&kind.shape),
+          &kind.shape,
           kDensity * kind.mass.volume,
           shift(at) * Eigen::Isometry3d(random_.rotation()),
           {.friction = 0.5, .linearDamping = 0.02, .angularDamping = 0.05}});
@@ -206,7 +209,7 @@ std::unique_ptr<Scene> poles(const Console& console, const SceneRequest& request
       constexpr int kSide = 8;
       constexpr double kApart = 1.3, kHeight = 4, kWave = 1.2;
       const auto kinds = bodyKinds(to, from, 1);
-      const BodyKind& pole = addKind(to, from, poleMesh(0.12, kHeight), 2000);
+      BodyKind& pole = addKind(to, from, poleMesh(0.12, kHeight), 2000);
       addGround();
       const auto place = [](int i) { return kApart * (i - 0.5 * (kSide - 1)); };
       for (int x = 0; x < kSide; ++x)
@@ -258,9 +261,9 @@ std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request
     Slope(const Console& to, const SceneRequest& from) : PileScene(from) {
       constexpr double kLength = 8, kWidth = 4, kThick = 0.4, kSize = 0.6;
       const auto kinds = bodyKinds(to, from, kSize);
-      const BodyKind& slab = addKind(to, from, slabMesh({kLength, kWidth, kThick}), 4000);
-      const BodyKind& table = addKind(to, from, slabMesh({kLength, 2 * kWidth, kThick}), 4000);
-      const BodyKind& pole = addKind(to, from, poleMesh(0.12, 0.8), 1000);
+      BodyKind& slab = addKind(to, from, slabMesh({kLength, kWidth, kThick}), 4000);
+      BodyKind& table = addKind(to, from, slabMesh({kLength, 2 * kWidth, kThick}), 4000);
+      BodyKind& pole = addKind(to, from, poleMesh(0.12, 0.8), 1000);
       floor_ = -4;
       const Eigen::Isometry3d ramp =
           shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.45, Vector3::UnitY()));  // falls towards +x
@@ -289,8 +292,8 @@ std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request
       const TriangleMesh mesh = sceneMesh(to, from.ground, from.filesAreYUp, 1);
       const double stands = -boundingBox(mesh).min().z();
       const double top = boundingBox(mesh).sizes().z();
-      const BodyKind& body = addKind(to, from, mesh, from.samples);
-      const BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
+      BodyKind& body = addKind(to, from, mesh, from.samples);
+      BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
       const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through
       stand(body, shift({0, 0, stands}), rough);
       stand(table, shift({0, 0, -0.1}), rough);
