@@ -198,57 +198,90 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
   }
 }
 
+/// A soft body and a field in one step. Places are in the field's coordinates.
+struct SoftFieldAlgorithm::Meeting {
+  Meeting(const btSoftBody& body, const btCollisionObject& object)
+      : soft(body),
+        shape(*fieldOf(object)),
+        worldFromField(worldFromMesh(object, shape)),
+        fieldFromWorld(worldFromField.inverse()),
+        margin(body.getCollisionShape()->getMargin()),
+        near(margin / 2) {}
+
+  Vector3 startOf(int node) const { return fieldFromWorld * fromBullet(soft.m_nodes[node].m_q); }
+  Vector3 endOf(int node) const { return fieldFromWorld * fromBullet(soft.m_nodes[node].m_x); }
+
+  const btSoftBody& soft;
+  const FieldShape& shape;
+  Eigen::Isometry3d worldFromField, fieldFromWorld;
+  double margin;  ///< within which nodes touch
+  double near;    ///< how near a node may come on its way
+};
+
+/// Nodes that may touch.
+struct SoftFieldAlgorithm::Candidates {
+  std::size_t count = 0;
+  std::array<int, kNodes> nodes;
+  std::array<Vector3, kNodes> starts, ends;  ///< of their ways
+  std::array<Vector3, kNodes> at;            ///< where they touch, if they do
+};
+
 void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) {
   const btCollisionObject& object = fieldOf(first) != nullptr ? first : second;
   if (fieldOf(object) == nullptr) return;  // a part of a compound
-  const btCollisionObject& softObject = &object == &first ? second : first;
-  const FieldShape& shape = *fieldOf(object);
-  const btSoftBody& soft = *btSoftBody::upcast(&softObject);
-  const Eigen::Isometry3d ofField = worldFromMesh(object, shape), fromWorld = ofField.inverse();
-  const double margin = soft.getCollisionShape()->getMargin(), near = margin / 2, farthest = kPieces * near;
-  const int count = soft.m_nodes.size();
+  const Meeting meeting(*btSoftBody::upcast(&object == &first ? &second : &first), object);
+  const int count = meeting.soft.m_nodes.size();
+  if (int(outside_.size()) != count) {
+    outside_.clear();
+    for (int node = 0; node < count; ++node) outside_.push_back(meeting.startOf(node));
+  }
   parts_.resize((count + kNodes - 1) / kNodes);
-  const bool fresh = int(outside_.size()) != count;
-  outside_.resize(std::size_t(count));
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t part) {
-    std::vector<Touching>& touching = parts_[part];
-    touching.clear();
-    std::array<Vector3, kNodes> at, before, ends;
-    std::array<ValueAndGradient, kNodes> answers;
-    std::array<double, kNodes> depths;
-    const int begin = int(part) * kNodes, end = std::min(count, begin + kNodes);
-    for (int i = begin; i < end; ++i) {
-      const btSoftBody::Node& node = soft.m_nodes[i];
-      const Vector3 from = fromWorld * fromBullet(node.m_q), to = fromWorld * fromBullet(node.m_x);
-      Vector3& outside = outside_[std::size_t(i)];
-      if (fresh || (to - outside).norm() > farthest) outside = from;
-      if (node.m_battach != 0 || shape.field().lowerBound(to) > margin + (to - outside).norm()) {
-        outside = to;
-        continue;
-      }
-      at[touching.size()] = whereItTouches(shape.field().field(), outside, to, near);
-      before[touching.size()] = from;
-      ends[touching.size()] = to;
-      touching.push_back({i});
-    }
-    const std::size_t all = touching.size();
-    shape.field().field().valuesAndGradients({at.data(), all}, {answers.data(), all});
-    shape.field().field().values({before.data(), all}, {depths.data(), all});
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < all; ++i) {
-      if (answers[i].value >= 0) outside_[std::size_t(touching[i].node)] = at[i];
-      const double steepness = answers[i].gradient.norm();
-      if (!(steepness > 0)) continue;
-      const Vector3 normal = answers[i].gradient / steepness;
-      // past where it touches, the surface is that place's plane
-      const double distance = answers[i].value + normal.dot(ends[i] - at[i]);
-      if (distance < margin) touching[kept++] = {touching[i].node, ofField.linear() * normal, distance, -depths[i]};
-    }
-    touching.resize(kept);
+    const int begin = int(part) * kNodes;
+    keepTouching(meeting, candidates(meeting, begin, std::min(count, begin + kNodes)), parts_[part]);
   });
   for (const std::vector<Touching>& part : parts_) {
     findings.contacts += part.size();
     for (const Touching& node : part) findings.add(node.depth);
+  }
+}
+
+SoftFieldAlgorithm::Candidates SoftFieldAlgorithm::candidates(const Meeting& meeting, int begin, int end) {
+  const FieldCollider& field = meeting.shape.field();
+  Candidates found;
+  for (int node = begin; node < end; ++node) {
+    const Vector3 from = meeting.startOf(node), to = meeting.endOf(node);
+    Vector3& outside = outside_[std::size_t(node)];
+    if ((to - outside).norm() > kPieces * meeting.near) outside = from;
+    if (meeting.soft.m_nodes[node].m_battach != 0 || field.lowerBound(to) > meeting.margin + (to - outside).norm()) {
+      outside = to;
+      continue;
+    }
+    found.nodes[found.count] = node;
+    found.starts[found.count] = from;
+    found.ends[found.count] = to;
+    found.at[found.count] = whereItTouches(field.field(), outside, to, meeting.near);
+    ++found.count;
+  }
+  return found;
+}
+
+void SoftFieldAlgorithm::keepTouching(const Meeting& meeting, const Candidates& all, std::vector<Touching>& touching) {
+  const Field& field = meeting.shape.field().field();
+  std::array<ValueAndGradient, kNodes> answers;
+  std::array<double, kNodes> values;
+  field.valuesAndGradients({all.at.data(), all.count}, {answers.data(), all.count});
+  field.values({all.starts.data(), all.count}, {values.data(), all.count});
+  touching.clear();
+  for (std::size_t i = 0; i < all.count; ++i) {
+    if (answers[i].value >= 0) outside_[std::size_t(all.nodes[i])] = all.at[i];
+    const double steepness = answers[i].gradient.norm();
+    if (!(steepness > 0)) continue;
+    const Vector3 normal = answers[i].gradient / steepness;
+    // past where it touches, the surface is that place's plane
+    const double distance = answers[i].value + normal.dot(all.ends[i] - all.at[i]);
+    if (distance < meeting.margin)
+      touching.push_back({all.nodes[i], meeting.worldFromField.linear() * normal, distance, -values[i]});
   }
 }
 

@@ -85,13 +85,19 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
  private:
   struct Touching {
     int node;
-    Vector3 normal = Vector3::Zero();  ///< in the world
-    double distance = 0;               ///< at the end of the step, by the plane of where it touches
-    double depth = 0;                  ///< at the step's start
+    Vector3 normal;   ///< in the world
+    double distance;  ///< at the end of the step, by the plane of where it touches
+    double depth;     ///< at the step's start
   };
+  struct Meeting;
+  struct Candidates;
 
   void find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) override;
   void fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) override;
+
+  /// Of the nodes from `begin` up to `end`, not with it.
+  Candidates candidates(const Meeting& meeting, int begin, int end);
+  void keepTouching(const Meeting& meeting, const Candidates& all, std::vector<Touching>& touching);
 
   std::vector<Vector3> outside_;              ///< where each node was last outside of the field, in its coordinates
   std::vector<std::vector<Touching>> parts_;  ///< of each so many nodes, in their order
