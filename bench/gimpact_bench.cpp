@@ -9,43 +9,15 @@
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <map>
 #include <optional>
 
 #include "contact_places.h"
 #include "hpsdf/physics/bullet.h"
+#include "simulate/coarse_mesh.h"
 
 namespace hpsdf::bench {
 namespace {
-
-/// About `count` vertices, each the mean of those in one cube, and the triangles that are left.
-TriangleMesh clustered(const TriangleMesh& mesh, std::size_t count) {
-  const double side = std::sqrt(1.2 * surfaceArea(mesh) / double(count));
-  std::map<std::array<std::int64_t, 3>, std::uint32_t> cells;
-  std::vector<std::uint32_t> cellOf;
-  std::vector<int> counts;
-  TriangleMesh coarse;
-  for (const Vector3& x : mesh.vertices) {
-    const auto place = [&](int axis) { return static_cast<std::int64_t>(std::floor(x[axis] / side)); };
-    const auto [cell, isNew] =
-        cells.try_emplace({place(0), place(1), place(2)}, static_cast<std::uint32_t>(cells.size()));
-    if (isNew) {
-      coarse.vertices.push_back(Vector3::Zero());
-      counts.push_back(0);
-    }
-    cellOf.push_back(cell->second);
-    coarse.vertices[cell->second] += x;
-    ++counts[cell->second];
-  }
-  for (std::size_t i = 0; i < counts.size(); ++i) coarse.vertices[i] /= counts[i];
-  for (const auto& [a, b, c] : mesh.triangles)
-    if (cellOf[a] != cellOf[b] && cellOf[b] != cellOf[c] && cellOf[c] != cellOf[a])
-      coarse.triangles.push_back({cellOf[a], cellOf[b], cellOf[c]});
-  return coarse;
-}
 
 /// A mesh as GImpact takes it, with its tree of boxes.
 class Body {
@@ -133,9 +105,14 @@ void full(benchmark::State& state, Nearness nearness) {
     state.SkipWithError("triangles and samples do not touch in the same places");
 }
 
+/// With about so many vertices.
+TriangleMesh withVertices(std::size_t count, const TriangleMesh& mesh) {
+  return app::coarse(mesh, std::sqrt(1.2 * surfaceArea(mesh) / double(count)));
+}
+
 /// As many vertices as ours has samples.
 void coarse(benchmark::State& state) {
-  static const TriangleMesh first = clustered(bunny(), 10'000), second = clustered(armadillo(), 10'000);
+  static const TriangleMesh first = withVertices(10'000, bunny()), second = withVertices(10'000, armadillo());
   static Pair pair(first, second);
   timeContacts(state, Nearness::touching, [](const Places& where) { return pair.find(where); });
   state.counters["vertices"] = double(first.vertices.size() + second.vertices.size());
