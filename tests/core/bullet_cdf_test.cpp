@@ -6,16 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "hpsdf/build.h"
 #include "hpsdf/cubic_grid.h"
+#include "support/cubic_grid_file.h"
 #include "support/one_leaf_field.h"
-#include "support/temporary_directory.h"
 
 namespace hpsdf {
 namespace {
@@ -23,15 +21,6 @@ namespace {
 constexpr bool kDouble = sizeof(btScalar) == 8;
 constexpr double kRounding = kDouble ? 1e-12 : 1e-4;  // of values and gradients of some tens
 constexpr int kPoints = 5000;
-
-std::string fileOf(const CubicGrid& grid) {
-  const support::TemporaryDirectory folder;
-  OutputFile out(folder / "grid.cdf");
-  writeCubicGrid(grid, out);
-  out.commit();
-  std::ifstream stream(folder / "grid.cdf", std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 bool load(btMiniSDF& sdf, const std::string& bytes) { return sdf.load(bytes.data(), static_cast<int>(bytes.size())); }
 

@@ -4,27 +4,17 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <numeric>
 #include <set>
 #include <string>
 
 #include "hpsdf/error.h"
+#include "support/cubic_grid_file.h"
 #include "support/one_leaf_field.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
 namespace {
-
-std::string fileOf(const CubicGrid& grid) {
-  const support::TemporaryDirectory folder;
-  OutputFile out(folder / "grid.cdf");
-  writeCubicGrid(grid, out);
-  out.commit();
-  std::ifstream stream(folder / "grid.cdf", std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// Takes numbers off a file's front.
 class Reader {

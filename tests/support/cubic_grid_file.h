@@ -1,0 +1,22 @@
+#pragma once
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "hpsdf/cubic_grid.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+
+/// The bytes that are written of a grid.
+inline std::string fileOf(const CubicGrid& grid) {
+  const support::TemporaryDirectory folder;
+  OutputFile out(folder / "grid.cdf");
+  writeCubicGrid(grid, out);
+  out.commit();
+  std::ifstream stream(folder / "grid.cdf", std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace hpsdf
