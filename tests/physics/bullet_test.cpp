@@ -54,6 +54,13 @@ Kind& hollow() {
 
 Eigen::Isometry3d at(const Vector3& place) { return Eigen::Isometry3d(Eigen::Translation3d(place)); }
 
+/// A square of cloth, its sides twice `half`, with so many nodes along each.
+std::unique_ptr<btSoftBody> flatSheet(World& world, const Vector3& middle, double half, int nodes) {
+  const auto corner = [&](double x, double y) { return toBullet(middle + half * Vector3(x, y, 0)); };
+  return std::unique_ptr<btSoftBody>(btSoftBodyHelpers::CreatePatch(
+      world.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), nodes, nodes, 0, true));
+}
+
 double energy(const World& world, std::size_t number) {
   const btRigidBody& body = world.body(number);
   const btVector3 v = body.getLinearVelocity(), w = body.getAngularVelocity();
@@ -205,9 +212,7 @@ TEST(BulletField, AMovingFieldLiftsABodyAndCloth) {
   table.setCollisionFlags(table.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   table.setActivationState(DISABLE_DEACTIVATION);
   const std::size_t body = world.add(box.shape, 1, at({0.6, 0, 0.2}) * box.mass.meshFromInertia);
-  const auto corner = [](double x, double y) { return btVector3(0.2 * x - 0.6, 0.2 * y, 0.02); };
-  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
-                                                                   corner(-1, 1), corner(1, 1), 9, 9, 0, true));
+  std::unique_ptr<btSoftBody> sheet = flatSheet(world, {-0.6, 0, 0.02}, 0.2, 9);
   sheet->getCollisionShape()->setMargin(0.01);
   sheet->setTotalMass(1, false);
   world.add(std::move(sheet));
@@ -236,9 +241,7 @@ TEST(BulletField, AsAPartOfACompoundItCollidesWithNothing) {
   world.add(compound, 0, at({0, 0, 0}));
   world.add(sphere, 1, at({0, 0, 0.3}));
   world.add(plate.shape, 1, at({0, 0, 0.6}) * plate.mass.meshFromInertia);
-  const auto corner = [](double x, double y) { return btVector3(0.4 * x, 0.4 * y, 0.15); };
-  world.add(std::unique_ptr<btSoftBody>(btSoftBodyHelpers::CreatePatch(
-      world.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), 5, 5, 0, true)));
+  world.add(flatSheet(world, {0, 0, 0.15}, 0.4, 5));
   for (int step = 0; step < 120; ++step) world.step();
   EXPECT_LT(world.worldFromBody(1).translation().z(), -0.5);
   EXPECT_LT(world.softBody(0).m_nodes[12].m_x.z(), -0.5);
@@ -306,10 +309,7 @@ TEST(BulletField, WhatIsThrownOutOfTheWorldBlowsUpToo) {
 TEST(BulletField, ANodeThatBlowsUpSaysWhereAndWhen) {
   World world;
   world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
-  const auto corner = [](double x, double y) { return btVector3(0.2 * x, 0.2 * y, 0); };
-  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
-                                                                   corner(-1, 1), corner(1, 1), 4, 4, 0, true));
-  world.add(std::move(sheet));
+  world.add(flatSheet(world, {0, 0, 0}, 0.2, 4));
   world.step();
   world.softBody(0).m_nodes[5].m_x.setX(std::numeric_limits<double>::quiet_NaN());
   try {
@@ -369,9 +369,7 @@ TEST(BulletField, ClothThatFallsFastDoesNotPassAThinPlate) {
   Kind plate("box,width=1,height=1,depth=0.02");
   World world;
   world.add(plate.shape, 0, plate.mass.meshFromInertia);
-  const auto corner = [](double x, double y) { return btVector3(0.25 * x, 0.25 * y, 0.3); };
-  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
-                                                                   corner(-1, 1), corner(1, 1), 15, 15, 0, true));
+  std::unique_ptr<btSoftBody> sheet = flatSheet(world, {0, 0, 0.3}, 0.25, 15);
   sheet->getCollisionShape()->setMargin(0.01);
   sheet->setTotalMass(1, false);
   sheet->setVelocity(btVector3(0, 0, -20));  // four times its thickness in a step
@@ -386,9 +384,7 @@ TEST(BulletField, ClothRestsOnABody) {
   Kind ball("sphere,radius=0.5");
   World world;
   world.add(ball.shape, 0, ball.mass.meshFromInertia);
-  const auto corner = [](double x, double y) { return btVector3(0.6 * x, 0.6 * y, 0.55); };
-  std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(world.softBodyInfo(), corner(-1, -1), corner(1, -1),
-                                                                   corner(-1, 1), corner(1, 1), 31, 31, 0, true));
+  std::unique_ptr<btSoftBody> sheet = flatSheet(world, {0, 0, 0.55}, 0.6, 31);
   constexpr double kMargin = 0.02;
   sheet->m_cfg.piterations = 8;
   sheet->m_cfg.kDF = 1;
