@@ -271,6 +271,38 @@ TEST(BulletField, ThreadsAndRepetitionsChangeNothing) {
   EXPECT_EQ(once, end(2));
 }
 
+/// Bullet's own contacts of spheres start from nothing in each step, too few iterations to carry what lies above.
+TEST(BulletField, AColumnOfMarblesStands) {
+  constexpr double kRadius = 0.05;
+  constexpr int kCount = 12;
+  Kind slab("box,width=1,height=1,depth=0.2");
+  btSphereShape marble(kRadius);
+  World world;
+  world.add(slab.shape, 0, slab.mass.meshFromInertia);
+  std::vector<std::size_t> column;
+  for (int n = 0; n < kCount; ++n) {
+    column.push_back(world.add(marble, 1, at({0, 0, 0.1 + (2 * n + 1) * kRadius})));
+    world.body(column.back()).setLinearFactor({0, 0, 1});  // does not fall over
+  }
+  for (int step = 0; step < 480; ++step) world.step();
+  double height = 0.1 - kRadius;
+  for (const std::size_t number : column) {
+    const double z = world.worldFromBody(number).translation().z();
+    EXPECT_NEAR(z - height, 2 * kRadius, 0.005 * kRadius) << "marble " << number;
+    height = z;
+  }
+}
+
+TEST(BulletField, ABodyRestsAsDeepAsTheSlop) {
+  Kind slab("box,width=1,height=1,depth=0.2");
+  btSphereShape marble(0.05);
+  World world({.slop = 0.001});
+  world.add(slab.shape, 0, slab.mass.meshFromInertia);
+  const std::size_t number = world.add(marble, 1, at({0, 0, 0.152}));
+  for (int step = 0; step < 480; ++step) world.step();
+  EXPECT_NEAR(world.worldFromBody(number).translation().z(), 0.15 - 0.001, 0.0002);
+}
+
 TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
   btSphereShape sphere(0.1);
   World world;
@@ -289,6 +321,7 @@ TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
   scaled.linear() *= 2;
   EXPECT_THROW(world.add(sphere, 1, scaled), Error);
   EXPECT_THROW(World({.step = 0}), Error);
+  EXPECT_THROW(World({.slop = -1}), Error);
 }
 
 /// Bullet leaves it where it is, and says nothing.

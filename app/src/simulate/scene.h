@@ -30,8 +30,8 @@ struct BodyKind {
 
 class Scene {
  public:
-  explicit Scene(const SceneRequest& request)
-      : world_({.step = request.step, .solverIterations = request.iterations}) {}
+  explicit Scene(const SceneRequest& request, double slop = 0)
+      : world_({.step = request.step, .solverIterations = request.iterations, .slop = slop}) {}
   virtual ~Scene() = default;
 
   physics::World& world() { return world_; }

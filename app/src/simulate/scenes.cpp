@@ -65,7 +65,7 @@ void requireFitting(const TriangleMesh& ground, const std::string& name, double 
 /// Marbles over something that is open upwards.
 class MarbleScene : public Scene {
  public:
-  MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request) {
+  MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request, radius / 300) {
     TriangleMesh mesh = sceneMesh(console, request.ground, request.filesAreYUp, 0);
     requireFitting(mesh, request.ground, radius);
     stand(addKind(console, request, std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());

@@ -189,9 +189,7 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
     const auto nearest = std::ranges::min_element(
         before_, {}, [&](const btManifoldPoint& old) { return old.m_localPointB.distance2(point.m_localPointB); });
     if (nearest != before_.end() && nearest->m_localPointB.distance2(point.m_localPointB) < near * near) {
-      point.m_appliedImpulse = nearest->m_appliedImpulse;
-      point.m_appliedImpulseLateral1 = nearest->m_appliedImpulseLateral1;
-      point.m_appliedImpulseLateral2 = nearest->m_appliedImpulseLateral2;
+      point.m_appliedImpulse = nearest->m_appliedImpulse;  // of friction Bullet takes none
       before_.erase(nearest);
     }
     manifolds_[i / 4]->addManifoldPoint(point);

@@ -104,7 +104,7 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
 };
 
 template <typename Algorithm>
-struct CreateFieldAlgorithm final : btCollisionAlgorithmCreateFunc {
+struct CreateAlgorithm final : btCollisionAlgorithmCreateFunc {
   btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                  const btCollisionObjectWrapper* first,
                                                  const btCollisionObjectWrapper* second) override {

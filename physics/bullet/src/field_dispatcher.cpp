@@ -8,6 +8,7 @@
 
 #include "field_algorithms.h"
 #include "hpsdf/physics/bullet.h"
+#include "sphere_pair.h"
 
 namespace hpsdf::physics {
 
@@ -17,8 +18,9 @@ struct FieldDispatcher::Algorithms {
     const btCollisionObject *first, *second;
   };
 
-  CreateFieldAlgorithm<RigidFieldAlgorithm> rigid;
-  CreateFieldAlgorithm<SoftFieldAlgorithm> soft;
+  CreateAlgorithm<RigidFieldAlgorithm> rigid;
+  CreateAlgorithm<SoftFieldAlgorithm> soft;
+  CreateAlgorithm<SpherePairAlgorithm> spheres;
   std::vector<Prepared> prepared;  ///< room that is used again
 };
 
@@ -31,6 +33,7 @@ FieldDispatcher::FieldDispatcher(btCollisionConfiguration* configuration)
   for (const int other : {FAST_CONCAVE_MESH_PROXYTYPE, SPHERE_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE})
     both(other, algorithms_->rigid);
   both(SOFTBODY_SHAPE_PROXYTYPE, algorithms_->soft);
+  registerCollisionCreateFunc(SPHERE_SHAPE_PROXYTYPE, SPHERE_SHAPE_PROXYTYPE, &algorithms_->spheres);
 }
 
 FieldDispatcher::~FieldDispatcher() { delete algorithms_; }

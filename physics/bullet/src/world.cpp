@@ -54,6 +54,7 @@ World::World(const WorldOptions& options) : options_(options) {
   if (!(options.step > 0) || !std::isfinite(options.step)) throw Error("world: the step must be a number above 0");
   if (!options.gravity.allFinite()) throw Error("world: gravity must be finite");
   if (options.solverIterations < 1) throw Error("world: the solver needs 1 iteration or more");
+  if (!(options.slop >= 0) || !std::isfinite(options.slop)) throw Error("world: slop must be a number, 0 or more");
   parts_ = std::make_unique<Parts>();
   btSoftRigidDynamicsWorld& world = parts_->world;
   world.setGravity(toBullet(options.gravity));
@@ -63,6 +64,7 @@ World::World(const WorldOptions& options) : options_(options) {
   info.m_splitImpulse = 1;
   info.m_splitImpulsePenetrationThreshold = 0;
   info.m_erp2 = 0.5;
+  info.m_linearSlop = options.slop;
   btSoftBodyWorldInfo& soft = world.getWorldInfo();
   soft.m_gravity = toBullet(options.gravity);
   soft.m_broadphase = &parts_->broadphase;

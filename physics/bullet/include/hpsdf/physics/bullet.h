@@ -60,7 +60,8 @@ struct DispatchFigures {
 };
 
 /// Bullet's dispatcher, which asks for all contacts of fields first, in parallel by the threads of the caller's TBB
-/// arena, and then fills the manifolds one after another: the result does not depend on the number of threads.
+/// arena, and then fills the manifolds one after another: the result does not depend on the number of threads. Two
+/// spheres keep the impulse of their contact from step to step, as Bullet's own do not: piles of them come to rest.
 class FieldDispatcher final : public btCollisionDispatcher {
  public:
   /// Registers the algorithms too.

@@ -16,6 +16,9 @@ struct WorldOptions {
   Vector3 gravity = {0, 0, -9.81};  ///< units a second²
   double step = 1.0 / 240;          ///< seconds
   int solverIterations = 20;
+  /// So deep bodies may rest in each other, in units: some hundredth of their size or less. Contacts then do not come
+  /// and go from step to step, and piles are calmer.
+  double slop = 0;
 };
 
 struct Material {
@@ -39,7 +42,8 @@ struct StepFigures {
 /// for any number of threads.
 class World {
  public:
-  /// Throws `Error` unless the step is above 0 and finite, gravity finite and there is one iteration at least.
+  /// Throws `Error` unless the step is above 0 and finite, gravity finite, there is one iteration at least, and slop is
+  /// 0 or above and finite.
   explicit World(const WorldOptions& options = {});
   ~World();
   World(const World&) = delete;
