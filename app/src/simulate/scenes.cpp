@@ -259,19 +259,23 @@ std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& 
 std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request) {
   struct Slope final : PileScene {
     Slope(const Console& to, const SceneRequest& from) : PileScene(from) {
-      constexpr double kLength = 8, kWidth = 4, kThick = 0.4, kSize = 0.6;
+      constexpr double kLength = 8, kWidth = 4.4, kThick = 0.4, kSize = 0.6, kRail = 0.7;
       const auto kinds = bodyKinds(to, from, kSize);
       BodyKind& slab = addKind(to, from, slabMesh({kLength, kWidth, kThick}), 4000);
       BodyKind& table = addKind(to, from, slabMesh({kLength, 2 * kWidth, kThick}), 4000);
+      BodyKind& rail = addKind(to, from, slabMesh({kLength, kThick, kRail}), 1000);
       BodyKind& pole = addKind(to, from, poleMesh(0.12, 0.8), 1000);
       floor_ = -4;
+      const Material smooth{.friction = 0.3};
       const Eigen::Isometry3d ramp =
-          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.45, Vector3::UnitY()));  // falls towards +x
-      stand(slab, ramp);
+          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.55, Vector3::UnitY()));  // falls towards +x
+      stand(slab, ramp, smooth);
+      for (const double side : {-0.5, 0.5})
+        stand(rail, ramp * shift({0, side * (kWidth + kThick), (kRail - kThick) / 2}), smooth);
       stand(table, shift({0.75 * kLength, 0, -0.3}));
       for (int row = 0; row < 3; ++row)
-        for (int i = 0; i < 3 + row % 2; ++i)
-          stand(pole, ramp * shift({-1.0 + 1.6 * row, 1.1 * (i - 0.5 * (2 + row % 2)), 0.4 + kThick / 2}));
+        for (int i = 0; i < 2 + row % 2; ++i)
+          stand(pole, ramp * shift({-1.0 + 1.6 * row, 1.4 * (i - 0.5 * (1 + row % 2)), 0.4 + kThick / 2}), smooth);
       for (std::size_t n = 0; n < from.bodies; ++n) {
         const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), 0);
         const Vector3 at = ramp * Vector3(-3.2, 1.0 * (double(n % 3) - 1), 0.9) + jitter;
