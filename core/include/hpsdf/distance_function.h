@@ -15,6 +15,14 @@
 
 namespace hpsdf {
 
+/// How inside is told from outside.
+enum class Sign : std::uint8_t {
+  automatic,     ///< whichever of the next two suits the mesh
+  pseudonormal,  ///< by the nearest feature's normal: for closed meshes that do not meet themselves
+  winding,       ///< by the winding number: for any mesh, holes being closed
+  shell,         ///< a wall of some thickness around the surface, which may be open
+};
+
 /// Where a signed distance comes from: kept with a field built from it.
 struct Source {
   std::string name = {};          ///< the mesh file's name without its path, or a shape's spec
@@ -23,6 +31,8 @@ struct Source {
   std::uint64_t faces = 0;
   Box box = {};                      ///< smallest box of the surface in world units; empty where it is not known
   Normalization normalization = {};  ///< that took the mesh's own units to these
+  Sign sign = Sign::automatic;       ///< as it was chosen; automatic where it is not known
+  double thickness = 0;              ///< of a shell, in world units
 };
 
 /// Any signed distance Φ, evaluated in batches; negative inside. Converts from anything callable, single

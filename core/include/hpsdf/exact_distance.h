@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "hpsdf/distance_function.h"
@@ -22,13 +23,38 @@ struct ClosestPoint {
   Feature feature;
 };
 
+struct DistanceOptions {
+  Sign sign = Sign::automatic;
+  double thickness = 0;  ///< of a shell, in world units: above 0 for one, else 0
+  int threads = 0;       ///< at most, 0: all. The result does not depend on them.
+};
+
+/// Which sign distances have, and why.
+struct SignChoice {
+  Sign sign = Sign::pseudonormal;  ///< never automatic
+  std::string reason = {};         ///< half a sentence, such as "the mesh is closed, and …"
+  std::size_t openSides = 0;       ///< of triangles, which no neighbour takes back
+  /// Where pseudonormal and winding number were compared, how often they differed there, and the deepest such place.
+  std::size_t compared = 0, differing = 0;
+  Vector3 deepest = Vector3::Zero();
+  double depth = 0;  ///< its distance to the surface
+};
+
 /// Exact signed distance to a triangle mesh in double precision.
 ///
-/// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time. Sign: dot
-/// product of (x - closest point) with the angle-weighted pseudonormal of the closest feature (Bærentzen & Aanæs 2005):
-/// right for closed meshes that do not intersect themselves. Equal distances are decided by the lower triangle index,
-/// so that a result depends on neither the order nor the grouping of queries: single and batched queries agree bit for
-/// bit.
+/// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time.
+///
+/// Sign, one of three:
+/// * `Sign::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
+/// feature
+///   (Bærentzen & Aanæs 2005): right for closed meshes that do not intersect themselves.
+/// * `Sign::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided as the
+///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
+///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.
+/// * `Sign::shell`: half of the thickness less than the unsigned distance. For sheets.
+///
+/// Equal distances are decided by the lower triangle index, so that a result depends on neither the order nor the
+/// grouping of queries: single and batched queries agree bit for bit.
 ///
 /// A triangle without area (its height within the roundings of its coordinates) answers by its sides and adds nothing
 /// to the pseudonormals. A point that is not finite gets a value that is not finite; the sign is lost where the
@@ -37,9 +63,9 @@ struct ClosestPoint {
 /// Const and thread-safe after construction. Keeps no reference to the mesh.
 class ExactDistance {
  public:
-  /// Takes at most so many threads, 0 for all; the result does not depend on them. Throws `Error` for a mesh without
-  /// triangles, with indices out of range or with non-finite coordinates.
-  explicit ExactDistance(const TriangleMesh& mesh, int threads = 0);
+  /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, and for a
+  /// thickness that does not go with the sign.
+  explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
   ExactDistance& operator=(ExactDistance&&) noexcept;
@@ -49,12 +75,16 @@ class ExactDistance {
   /// Batched: fastest when neighbours in `points` are neighbours in space. The spans have equal length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
+  /// The nearest point of the triangles. Its signed distance is that of `operator()`: beside a closed hole, and of a
+  /// shell, not the distance to the point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
-  /// Name, fingerprint, counts and box of the mesh.
+  const SignChoice& signChoice() const;
+
+  /// Name, fingerprint, counts, box and sign of the mesh.
   const Source& source() const;
 
-  /// Bytes held: triangles, pseudonormals and hierarchy.
+  /// Bytes held: triangles, hierarchy, pseudonormals, moments of the winding number.
   std::size_t bytes() const;
 
  private:

@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "distance/hierarchy.h"
+#include "distance/inside.h"
 #include "distance/pseudonormals.h"
 #include "distance/search.h"
+#include "distance/sign_choice.h"
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
 #include "hpsdf/threads.h"
@@ -36,6 +38,12 @@ void check(const TriangleMesh& mesh) {
                   " has a coordinate that is not a finite number; repair or export the mesh again");
 }
 
+void check(const DistanceOptions& options) {
+  const bool isShell = options.sign == Sign::shell;
+  if (isShell ? !(options.thickness > 0) || !std::isfinite(options.thickness) : options.thickness != 0)
+    throw Error("a shell, and nothing else, has a thickness, a number above 0");
+}
+
 /// The point of segment ab closest to x, as its parameter in [0, 1].
 double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
   const Vector3 direction = b - a;
@@ -46,16 +54,28 @@ double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
 }  // namespace
 
 struct ExactDistance::Data {
-  explicit Data(const TriangleMesh& mesh)
-      : source{mesh.name, 0, mesh.vertices.size(), mesh.triangles.size(), boundingBox(mesh)} {
+  Data(const TriangleMesh& mesh, const DistanceOptions& options)
+      : source{.name = mesh.name,
+               .vertices = mesh.vertices.size(),
+               .faces = mesh.triangles.size(),
+               .box = boundingBox(mesh),
+               .thickness = options.thickness} {
     tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
                          [&] {
                            hierarchy = distance::Hierarchy(mesh, source.box);
                            normals = distance::Pseudonormals(hierarchy);
                          });
+    choice.sign = options.sign;
+    if (options.sign == Sign::automatic || options.sign == Sign::winding) inside = distance::Inside(hierarchy, mesh);
+    if (options.sign == Sign::automatic)
+      choice =
+          chooseSign(hierarchy, normals, source.box, inside, [this](auto points, auto out) { byNormals(points, out); });
+    if (choice.sign != Sign::winding) inside = {};
+    source.sign = choice.sign;
   }
 
-  /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0.
+  /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0. Its
+  /// sign is the pseudonormal's.
   ClosestPoint resolve(const Vector3& x, const distance::Nearest& nearest) const {
     const std::uint32_t slot = hierarchy.slotAt(nearest.place);
     const TriangleFrame& frame = hierarchy.frames()[slot];
@@ -79,9 +99,31 @@ struct ExactDistance::Data {
     return at(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
+  /// As they are by pseudonormals.
+  void byNormals(std::span<const Vector3> points, std::span<double> out) const {
+    using distance::kPacket;
+    std::array<distance::Nearest, kPacket> nearest{};  // of the packet before: a tight bound from the outset
+    for (std::size_t first = 0; first < points.size(); first += kPacket) {
+      const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
+      std::array<Vector3, kPacket> packet;
+      for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
+      hierarchy.nearest(packet, nearest);
+      for (std::size_t i = 0; i < count; ++i) out[first + i] = resolve(packet[i], nearest[i]).signedDistance;
+    }
+  }
+
+  /// From those, in place, the distances that were asked for.
+  void sign(std::span<const Vector3> points, std::span<double> distances) const {
+    if (choice.sign == Sign::pseudonormal) return;
+    for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
+    if (choice.sign == Sign::winding) inside.sign(points, distances);
+  }
+
   Source source;
   distance::Hierarchy hierarchy;
   distance::Pseudonormals normals;
+  distance::Inside inside;  ///< empty unless it gives the sign
+  SignChoice choice;
 
  private:
   /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.
@@ -92,9 +134,10 @@ struct ExactDistance::Data {
   }
 };
 
-ExactDistance::ExactDistance(const TriangleMesh& mesh, int threads) {
+ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options) {
   check(mesh);
-  data_ = withThreads(threads, [&] { return std::make_unique<const Data>(mesh); });
+  check(options);
+  data_ = withThreads(options.threads, [&] { return std::make_unique<const Data>(mesh, options); });
 }
 
 ExactDistance::~ExactDistance() = default;
@@ -105,25 +148,24 @@ double ExactDistance::operator()(const Vector3& x) const { return closestPoint(x
 
 void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  using distance::kPacket;
-  std::array<distance::Nearest, kPacket> nearest{};  // of the packet before: a tight bound from the outset
-  for (std::size_t first = 0; first < points.size(); first += kPacket) {
-    const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
-    std::array<Vector3, kPacket> packet;
-    for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
-    data_->hierarchy.nearest(packet, nearest);
-    for (std::size_t i = 0; i < count; ++i) out[first + i] = data_->resolve(packet[i], nearest[i]).signedDistance;
-  }
+  data_->byNormals(points, out);
+  data_->sign(points, out);
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  return data_->resolve(x, data_->hierarchy.nearest(x));
+  ClosestPoint closest = data_->resolve(x, data_->hierarchy.nearest(x));
+  data_->sign({&x, 1}, {&closest.signedDistance, 1});
+  return closest;
 }
+
+const SignChoice& ExactDistance::signChoice() const { return data_->choice; }
 
 std::string_view instructionSet() { return distance::instructionSet(); }
 
 const Source& ExactDistance::source() const { return data_->source; }
 
-std::size_t ExactDistance::bytes() const { return data_->hierarchy.bytes() + data_->normals.bytes(); }
+std::size_t ExactDistance::bytes() const {
+  return data_->hierarchy.bytes() + data_->normals.bytes() + data_->inside.bytes();
+}
 
 }  // namespace hpsdf

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "distance/hole_rims.h"
+#include "distance/winding.h"
+
+namespace hpsdf::distance {
+
+/// Gives distances their sign by the winding number: inside it is above ½. A surface on which it is ½ closes every
+/// hole, and counts as surface: it is |w − ½|/|∇w| away, to first order, and where that is less than the distance to
+/// the triangles, it is the distance.
+class Inside {
+ public:
+  Inside() = default;
+
+  /// Refers to the hierarchy, which must stay where it is. The inside of a closed mesh whose faces look inwards is all
+  /// around it.
+  Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh);
+
+  bool hasRims() const { return !rims_.empty(); }
+  std::size_t rimSides() const { return rims_.size(); }
+  bool inside(const Vector3& x) const { return winding_.inside(x, level_); }
+
+  /// Makes signed ones, in place, of distances to the triangles, with the fewer winding numbers the closer together the
+  /// points lie. A point gets the same alone and among others.
+  void sign(std::span<const Vector3> points, std::span<double> distances) const;
+
+  std::size_t bytes() const { return winding_.bytes() + rims_.bytes(); }
+
+ private:
+  struct Known;
+  Known find(const Vector3& x, double distance) const;
+  void signTogether(std::span<const Vector3> points, std::span<double> distances, std::vector<Known>& known) const;
+
+  const Hierarchy* hierarchy_ = nullptr;
+  Winding winding_;
+  HoleRims rims_;
+  double level_ = 0.5;
+};
+
+}  // namespace hpsdf::distance
