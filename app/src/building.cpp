@@ -85,6 +85,12 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
   throw Error(surface + ": " + message);
 }
 
+/// An option that says nothing without another is a mistake.
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given) {
+  if (arguments.given(name) && !given)
+    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
+}
+
 /// A surface as a field is made from it.
 struct PreparedSurface {
   std::optional<DistanceFunction> analytic;  ///< else the mesh
@@ -117,9 +123,31 @@ std::shared_ptr<const DistanceFunction> distanceOf(const std::shared_ptr<const E
   return std::make_shared<const DistanceFunction>(std::move(evaluate), std::move(source));
 }
 
-std::shared_ptr<const DistanceFunction> distanceTo(const PreparedSurface& surface, int threads) {
-  if (surface.analytic) return std::make_shared<const DistanceFunction>(*surface.analytic);
-  return distanceOf(std::make_shared<const ExactDistance>(surface.mesh, threads), surface.normalization);
+Sign signOf(const std::string& name) {
+  if (name == "pseudonormal") return Sign::pseudonormal;
+  if (name == "winding") return Sign::winding;
+  return name == "unsigned-shell" ? Sign::shell : Sign::automatic;
+}
+
+DistanceOptions distanceOptions(const Arguments& arguments) {
+  DistanceOptions options{.sign = signOf(arguments.text("sign")), .threads = int(arguments.whole("threads"))};
+  if (options.sign == Sign::shell && !arguments.given("thickness"))
+    throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
+  requireOwner(arguments, "thickness", "sign unsigned-shell", options.sign == Sign::shell);
+  if (options.sign == Sign::shell) options.thickness = arguments.number("thickness");
+  return options;
+}
+
+/// With the sign of a field that was made from `source`.
+std::shared_ptr<const ExactDistance> exactDistanceOf(const TriangleMesh& mesh, const Source& source) {
+  return std::make_shared<const ExactDistance>(mesh,
+                                               DistanceOptions{.sign = source.sign, .thickness = source.thickness});
+}
+
+/// Of a closed mesh without folds all expect the sign that it gets.
+void tellSign(const Console& console, const std::string& surface, const SignChoice& choice) {
+  if (!choice.reason.empty() && choice.sign != Sign::pseudonormal)
+    console.err << fmt::format("hpsdf: {}: sign by winding number: {}", surface, choice.reason) << std::endl;
 }
 
 /// ∇Φ of a shape in closed form, by differences across a millionth of it.
@@ -137,12 +165,6 @@ Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
 
 bool isMadeFrom(const Source& given, const Source& source) {
   return given.fingerprint == source.fingerprint && (source.fingerprint != 0 || given.name == source.name);
-}
-
-/// An option that says nothing without another is a mistake.
-void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given) {
-  if (arguments.given(name) && !given)
-    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
 }
 
 std::string nameOf(const Source& source) { return source.name.empty() ? "unknown" : source.name; }
@@ -331,6 +353,21 @@ std::vector<Parameter> buildParameters() {
                "known (orders up to 13); product takes Gauss points along each axis, as the paper does.",
        .defaultText = "compact",
        .choices = {"compact", "product"}},
+      {.name = "sign",
+       .type = ParameterType::choice,
+       .help = "How inside is told from outside. pseudonormal: by the normals of what is nearest, for closed meshes "
+               "that do "
+               "not meet themselves. winding: by how often the faces surround a place, for any mesh; holes are closed. "
+               "unsigned-shell: all is outside but a wall around the faces, --thickness wide, for sheets. auto: "
+               "pseudonormal where the mesh is closed and both agree, else winding, and says why.",
+       .defaultText = "pseudonormal",
+       .choices = {"auto", "pseudonormal", "winding", "unsigned-shell"}},
+      {.name = "thickness",
+       .type = ParameterType::number,
+       .help = "Of the wall that --sign unsigned-shell makes.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
       {.name = "band",
        .type = ParameterType::number,
        .help =
@@ -438,9 +475,17 @@ BuildOptions buildOptions(const Arguments& arguments) {
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   try {
     const BuildOptions options = buildOptions(arguments);  // mistakes, before long work
+    const DistanceOptions ofMesh = distanceOptions(arguments);
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
-    BuildInput input{distanceTo(prepared, options.threads), prepared.report, {}, options};
+    BuildInput input{nullptr, prepared.report, {}, options};
+    if (prepared.analytic) {
+      input.exact = std::make_shared<const DistanceFunction>(*prepared.analytic);
+    } else {
+      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, ofMesh);
+      tellSign(console, surface, exact->signChoice());
+      input.exact = distanceOf(exact, prepared.normalization);
+    }
     input.setUpSeconds = secondsSince(start);
     const Box& box = input.exact->source().box;
     input.domain = domainOf(arguments, box);
@@ -476,7 +521,9 @@ bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) ||
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
   try {
-    auto exact = distanceTo(prepare(console, surface, !source.normalization.isIdentity()), 0);
+    const PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
+    auto exact = prepared.analytic ? std::make_shared<const DistanceFunction>(*prepared.analytic)
+                                   : distanceOf(exactDistanceOf(prepared.mesh, source), prepared.normalization);
     if (!isMadeFrom(exact->source(), source))
       console.err << "hpsdf: warning: " << surface << " is not what the field was made from (" << nameOf(source) << ")"
                   << std::endl;
@@ -500,14 +547,19 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
         return differenceQuotient(*distance, x);
       };
     } else {
-      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh);
+      const auto exact = exactDistanceOf(prepared.mesh, source);
       reference.distance = distanceOf(exact, prepared.normalization);
       reference.mesh = std::move(prepared.mesh);
       // nearer than this, rounding decides the direction
       const double least = 1e-9 * exact->source().box.sizes().maxCoeff();
       reference.normal = [exact, least](const Vector3& x, double signedDistance) {
-        if (std::abs(signedDistance) < least) return Vector3(Vector3::Zero());
-        return Vector3((x - exact->closestPoint(x).point) / signedDistance);
+        const ClosestPoint closest = exact->closestPoint(x);
+        const Vector3 away = x - closest.point;
+        const double distance = away.norm(), thickness = exact->source().thickness;
+        // what closes a hole is nearer than the faces, and has no normal that is known
+        const bool besideHole = std::abs(std::abs(signedDistance + thickness / 2) - distance) > least;
+        if (distance < least || besideHole) return Vector3(Vector3::Zero());
+        return Vector3(away / (thickness == 0 && signedDistance < 0 ? -distance : distance));
       };
     }
     reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);

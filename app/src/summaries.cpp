@@ -115,6 +115,20 @@ std::string continuityName(const Field& field) {
   return weak && exact ? "both" : weak ? "weak" : exact ? "exact" : "none";
 }
 
+std::string signName(Sign sign) {
+  switch (sign) {
+    case Sign::pseudonormal:
+      return "pseudonormal";
+    case Sign::winding:
+      return "winding";
+    case Sign::shell:
+      return "unsigned-shell";
+    case Sign::automatic:
+      break;
+  }
+  return "unknown";
+}
+
 std::string strategyName(Strategy strategy) {
   switch (strategy) {
     case Strategy::h1:
@@ -171,9 +185,8 @@ std::string meshText(const std::string& name, const MeshReport& report) {
 std::string meshWarning(const std::string& name, const MeshReport& report) {
   if (report.closed()) return {};
   return fmt::format(
-      "{}: the surface is not closed ({}): signs may be wrong, and refinement may chase their jumps without end; a "
-      "lower "
-      "max-depth bounds that",
+      "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "
+      "without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
       name, faultyEdges(report));
 }
 
@@ -235,7 +248,9 @@ Json fieldJson(const CurrentField& current) {
        {{"name", metadata.source.name},
         {"fingerprint", fingerprintText(metadata.source.fingerprint)},
         {"vertices", metadata.source.vertices},
-        {"faces", metadata.source.faces}}},
+        {"faces", metadata.source.faces},
+        {"sign", metadata.source.faces > 0 ? Json(signName(metadata.source.sign)) : Json()},
+        {"thickness", metadata.source.thickness > 0 ? Json(metadata.source.thickness) : Json()}}},
       {"degree_volume", levelsJson(figures.degreeVolume)},
       {"depth_volume", levelsJson(figures.depthVolume)},
       {"degree_leaves", levelsJson(figures.degreeLeaves)},
@@ -267,6 +282,10 @@ std::string fieldText(const CurrentField& current) {
     text += summaryRow("vertices, faces",
                        fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
     text += summaryRow("fingerprint", fingerprintText(metadata.source.fingerprint));
+    text += summaryRow(
+        "sign", signName(metadata.source.sign) +
+                    (metadata.source.thickness > 0 ? fmt::format(", {} thick", shortNumber(metadata.source.thickness))
+                                                   : std::string()));
   }
   if (const Normalization& n = metadata.source.normalization; !n.isIdentity())
     text += summaryRow("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));

@@ -125,9 +125,10 @@ std::string withChecksum(std::string bytes) {
   return bytes;
 }
 
-constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8;  // bytes at the header's end
+constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8;  // bytes at the header's end
 
-/// As older programs wrote them: version 2 without what came after the steps, version 1 without these too.
+/// As older programs wrote them: version 3 without the sign, version 2 without what came after the steps, version 1
+/// without these too.
 TEST(FieldFile, FilesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
@@ -138,12 +139,17 @@ TEST(FieldFile, FilesOfOlderVersionsAreRead) {
   std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
+  bytes[8] = 3;
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion4, kSinceVersion4)));
+  EXPECT_EQ(load(file).metadata().measuredError, field.metadata().measuredError);
+  EXPECT_EQ(load(file).data().nodes, field.data().nodes);
+  const std::size_t sinceSteps = nodes - kSinceVersion4 - kSinceVersion3;
   bytes[8] = 2;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion3, kSinceVersion3)));
+  writeAll(file, withChecksum(bytes.erase(sinceSteps, kSinceVersion3)));
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 1;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion3 - 8, 8)));
+  writeAll(file, withChecksum(bytes.erase(sinceSteps - 8, 8)));
   const Field old = load(file);
   EXPECT_EQ(old.metadata().steps, std::nullopt);
   EXPECT_EQ(old.metadata().roundingRms, field.metadata().roundingRms);
@@ -166,12 +172,16 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   data.metadata.measuredError = 0.0075;
   data.metadata.enriched = true;
   data.metadata.continuityWeight = 3;
+  data.metadata.source.sign = Sign::shell;
+  data.metadata.source.thickness = 0.125;
   save(Field(data), file);
   const Field again = load(file);
   EXPECT_EQ(again.data().blend, 0.125);
   ASSERT_EQ(again.data().bounds.size(), data.nodes.size());
   EXPECT_EQ(again.data().bounds.back().error, 0.25f);
   EXPECT_EQ(again.data().bounds.back().slope, 1.5f);
+  EXPECT_EQ(again.metadata().source.sign, Sign::shell);
+  EXPECT_EQ(again.metadata().source.thickness, 0.125);
   EXPECT_EQ(again.metadata().estimator, Estimator::residual);
   EXPECT_EQ(again.metadata().criterion, Criterion::optimal);
   EXPECT_EQ(again.metadata().nearnessKind, NearnessKind::exponential);
@@ -191,7 +201,8 @@ TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
   save(Field(data), file);
   const std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
-  const std::size_t bounds = bytes.size() - 8 - 8 * count, since = bounds - 8 * (coefficients + count) - kSinceVersion3;
+  const std::size_t bounds = bytes.size() - 8 - 8 * count,
+                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));
@@ -206,6 +217,8 @@ TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
     for (const float bound : {-1.0f, NAN}) EXPECT_TRUE(refused(at, bound)) << at;
   EXPECT_FALSE(refused(bounds, 1e30f));
   for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{2})) << flag;
+  EXPECT_FALSE(refused(since + kSinceVersion3, Sign::shell));
+  EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{4})) << "sign";
 }
 
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.

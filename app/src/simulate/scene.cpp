@@ -120,7 +120,7 @@ Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRe
   }
   const int threads = tbb::this_task_arena::max_concurrency();
   Field field = withProgress(console, [&](const Progress& progress) {
-    const ExactDistance distance(mesh, threads);
+    const ExactDistance distance(mesh, {.threads = threads});
     return build(distance, domainAround(mesh), {.targetError = request.targetError, .threads = threads}, progress);
   });
   if (request.cache) save(field, file);

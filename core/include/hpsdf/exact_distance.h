@@ -24,7 +24,7 @@ struct ClosestPoint {
 };
 
 struct DistanceOptions {
-  Sign sign = Sign::automatic;
+  Sign sign = Sign::pseudonormal;
   double thickness = 0;  ///< of a shell, in world units: above 0 for one, else 0
   int threads = 0;       ///< at most, 0: all. The result does not depend on them.
 };

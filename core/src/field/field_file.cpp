@@ -28,7 +28,8 @@ static_assert(sizeof(float) == 4 && std::numeric_limits<float>::is_iec559);
 
 // Like PNG's: a carriage return, a line feed and an end-of-file mark show a transfer that took it for text.
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-constexpr std::uint32_t kVersion = 3;  // 1 had no steps, 2 nothing of continuity, bounds and other ways to steer
+constexpr std::uint32_t kVersion =
+    4;  // 1 had no steps, 2 nothing of continuity, bounds and other ways to steer, 3 no sign
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 constexpr std::uint32_t kLongestName = 4096;
 constexpr std::size_t kChecksumBytes = 8;
@@ -220,6 +221,9 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(m.continuityWeight);
   stream.item(data.blend);
   stream.item(sizes.bounds);
+  if (version < 4) return;
+  stream.item(m.source.sign);
+  stream.item(m.source.thickness);
 }
 
 }  // namespace
@@ -264,6 +268,8 @@ Field load(const std::filesystem::path& file) {
   if (made.strategy > Strategy::h2 || made.estimator > Estimator::residual || made.criterion > Criterion::optimal ||
       made.nearnessKind > NearnessKind::exponential)
     reader.damaged("it was made by an unknown strategy, estimator, criterion or kind of nearness");
+  if (made.source.sign > Sign::shell) reader.damaged("its sign is of an unknown kind");
+  if (version < 4 && made.source.faces > 0) data.metadata.source.sign = Sign::pseudonormal;  // there was no other
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);

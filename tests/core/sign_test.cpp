@@ -1,0 +1,276 @@
+// Inside and outside of meshes that are closed, folded, nested, overlapping, open.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "distance/winding.h"
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_import.h"
+#include "hpsdf/shapes.h"
+#include "support/test_mesh.h"
+
+namespace hpsdf {
+namespace {
+
+using distance::Hierarchy;
+using distance::Winding;
+
+/// The winding number by all triangles, each an integral of its own: the solid angle from the three angles between the
+/// planes through x (Girard), unlike the library's formula.
+double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
+  long double sum = 0;
+  using Long = Eigen::Matrix<long double, 3, 1>;
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Long, 3> to, side;
+    for (int k = 0; k < 3; ++k) to[k] = (mesh.vertices[triangle[k]] - x).cast<long double>().normalized();
+    const long double volume = to[0].dot(to[1].cross(to[2]));
+    if (volume == 0) continue;
+    for (int k = 0; k < 3; ++k) side[k] = to[k].cross(to[(k + 1) % 3]);
+    long double angles = -std::numbers::pi_v<long double>;
+    for (int k = 0; k < 3; ++k) {
+      const Long before = -side[(k + 2) % 3];
+      angles += std::atan2(side[k].cross(before).norm(), side[k].dot(before));
+    }
+    sum += volume > 0 ? angles : -angles;
+  }
+  return double(sum / (4 * std::numbers::pi_v<long double>));
+}
+
+std::vector<Vector3> placesIn(const Box& box, int count, std::uint64_t seed = 1) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> u(-0.1, 1.1);
+  std::vector<Vector3> places(static_cast<std::size_t>(count));
+  for (Vector3& x : places) {
+    const double a = u(random), b = u(random), c = u(random);
+    x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
+  }
+  return places;
+}
+
+TriangleMesh moved(TriangleMesh mesh, const Vector3& by, double scale = 1) {
+  for (Vector3& x : mesh.vertices) x = scale * x + by;
+  return mesh;
+}
+
+TriangleMesh joined(const TriangleMesh& one, const TriangleMesh& other) {
+  TriangleMesh mesh = one;
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (auto [a, b, c] : other.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
+  return mesh;
+}
+
+TriangleMesh turned(TriangleMesh mesh) {
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+/// A box of size 2 without its upper side.
+TriangleMesh openBox() {
+  TriangleMesh mesh = shapes::mesh("box,width=2,height=2,depth=2");
+  std::erase_if(mesh.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(triangle, [&](std::uint32_t v) { return mesh.vertices[v].z() > 0.999; });
+  });
+  return mesh;
+}
+
+const DistanceOptions kAutomatic{.sign = Sign::automatic};
+
+double value(const ExactDistance& distance, const Vector3& x) { return distance(x); }
+
+TEST(Winding, EstimatesAreAsNearAsTheySay) {
+  for (const TriangleMesh& mesh :
+       {shapes::mesh("builtin:gear"), openBox(), shapes::mesh("builtin:torus,segments=48,sides=24")}) {
+    const Hierarchy hierarchy(mesh, boundingBox(mesh));
+    const Winding winding(hierarchy);
+    double greatest = 0;
+    for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
+      const double exact = windingNumber(mesh, x);
+      EXPECT_NEAR(winding.exact(x), exact, 1e-9);
+      for (int level = 0; level < Winding::kLevels; ++level) {
+        const Winding::Estimate estimate = winding.estimate(x, level);
+        EXPECT_LE(std::abs(estimate.value - exact), estimate.error + 1e-9) << "level " << level;
+        if (level == 0) greatest = std::max(greatest, std::abs(estimate.value - exact));
+      }
+      EXPECT_EQ(winding.inside(x), exact > 0.5);
+      EXPECT_LE(winding.within(x, 1e-6).error, 1e-6);
+    }
+    EXPECT_TRUE(mesh.triangles.size() < 1000 || greatest > 1e-9) << "clusters are not taken at all";
+  }
+}
+
+TEST(Sign, OfAClosedMeshIsThePseudonormals) {
+  const TriangleMesh mesh = shapes::mesh("builtin:gear");
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
+  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
+  EXPECT_EQ(distance.source().sign, Sign::pseudonormal);
+  EXPECT_EQ(distance.signChoice().differing, 0u);
+  EXPECT_GT(distance.signChoice().compared, 4000u);
+  for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
+}
+
+TEST(Sign, OfAMeshThatLooksInwardsIsTheOther) {
+  const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
+  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
+  for (const Vector3& x : placesIn(boundingBox(mesh), 1000)) EXPECT_EQ(distance(x), byWinding(x));
+}
+
+TEST(Sign, OfBodiesThatOverlapIsThatOfTheirUnion) {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
+  const ExactDistance distance(joined(ball, moved(ball, {1, 0, 0})), kAutomatic);
+  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
+  EXPECT_GT(distance.signChoice().differing, 0u);
+  EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("overlap"));
+  EXPECT_LT(value(distance, {0.5, 0, 0}), 0);
+  EXPECT_LT(value(distance, {0.02, 0, 0}), 0) << "inside of one, beside the other's surface";
+  EXPECT_GT(value(distance, {2.5, 0, 0}), 0);
+}
+
+TEST(Sign, OfABodyWithinAnotherIsThatOfTheOuter) {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
+  const ExactDistance solid(joined(ball, moved(ball, Vector3::Zero(), 0.5)), kAutomatic);
+  EXPECT_EQ(solid.signChoice().sign, Sign::winding);
+  EXPECT_LT(value(solid, {0.55, 0, 0}), 0);
+  const ExactDistance hollow(joined(ball, turned(moved(ball, Vector3::Zero(), 0.5))), kAutomatic);
+  EXPECT_EQ(hollow.signChoice().sign, Sign::pseudonormal);
+  EXPECT_GT(value(hollow, {0.3, 0, 0}), 0);
+}
+
+/// As glmark2's bunny does: a vertex pushed through the surface, where normals of the fold look the wrong way.
+TEST(Sign, IsRightWhereAClosedMeshFoldsOver) {
+  TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
+  const std::uint32_t vertex = mesh.triangles[100][0];
+  const Vector3 normal = mesh.vertices[vertex].normalized(), across = normal.unitOrthogonal();
+  mesh.vertices[vertex] += 0.5 * across - 0.3 * normal;  // under its neighbours
+  const ExactDistance distance(mesh, kAutomatic), byNormals(mesh, {.sign = Sign::pseudonormal});
+  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> u(-0.5, 0.5);
+  int misled = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const double a = u(random), b = u(random), c = u(random);
+    const Vector3 x = mesh.vertices[vertex] + Vector3(a, b, c);
+    const double exact = windingNumber(mesh, x);
+    if (std::abs(distance(x)) < 1e-9) continue;
+    EXPECT_EQ(distance(x) < 0, exact > 0.5) << x.transpose();
+    misled += (byNormals(x) < 0) != (exact > 0.5);
+  }
+  EXPECT_GT(misled, 0) << "else this tells nothing";
+}
+
+TEST(Sign, HolesAreClosedWithoutAJump) {
+  const TriangleMesh mesh = openBox();
+  const ExactDistance distance(mesh, kAutomatic);
+  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
+  EXPECT_EQ(distance.signChoice().openSides, 4u);
+  EXPECT_LT(value(distance, {0, 0, 0}), -0.9);
+  EXPECT_GT(value(distance, {0, 0, 3}), 0.5);
+  EXPECT_GT(value(distance, {0, 0, -1.5}), 0.49);
+  double steepest = 0, least = 1;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> u(-1.5, 1.5);
+  for (int n = 0; n < 200; ++n) {  // straight ways through the box and its hole
+    const double a = u(random), b = u(random), c = u(random), d = u(random);
+    const Vector3 from(a, b, -1.5), to(c, d, 2);
+    double before = distance(from);
+    for (int i = 1; i <= 500; ++i) {
+      const double now = distance(from + (to - from) * (i / 500.0));
+      steepest = std::max(steepest, std::abs(now - before) / ((to - from).norm() / 500));
+      least = std::min(least, now);
+      before = now;
+    }
+  }
+  EXPECT_LT(steepest, 2.5) << "a jump of 1 across 1/500 of the way would be some 150";
+  EXPECT_LT(least, -0.5);
+}
+
+TEST(Sign, AFieldOfAnOpenMeshChasesNoJump) {
+  const TriangleMesh mesh = openBox();
+  const BuildOptions options{.targetError = 1e-5, .maxDepth = 6};
+  const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
+  const Field unsignedField =
+      build(ExactDistance(mesh, {.sign = Sign::shell, .thickness = 1e-9}), domainAround(mesh), options);
+  // the winding number's sign, and no patch
+  const ExactDistance byNormals(mesh), byWinding(mesh, kAutomatic);
+  const auto jump = [&](const Vector3& x) { return std::copysign(byNormals(x), byWinding(x)); };
+  const Field jumping = build(jump, domainAround(mesh), options);
+  EXPECT_LT(field.data().nodes.size(), unsignedField.data().nodes.size());
+  EXPECT_GT(jumping.data().nodes.size(), 4 * field.data().nodes.size()) << "else this tells nothing";
+  EXPECT_EQ(field.metadata().source.sign, Sign::winding);
+}
+
+TEST(Sign, OneAndManyAreTheSameToTheBit) {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
+  for (const TriangleMesh& mesh : {openBox(), joined(ball, moved(ball, {1, 0, 0}))}) {
+    const ExactDistance distance(mesh, kAutomatic);
+    ASSERT_EQ(distance.signChoice().sign, Sign::winding);
+    for (const double size : {2.0, 0.3, 0.01}) {  // of the places' box: the smaller, the more they tell each other
+      const Box box(Vector3(0.9, 0.2, 0.95), Vector3(0.9, 0.2, 0.95) + Vector3::Constant(size));
+      std::vector<Vector3> places = placesIn(box, 700);
+      places[13].setConstant(std::numeric_limits<double>::quiet_NaN());
+      std::vector<double> found(places.size());
+      distance(places, found);
+      EXPECT_FALSE(std::isfinite(std::exchange(found[13], 0)));
+      places[13] = mesh.vertices[0];
+      for (std::size_t i = 0; i < places.size(); ++i)
+        EXPECT_EQ(found[i], distance(places[i])) << "place " << i << " of " << size;
+    }
+  }
+}
+
+TEST(Sign, OfAShellIsBelowZeroInTheWallAlone) {
+  TriangleMesh sheet;
+  sheet.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const ExactDistance plain(sheet, kAutomatic);
+  EXPECT_THAT(plain.signChoice().reason, testing::HasSubstr("surround nothing"));
+  const ExactDistance shell(sheet, {.sign = Sign::shell, .thickness = 0.1});
+  EXPECT_EQ(value(shell, {0, 0, 0}), -0.05);
+  EXPECT_DOUBLE_EQ(value(shell, {0, 0, -0.5}), 0.45);
+  EXPECT_DOUBLE_EQ(shell.closestPoint({0, 0, 0.5}).signedDistance, 0.45);
+  EXPECT_EQ(shell.source().thickness, 0.1);
+  EXPECT_THROW(ExactDistance(sheet, {.sign = Sign::shell}), Error);
+  EXPECT_THROW(ExactDistance(sheet, {.thickness = 0.1}), Error);
+  EXPECT_THROW(ExactDistance(sheet, {.sign = Sign::shell, .thickness = HUGE_VAL}), Error);
+}
+
+TEST(Sign, IsTheSameAtAnyScale) {
+  const TriangleMesh mesh = openBox();
+  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 300);
+  const ExactDistance plain(mesh, kAutomatic);
+  for (const double scale : {1e-20, 1e-6, 1e6, 1e20}) {
+    const ExactDistance scaled(moved(mesh, Vector3::Zero(), scale), kAutomatic);
+    for (const Vector3& x : places) EXPECT_NEAR(scaled(scale * x) / scale, plain(x), 1e-9) << scale;
+  }
+}
+
+/// Real meshes, closed and broken, at fewer places than `hpsdf mesh --check-sign` takes.
+TEST(Sign, OfRealMeshesIsTheWindingNumbers) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  for (const char* name : {"cad/cube_12.obj", "cad/fandisk.obj", "cad/wingnut.obj", "cad/1002_tray_bottom.STL",
+                           "paper/finger_skeletonhand_part.ply", "broken/self_intersectA.obj", "broken/teapot.obj",
+                           "broken/suzanne.obj", "broken/mp_bed.obj", "broken/Generic_Twin_7081_left.obj"}) {
+    const TriangleMesh mesh = importMesh(support::testMesh(name)).mesh;
+    const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
+    const bool closed = byWinding.signChoice().openSides == 0;
+    for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
+      if (std::abs(distance(x)) < 1e-6 * boundingBox(mesh).sizes().maxCoeff()) continue;
+      const bool inside = windingNumber(mesh, x) > 0.5;
+      EXPECT_EQ(byWinding(x) < 0, inside) << name << " at " << x.transpose();
+      EXPECT_TRUE(!closed || (distance(x) < 0) == inside) << name << " at " << x.transpose();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hpsdf
