@@ -36,9 +36,9 @@ Rows legendreOfPart(double shift, double scale, int degree) {
 /// A polynomial over a box, which is -1 to 1 in its coordinates.
 struct Piece {
   std::array<double, 3> lower, upper;  ///< in the grid's cells
-  int degree;
-  std::vector<double> c;  ///< a cube of (degree + 1)³, z fastest; those of a greater total degree are 0
-  double rest = 0;        ///< what terms that were left out amount to, at most
+  int degree;                          ///< 1 or more: of constants too the linear terms are looked at
+  std::vector<double> c;               ///< a cube of (degree + 1)³, z fastest; those of a greater total degree are 0
+  double rest = 0;                     ///< what terms that were left out amount to, at most
 
   double width(int axis) const { return upper[axis] - lower[axis]; }
   double at(int i, int j, int k) const { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
@@ -113,12 +113,12 @@ class LowerBounds {
     const FieldData& data = field_.data();
     const GridFrame& frame = field_.directory().frame;
     const std::uint64_t bits = data.nodes[leaf.id];
-    const int degree = node::degree(bits);
+    const int stored = node::degree(bits), degree = std::max(stored, 1);
     Piece piece{{}, {}, degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
     std::visit(
         [&](const auto& coefficients) {
           std::size_t next = node::offset(bits);
-          Piece::forEachTerm(0, degree, [&](int i, int j, int k) { piece.at(i, j, k) = coefficients[next++]; });
+          Piece::forEachTerm(0, stored, [&](int i, int j, int k) { piece.at(i, j, k) = coefficients[next++]; });
         },
         data.coefficients);
     const double edge = std::ldexp(1.0, depth_ - leaf.depth);

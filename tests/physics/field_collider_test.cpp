@@ -101,6 +101,19 @@ TEST(FieldCollider, LosesFewCells) {
   EXPECT_LT(collider.bytes(), 4u << 20);
 }
 
+TEST(FieldCollider, TakesLeavesOfDegreeZero) {
+  FieldData data;
+  data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+  data.nodes = {node::leaf(0, 0)};
+  data.coefficients = std::vector<double>{0.01};
+  const Field field(std::move(data));
+  const FieldCollider collider(field);
+  for (const Vector3& x : {Vector3(0, 0, 0), Vector3(0.9, -0.9, 0.9)}) {
+    EXPECT_LE(collider.lowerBound(x), 0.01);
+    EXPECT_GT(collider.lowerBound(x), 0.008);  // rounded down, to a 32nd of a cell
+  }
+}
+
 TEST(FieldCollider, KnowsThatFarAwayIsOutside) {
   const DistanceFunction sphere = shapes::analytic("sphere,radius=0.7");
   const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-5});

@@ -249,6 +249,7 @@ SoftFieldAlgorithm::Candidates SoftFieldAlgorithm::candidates(const Meeting& mee
   Candidates found;
   for (int node = begin; node < end; ++node) {
     const Vector3 from = meeting.startOf(node), to = meeting.endOf(node);
+    if (!from.allFinite() || !to.allFinite()) continue;  // the world tells whose it is at the step's end
     Vector3& outside = outside_[std::size_t(node)];
     if ((to - outside).norm() > kPieces * meeting.near) outside = from;
     if (meeting.soft.m_nodes[node].m_battach != 0 || field.lowerBound(to) > meeting.margin + (to - outside).norm()) {

@@ -24,7 +24,7 @@ class FieldCollider {
 
   const Field& field() const { return *field_; }
 
-  /// 0 or more; the field at x is no less, or negative where this is 0.
+  /// 0 or more; the field at x is no less, or negative where this is 0. x may be infinite, not NaN; so below.
   double lowerBound(const Vector3& x) const;
 
   /// 0 or more; at any distance r of x at which this less r is above 0 the field is no less than that.
