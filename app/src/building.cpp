@@ -12,6 +12,7 @@
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
 #include "long_work.h"
+#include "mesh_process.h"
 #include "progress_line.h"
 #include "summaries.h"
 
@@ -55,13 +56,6 @@ Box domainOf(const Arguments& arguments, const Box& surface) {
   return domainAround(surface, DomainShape::cube, margin);
 }
 
-ImportedMesh importSurface(const std::string& surface) {
-  if (!surface.starts_with(kBuiltin)) return importMesh(surface);
-  TriangleMesh mesh = shapes::mesh(surface);
-  const MeshReport report = inspect(mesh);
-  return {std::move(mesh), report};
-}
-
 /// A field that misses part of its surface is seldom meant.
 void warnOfCutSurface(const Console& console, const Box& surface, const Box& domain) {
   if (!surface.isEmpty() && !domain.contains(surface))
@@ -100,7 +94,7 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
     if (toNormalize) prepared.analytic = normalizedFunction(*prepared.analytic);
     return prepared;
   }
-  ImportedMesh imported = importSurface(surface);
+  ImportedMesh imported = importSurface(console, surface);
   if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
     console.err << "hpsdf: warning: " << warning << std::endl;
   prepared.report = imported.report;
@@ -535,11 +529,19 @@ void refuseForeign(const CurrentField& current, const ReferenceSurface& referenc
                           source.empty() ? "something unknown" : source, surface, otherwise));
 }
 
-MeshReport inspectSurface(const std::string& surface) {
+ImportedMesh importSurface(const Console& console, const std::string& surface) {
   if (surface.starts_with(kAnalytic))
     throw Error(
         fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
-  return importSurface(surface).report;
+  if (surface.starts_with(kBuiltin)) {
+    TriangleMesh mesh = shapes::mesh(surface);
+    const MeshReport report = inspect(mesh);
+    return {std::move(mesh), report};
+  }
+  if (console.meshReader.empty()) return importMesh(surface);
+  return withProgress(console, [&](const Progress& progress) {
+    return importApart(console.meshReader, surface, readingLimits(surface), progress);
+  });
 }
 
 }  // namespace hpsdf::app

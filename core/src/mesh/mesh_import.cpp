@@ -85,6 +85,18 @@ double promisedElements(const fs::path& file) {
   return most;
 }
 
+/// assimp looks for the end of a PLY file's header until it finds one, which may be never.
+void requireHeaderEnds(const fs::path& file) {
+  constexpr std::size_t kLongestHeader = 1 << 20;
+  if (extensionOf(file) != "ply") return;
+  std::string beginning(kLongestHeader, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(stream.gcount()));
+  if (beginning.find("end_header") == std::string::npos)
+    throw Error(file.string() + ": its header does not end; check or export the file again");
+}
+
 /// assimp takes memory for what a header promises before it reads on: a few wrong bytes could ask for all there is.
 void requirePromisesKept(const fs::path& file) {
   std::error_code error;
@@ -192,6 +204,7 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
 
 ImportedMesh importMesh(const fs::path& file) {
   requireReadable(file);
+  requireHeaderEnds(file);
   requirePromisesKept(file);
   TriangleMesh mesh;
   {
