@@ -166,7 +166,7 @@ std::string endText(int status) {
   if (WIFEXITED(status)) return fmt::format("exit status {}", WEXITSTATUS(status));
   switch (WTERMSIG(status)) {
     case SIGABRT:
-      return "aborted by a check of assimp's";
+      return "aborted by a check of its own";
     case SIGSEGV:
     case SIGBUS:
       return "wrong access to memory";

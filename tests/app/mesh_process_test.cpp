@@ -269,7 +269,8 @@ TEST_F(MeshProcess, refusesInTheSameWords) {
 }
 
 TEST_F(MeshProcess, outlivesWhatBringsAssimpDown) {
-  EXPECT_THAT(errorOf(write("t.off", "OFF\n")), HasSubstr("aborted"));
+  // its reader of JSON calls itself at each bracket, until its stack is used up
+  EXPECT_THAT(errorOf(write("t.gltf", std::string(200'000, '['))), HasSubstr("came down (wrong access to memory)"));
 }
 
 TEST_F(MeshProcess, endsInTime) {
@@ -336,6 +337,7 @@ TEST_F(MeshProcess, believesNoAnswer) {
   EXPECT_THAT(answer("exit 7"), HasSubstr("came down (exit status 7)"));
   EXPECT_THAT(answer("echo hello"), HasSubstr("came down (exit status 0)"));
   EXPECT_THAT(answer("kill -KILL $$"), HasSubstr("came down (killed"));
+  EXPECT_THAT(answer("kill -ABRT $$"), HasSubstr("came down (aborted by a check of its own)"));
   EXPECT_THAT(answer("kill -SEGV $$"), HasSubstr("came down (wrong access to memory)"));
   EXPECT_THAT(answer("cat /dev/zero"), HasSubstr("wrong answer (it does not begin like one)"));
   EXPECT_THAT(answer("exec sleep 100", 0.2), HasSubstr("takes more than 0.2 s"));
@@ -503,7 +505,6 @@ TEST_F(MeshProcess, mutatedFilesAreMeshesOrErrorsOfOneLine) {
   std::printf("slowest: %.3f s\n", slowest);
   EXPECT_GT(outcomes["mesh"], count / 20);
   EXPECT_GT(outcomes["refused"], count / 20);
-  EXPECT_GT(outcomes["came down (aborted by a check of assimp's)"], 0u) << "the way back from there was not tried";
 }
 
 }  // namespace
