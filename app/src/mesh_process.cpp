@@ -191,7 +191,7 @@ class Reading {
 
   MeshReply reply() {
     receive();
-    if (bytes_.empty() || bytes_.size() < expected_) throw died();
+    if (expected_ == 0 || bytes_.size() < expected_) throw died();
     return parseReply(bytes_);
   }
 
