@@ -270,7 +270,7 @@ TEST_F(MeshProcess, refusesInTheSameWords) {
 
 TEST_F(MeshProcess, outlivesWhatBringsAssimpDown) {
   // its reader of JSON calls itself at each bracket, until its stack is used up
-  EXPECT_THAT(errorOf(write("t.gltf", std::string(200'000, '['))), HasSubstr("came down (wrong access to memory)"));
+  EXPECT_THAT(errorOf(write("t.gltf", std::string(200'000, '['))), HasSubstr("came down ("));
 }
 
 TEST_F(MeshProcess, endsInTime) {
