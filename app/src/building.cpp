@@ -12,6 +12,7 @@
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
 #include "long_work.h"
+#include "mesh_process.h"
 #include "progress_line.h"
 #include "summaries.h"
 
@@ -53,13 +54,6 @@ Box domainOf(const Arguments& arguments, const Box& surface) {
   // exactly the paper's cube, not one that follows the rounding of the mesh's normalization
   if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
   return domainAround(surface, DomainShape::cube, margin);
-}
-
-ImportedMesh importSurface(const std::string& surface) {
-  if (!surface.starts_with(kBuiltin)) return importMesh(surface);
-  TriangleMesh mesh = shapes::mesh(surface);
-  const MeshReport report = inspect(mesh);
-  return {std::move(mesh), report};
 }
 
 /// A field that misses part of its surface is seldom meant.
@@ -106,7 +100,7 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
     if (toNormalize) prepared.analytic = normalizedFunction(*prepared.analytic);
     return prepared;
   }
-  ImportedMesh imported = importSurface(surface);
+  ImportedMesh imported = importSurface(console, surface);
   if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
     console.err << "hpsdf: warning: " << warning << std::endl;
   prepared.report = imported.report;
@@ -587,11 +581,19 @@ void refuseForeign(const CurrentField& current, const ReferenceSurface& referenc
                           source.empty() ? "something unknown" : source, surface, otherwise));
 }
 
-MeshReport inspectSurface(const std::string& surface) {
+ImportedMesh importSurface(const Console& console, const std::string& surface) {
   if (surface.starts_with(kAnalytic))
     throw Error(
         fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
-  return importSurface(surface).report;
+  if (surface.starts_with(kBuiltin)) {
+    TriangleMesh mesh = shapes::mesh(surface);
+    const MeshReport report = inspect(mesh);
+    return {std::move(mesh), report};
+  }
+  if (console.meshReader.empty()) return importMesh(surface);
+  return withProgress(console, [&](const Progress& progress) {
+    return importApart(console.meshReader, surface, readingLimits(surface), progress);
+  });
 }
 
 }  // namespace hpsdf::app

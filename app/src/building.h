@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
-#include "hpsdf/mesh_report.h"
+#include "hpsdf/mesh_import.h"
 #include "session.h"
 
 namespace hpsdf::app {
@@ -88,7 +88,8 @@ std::string surfaceFor(const Session& session, const Arguments& arguments);
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise = "");
 
-/// The report of a mesh file or a built-in shape; throws `Error` for an analytic one.
-MeshReport inspectSurface(const std::string& surface);
+/// A mesh file or a built-in shape: the one road by which commands come to meshes. Files are read by the console's
+/// `meshReader`. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
+ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 }  // namespace hpsdf::app

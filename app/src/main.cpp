@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "interrupt.h"
+#include "mesh_process.h"
 #include "program.h"
 
 namespace {
@@ -28,9 +29,11 @@ int main(int argc, char** argv) {
   // a reader that went away, or a file longer than allowed, is reported like any other failed write
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGCHLD, SIG_DFL);  // ignored, as some callers leave it, nobody could be waited for
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   const std::vector<std::string> words(argv + (argc > 0), argv + argc);
+  if (hpsdf::app::asksForReading(words)) return hpsdf::app::readForOtherProcess(words);
   const bool terminal = isatty(STDERR_FILENO) == 1;
-  return hpsdf::app::runProgram(words, {std::cin, std::cout, std::cerr, terminal});
+  return hpsdf::app::runProgram(words, {std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()});
 }

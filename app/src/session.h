@@ -37,6 +37,8 @@ struct Console {
   std::ostream& err;             ///< progress, notes and warnings
   bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
   WorkListener* listener = nullptr;
+  std::filesystem::path meshReader =
+      {};  ///< program that mesh files are read by (mesh_process.h); empty: by this process
 };
 
 /// The field that commands work on.

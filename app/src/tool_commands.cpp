@@ -64,7 +64,7 @@ void runInclude(Session& session, const Arguments& arguments) {
 
 void runMesh(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
-  const MeshReport report = inspectSurface(surface);
+  const MeshReport report = importSurface(session.console(), surface).report;
   if (session.wantsJson(arguments)) return printJson(session.console().out, meshJson(surface, report));
   session.console().out << meshText(surface, report);
   if (!report.closed())
@@ -111,6 +111,7 @@ void runDoctor(Session& session, const Arguments& arguments) {
   }
   const auto simd = simdOfCpu();
   const unsigned threads = std::thread::hardware_concurrency();
+  const bool readsApart = !session.console().meshReader.empty();
   if (session.wantsJson(arguments)) {
     Json instructions = Json::object();
     for (const auto& [name, there] : simd) instructions[name] = there;
@@ -122,6 +123,7 @@ void runDoctor(Session& session, const Arguments& arguments) {
                                              {"simd", instructions},
                                              {"simd_used", instructionSet()},
                                              {"threads", threads},
+                                             {"mesh_reader", readsApart ? "own process" : "this process"},
                                              {"assimp", assimpVersion()}});
   }
   std::vector<std::string> present;
@@ -138,6 +140,8 @@ void runDoctor(Session& session, const Arguments& arguments) {
       fmt::format("{}; exact distances use {}",
                   present.empty() ? "the baseline" : fmt::format("{}", fmt::join(present, ", ")), instructionSet()));
   row("threads", std::to_string(threads));
+  row("meshes", readsApart ? "each file is read by a process of its own, with limits of time and memory"
+                           : "files are read by this process, without limits: it cannot be started again");
   row("assimp", assimpVersion());
 }
 
@@ -199,7 +203,7 @@ Command doctorCommand() {
           .summary = "Tell what this program runs on: renderer, SIMD, threads.",
           .help =
               "The OpenGL device that pictures would be drawn with, or why there is none; instruction sets of the "
-              "processor; threads; versions.",
+              "processor; threads; whether mesh files are read by a process of their own; versions.",
           .examples = {"hpsdf doctor", "hpsdf doctor --gl software"},
           .parameters = std::move(parameters),
           .action = runDoctor};

@@ -12,12 +12,14 @@
 #include <bit>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 #include <sstream>
 #include <string>
@@ -223,6 +225,22 @@ std::set<std::string> namesIn(const fs::path& folder) {
 constexpr std::string_view kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
     "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
+/// assimp's reader of JSON calls itself at each bracket, until its stack is used up.
+const std::string kBringsAssimpDown(200'000, '[');
+
+/// Cutting this face into triangles takes the square of its corners: tens of seconds.
+std::string slowPolygon() {
+  constexpr int kCorners = 100'000;
+  std::ostringstream file;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCorners;
+    file << "v " << std::cos(angle) << " " << std::sin(angle) << " 0\n";
+  }
+  file << "f";
+  for (int i = 1; i <= kCorners; ++i) file << " " << i;
+  return file.str() + "\n";
+}
 
 /// A folder of its own for each test, and in it a small field, built once by the program itself.
 class Cli : public testing::Test {
@@ -1364,6 +1382,33 @@ TEST_F(Cli, badMeshesAreRefused) {
   expectRefused({{"mesh", "analytic:sphere"}}, "analytic", before);
 }
 
+TEST_F(Cli, whatBringsTheImporterDownIsRefused) {
+  writeFile(at("down.gltf"), kBringsAssimpDown);
+  writeFile(at("slow.obj"), slowPolygon());
+  writeFile(at("t.obj"), kTetrahedron);
+  const auto before = namesIn(folder_.path());
+  for (const Call& call : {Call{{"mesh", at("down.gltf")}}, Call{{"build", at("down.gltf"), "-o", at("f.hpsdf")}},
+                           Call{{"verify", field(), at("down.gltf")}}})
+    expectRefused(call, "down.gltf: the process that read it came down (", before);
+  const auto mesh = [&](const char* name, const std::string& variable, const std::string& value) {
+    return Call{.words = {"mesh", at(name)}, .environment = {{variable, value}}};
+  };
+  const Outcome slow = run(mesh("slow.obj", "HPSDF_IMPORT_SECONDS", "0.5"));
+  EXPECT_EQ(slow.status, 2);
+  EXPECT_THAT(slow.err, HasSubstr("slow.obj: reading it takes more than 0.5 s"));
+  expectRefused(mesh("t.obj", "HPSDF_IMPORT_SECONDS", "soon"), "HPSDF_IMPORT_SECONDS: expected a number above 0",
+                before);
+  expectRefused(mesh("t.obj", "HPSDF_IMPORT_BYTES", "-1"), "HPSDF_IMPORT_BYTES: expected a number above 0", before);
+  EXPECT_EQ(run(mesh("t.obj", "HPSDF_IMPORT_BYTES", "1e9")).status, 0);
+}
+
+TEST_F(Cli, theImporterIsNoCommand) {
+  EXPECT_EQ(Json::parse(run({{"doctor", "--json"}}).out).at("mesh_reader"), "own process");
+  EXPECT_EQ(Json::parse(runHere({"doctor", "--json"}).out).at("mesh_reader"), "this process");
+  EXPECT_THAT(run({{"docs"}}).out, Not(HasSubstr("__read-mesh")));
+  expectRefused({{"__read-mesh", at("t.obj")}}, "unknown command '__read-mesh'");
+}
+
 TEST_F(Cli, badOptionsAreRefused) {
   const auto build = [&](std::vector<std::string> more) {
     std::vector<std::string> words = {"build", "builtin:torus", "-o", at("f.hpsdf")};
@@ -1467,6 +1512,31 @@ TEST_F(Cli, interruptStopsTheConstruction) {
     EXPECT_THAT(outcome.out, IsEmpty());
     EXPECT_LT(seconds, 5) << "the promise is one second; this machine may be busy";
     EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+  }
+}
+
+/// However the program ends while a mesh file is read, the process that reads it ends as well.
+TEST_F(Cli, theImporterEndsWithTheProgram) {
+  writeFile(at("slow.obj"), slowPolygon());
+  const auto readers = [&] {
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator("/proc")) {
+      std::ifstream words(entry.path() / "cmdline");
+      const std::string text{std::istreambuf_iterator<char>(words), {}};
+      count += text.find("__read-mesh") != std::string::npos && text.find(at("slow.obj")) != std::string::npos;
+    }
+    return count;
+  };
+  for (const auto& [signal, status] : {std::pair{SIGINT, 130}, {SIGKILL, -SIGKILL}}) {
+    Process process({{"mesh", at("slow.obj")}});
+    process.waitForErrorLine();  // of its progress
+    EXPECT_EQ(readers(), 1u);
+    process.send(signal);
+    const Outcome outcome = process.finish();
+    EXPECT_EQ(outcome.status, status);
+    EXPECT_THAT(outcome.err, EndsWith(signal == SIGINT ? "hpsdf: cancelled; nothing was written\n" : ""));
+    for (int i = 0; i < 500 && readers() > 0; ++i) usleep(10000);
+    EXPECT_EQ(readers(), 0u);
   }
 }
 

@@ -355,6 +355,11 @@ TEST_F(MeshImport, TruncatedFiles) {
   EXPECT_THAT(errorOf("huge.off", "OFF # by hand\n# counts\n4000000000 1 0\n0 0 0\n"),
               HasSubstr("/huge.off: its header promises more"));
   EXPECT_THAT(errorOf("huge.off", "COFF 1 4000000000 0\n0 0 0\n"), HasSubstr("/huge.off: its header promises more"));
+  const std::string header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n";
+  for (const char* end : {"", "end_", "#end_header\n", "end_headers\n"})
+    EXPECT_THAT(errorOf("cut.ply", header + end), HasSubstr("/cut.ply: its header does not end")) << end;
+  for (const char* end : {"end_header", "end_header\r\n", " end_header \n", "comment end_header\r\nend_header\n"})
+    EXPECT_THAT(errorOf("none.ply", header + end), Not(HasSubstr("its header does not end"))) << end;
   EXPECT_THAT(errorOf("few.off", "OFF\n4 4 0\n0 0 0\n"), HasSubstr("/few.off: "));
   EXPECT_THAT(errorOf("alone.gltf", gltfScene(R"({"mesh":0})", "0", "missing.bin")), HasSubstr("/alone.gltf: "));
 }

@@ -13,7 +13,6 @@
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
-#include "hpsdf/mesh_import.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/shapes.h"
@@ -90,7 +89,7 @@ std::size_t Scene::moving() const {
 }
 
 TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size) {
-  TriangleMesh mesh = loadMesh(name);
+  TriangleMesh mesh = importSurface(console, name).mesh;
   try {
     physics::massProperties(mesh);
   } catch (const Error& error) {

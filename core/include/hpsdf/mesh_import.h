@@ -13,10 +13,14 @@ struct ImportedMesh {
   MeshReport report;
 };
 
+/// Beyond this, squares and volumes leave the range of double.
+constexpr double kLargestCoordinate = 1e100;
+
 /// Welds equal positions, drops degenerate and duplicate faces and unused vertices (a face on one line that keeps its
 /// neighbours connected is mended by an edge flip instead: dropping it would open the mesh), and turns the *whole* mesh
 /// when its signed volume is negative (never part by part: a cavity's faces look inward on purpose). Throws `Error` for
-/// indices out of range, non-finite coordinates, or when no face with an area is left.
+/// indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or when no face with an area
+/// is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
 /// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,
@@ -25,6 +29,11 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6),
 /// and indices out of range in OFF and PLY files are mended (in glTF files, their faces left out) silently, so that
 /// they cannot be reported.
+///
+/// It reads within the caller's process, without a limit of time or memory, and what brings assimp down brings that
+/// process down: a deeply nested glTF file its stack, others its asserts, which are on in Debian. Some files keep it,
+/// or the cutting of a face with very many corners, busy for minutes. For files from strangers do as the program
+/// `hpsdf` does, and read in a process of its own.
 ///
 /// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, non-finite, or without area.
 ImportedMesh importMesh(const std::filesystem::path& file);

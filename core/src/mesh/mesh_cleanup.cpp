@@ -21,9 +21,6 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Beyond this, squares and volumes leave the range of double.
-constexpr double kLargestCoordinate = 1e100;
-
 template <typename T>
 struct HashBytes {
   std::size_t operator()(const std::array<T, 3>& key) const { return XXH3_64bits(key.data(), sizeof key); }

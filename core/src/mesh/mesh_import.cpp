@@ -85,6 +85,30 @@ double promisedElements(const fs::path& file) {
   return most;
 }
 
+/// Whether a line of the text, whatever ends its lines, says no more than that.
+bool hasLine(std::string_view text, std::string_view line) {
+  constexpr std::string_view kBlank = " \t", kLineEnd = "\r\n";
+  for (std::size_t at = 0; (at = text.find(line, at)) != std::string_view::npos; at += line.size()) {
+    const std::size_t before = text.substr(0, at).find_last_not_of(kBlank);
+    const std::size_t after = text.find_first_not_of(kBlank, at + line.size());
+    const auto ends = [&](std::size_t i) { return i == text.npos || kLineEnd.find(text[i]) != kLineEnd.npos; };
+    if (ends(before) && ends(after)) return true;
+  }
+  return false;
+}
+
+/// assimp looks for the end of a PLY file's header until it finds one, which may be never.
+void requireHeaderEnds(const fs::path& file) {
+  constexpr std::size_t kLongestHeader = 1 << 20;
+  if (extensionOf(file) != "ply") return;
+  std::string beginning(kLongestHeader, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(stream.gcount()));
+  if (!hasLine(beginning, "end_header"))
+    throw Error(file.string() + ": its header does not end; check or export the file again");
+}
+
 /// assimp takes memory for what a header promises before it reads on: a few wrong bytes could ask for all there is.
 void requirePromisesKept(const fs::path& file) {
   std::error_code error;
@@ -192,6 +216,7 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
 
 ImportedMesh importMesh(const fs::path& file) {
   requireReadable(file);
+  requireHeaderEnds(file);
   requirePromisesKept(file);
   TriangleMesh mesh;
   {
