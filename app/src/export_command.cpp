@@ -60,7 +60,7 @@ Json differenceJson(const GridDifference& difference) {
 
 Json exportJson(const Exported& made, const std::string& file) {
   return {{"output", file},
-          {"file_bytes", fileSize(file)},
+          {"file_bytes", std::filesystem::file_size(file)},
           {"resolution", made.grid.resolution},
           {"nodes", made.grid.nodes.size()},
           {"cell_size", vectorJson(made.grid.cellSize())},
@@ -78,8 +78,9 @@ std::string differenceText(const GridDifference& difference, const std::string& 
 
 std::string exportText(const Exported& made, const std::string& file) {
   const auto& [x, y, z] = made.grid.resolution;
-  std::string text = fmt::format("{}: {} x {} x {} cubic cells, {} nodes, {}\n", file, x, y, z,
-                                 grouped(made.grid.nodes.size()), bytesText(static_cast<double>(fileSize(file))));
+  std::string text =
+      fmt::format("{}: {} x {} x {} cubic cells, {} nodes, {}\n", file, x, y, z, grouped(made.grid.nodes.size()),
+                  bytesText(static_cast<double>(std::filesystem::file_size(file))));
   text += summaryRow("beside the field", differenceText(made.error.everywhere, "in the domain"));
   text += summaryRow("near the surface",
                      differenceText(made.error.nearSurface, fmt::format("within {}", shortNumber(made.error.near))));

@@ -20,7 +20,7 @@ namespace {
 
 void saveCurrent(Session& session, const std::string& file) {
   save(session.current().field, file);
-  session.setFileBytes(fileSize(file));
+  session.setFileBytes(std::filesystem::file_size(file));
 }
 
 /// Where a command keeps the field that it makes; in a script the current field may be all that is wanted.
@@ -315,7 +315,7 @@ Parameter fieldParameter() {
 
 void loadField(Session& session, const std::string& file) {
   Field field = load(file);
-  session.setField({std::move(field), file, fileSize(file)});
+  session.setField({std::move(field), file, std::filesystem::file_size(file)});
 }
 
 void useField(Session& session, const Arguments& arguments) {

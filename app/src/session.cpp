@@ -18,13 +18,6 @@ std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend
 
 }  // namespace
 
-std::uintmax_t fileSize(const std::filesystem::path& file) {
-  std::error_code gone;
-  const std::uintmax_t bytes = std::filesystem::file_size(file, gone);
-  if (gone) throw Error(file.string() + ": was removed while it was in use; keep it there");
-  return bytes;
-}
-
 Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
 Session::~Session() = default;
 

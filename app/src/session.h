@@ -39,9 +39,6 @@ struct Console {
   WorkListener* listener = nullptr;
 };
 
-/// Of a file that was read or written just now; throws `Error` where it has been removed since.
-std::uintmax_t fileSize(const std::filesystem::path& file);
-
 /// The field that commands work on.
 struct CurrentField {
   Field field;
