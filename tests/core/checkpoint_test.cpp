@@ -93,7 +93,7 @@ std::vector<BuildOptions> everyWay() {
 TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
   support::TemporaryDirectory folder;
   std::mt19937_64 random(7);
-  constexpr int kInterruptions = 6, kAttempts = 300;
+  constexpr int kResumed = 4, kAttempts = 300;
   int way = 0;
   for (BuildOptions options : everyWay()) {
     SCOPED_TRACE("way " + std::to_string(way++));
@@ -101,10 +101,10 @@ TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
     std::atomic<int> left = kMany;
     const std::string whole = bytesOf(build(spheres, cube(), options, endingAfter(left)), folder.path());
     const int all = kMany - left;
-    int interruptions = 0, resumed = 0, ends = 0;
+    int resumed = 0, ends = 0;
     Checkpoint checkpoint = alwaysAt(folder / "state");
     checkpoint.resumed = [&](std::uint64_t) { ++resumed; };
-    for (int n = 0; n < kAttempts && (interruptions < kInterruptions || ends == 0); ++n) {
+    for (int n = 0; n < kAttempts && (resumed < kResumed || ends == 0); ++n) {
       options.threads = 1 + static_cast<int>(random() % 3);
       left = static_cast<int>(random() % std::uint64_t(all));
       try {
@@ -113,12 +113,10 @@ TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
         fs::remove(checkpoint.file);
         ++ends;
       } catch (const Cancelled&) {
-        ++interruptions;
       }
     }
     EXPECT_GE(ends, 1);
-    EXPECT_GE(interruptions, kInterruptions);
-    EXPECT_GE(resumed, 2);
+    EXPECT_GE(resumed, kResumed);
     fs::remove(checkpoint.file);
   }
 }
@@ -240,12 +238,12 @@ TEST_F(Refused, AreFilesThatAreNoStates) {
 
 TEST_F(Refused, AreTruncatedAndAlteredStates) {
   std::size_t count = 0;
-  for (std::size_t length = 0; length < state_.size(); length += length < 200 ? 1 : state_.size() / 500, ++count)
+  for (std::size_t length = 0; length < state_.size(); length += length < 200 ? 1 : state_.size() / 200, ++count)
     ASSERT_NE(refusalOf(state_.substr(0, length)), "") << length << " of " << state_.size() << " bytes";
-  EXPECT_GT(count, 500u);
+  EXPECT_GT(count, 300u);
   EXPECT_TRUE(holds(refusalOf(state_ + "x"), "too long"));
   std::mt19937_64 random(2);
-  for (int n = 0; n < 600; ++n) {
+  for (int n = 0; n < 400; ++n) {
     std::string bytes = state_;
     const std::size_t position = n < 200 ? std::size_t(n) : random() % state_.size();
     bytes[position] = char(bytes[position] ^ (1 << (random() % 8)));
@@ -258,7 +256,7 @@ TEST_F(Refused, AreTruncatedAndAlteredStates) {
 TEST_F(Refused, ForgedStatesDoNoHarm) {
   std::mt19937_64 random(3);
   int refused = 0;
-  constexpr int kForged = 400;
+  constexpr int kForged = 200;
   for (int n = 0; n < kForged; ++n) {
     std::string bytes = state_;
     const std::size_t from = n < kForged / 2 ? 80 : bytes.size() - 300;  // numbers and first cells; lists of cells
