@@ -1,12 +1,15 @@
 #include "building.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "hpsdf/checkpoint.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
@@ -159,6 +162,34 @@ Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
 
 bool isMadeFrom(const Source& given, const Source& source) {
   return given.fingerprint == source.fingerprint && (source.fingerprint != 0 || given.name == source.name);
+}
+
+/// Everything that decides what a construction comes to, whatever an argument is for.
+std::string decidingArguments(const Arguments& arguments) {
+  std::string text;
+  for (const Parameter& parameter : buildParameters()) {
+    if (parameter.name == "threads" || !arguments.has(parameter.name)) continue;
+    const std::vector<double> numbers = arguments.numbers(parameter.name);
+    text += fmt::format("{}={}\n", parameter.name,
+                        numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));
+  }
+  return text;
+}
+
+Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
+  Checkpoint checkpoint{.file = file, .seconds = arguments.number("checkpoint-seconds")};
+  checkpoint.about = decidingArguments(arguments);
+  checkpoint.resumed = [&console, file](std::uint64_t steps) {
+    console.err << fmt::format("hpsdf: note: going on from {}, after {} steps", file.string(), grouped(steps))
+                << std::endl;
+  };
+  checkpoint.failed = [&console, warned = false](const Error& error) mutable {
+    if (std::exchange(warned, true)) return;
+    console.err << fmt::format("{}hpsdf: warning: {}; the construction goes on without",
+                               console.redrawsProgress ? kEraseLine : "", error.what())
+                << std::endl;
+  };
+  return checkpoint;
 }
 
 std::string nameOf(const Source& source) { return source.name.empty() ? "unknown" : source.name; }
@@ -415,6 +446,27 @@ Parameter blendWidthParameter(std::string name) {
           .minimumExcluded = true};
 }
 
+std::vector<Parameter> checkpointParameters() {
+  return {
+      {.name = "checkpoint",
+       .type = ParameterType::flag,
+       .help =
+           "Keep the state of the construction from time to time, as OUTPUT.checkpoint. Where that is there already, "
+           "because the program was killed, go on from it: the field is the same, to the byte, as in one go. Another "
+           "mesh's, one of other options but threads, and a damaged one are refused; once the field is written it is "
+           "removed.",
+       .defaultText = "false"},
+      {.name = "checkpoint-seconds",
+       .type = ParameterType::number,
+       .help = "Of checkpoint: at least so long between two. It is longer where writing takes long: at most 2 % of the "
+               "time go into it.",
+       .defaultText = "5",
+       .unit = "seconds",
+       .minimum = 0,
+       .maximum = 1e9},
+  };
+}
+
 BuildOptions buildOptions(const Arguments& arguments) {
   const bool paper = arguments.flag("paper");
   BuildOptions options = paper ? paperOptions() : BuildOptions{};
@@ -490,16 +542,21 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
   }
 }
 
-BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments) {
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& checkpoint) {
   BuildInput input = buildInput(console, surface, arguments);
   try {
     const auto start = std::chrono::steady_clock::now();
-    Field field = withProgress(
-        console, [&](const Progress& progress) { return build(*input.exact, input.domain, input.options, progress); });
+    Field field = withProgress(console, [&](const Progress& progress) {
+      if (checkpoint.empty()) return build(*input.exact, input.domain, input.options, progress);
+      return buildResumably(*input.exact, input.domain, input.options, checkpointAt(console, checkpoint, arguments),
+                            progress);
+    });
     warnOfErrorLeft(console, field.metadata());
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   } catch (const Error& error) {
+    if (!checkpoint.empty() && std::string_view(error.what()).starts_with(checkpoint.string())) throw;
     rethrowNaming(surface, error);
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 // From a mesh file or a shape's name to a field, as `build` and `report` do it.
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -16,6 +17,9 @@ namespace hpsdf::app {
 
 /// The parameters of a construction, shared by `build`, `report` and others.
 std::vector<Parameter> buildParameters();
+
+/// Whether and how often the state of a construction is kept.
+std::vector<Parameter> checkpointParameters();
 
 /// How many threads; `result`, such as "The field is", does not depend on them.
 Parameter threadsParameter(const std::string& result);
@@ -52,8 +56,10 @@ struct BuiltField {
   double seconds = 0;                             ///< of the construction, with the hierarchy over the triangles
 };
 
-/// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`.
-BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments);
+/// Throws `Error` naming `surface`, `Cancelled` after Ctrl-C. Progress and warnings go to the console's `err`. With a
+/// file for the construction's state (`checkpointParameters` among the arguments) it goes on from what is there.
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& checkpoint = {});
 
 /// That bounds do not hold beside a mesh's holes, where it has some.
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh);

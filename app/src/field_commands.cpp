@@ -54,15 +54,50 @@ void changeCurrent(Session& session, const Arguments& arguments, Field field) {
   saveMade(session, arguments);
 }
 
+/// Where the construction keeps its state; empty: nowhere.
+std::filesystem::path checkpointFile(const Arguments& arguments) {
+  if (!arguments.flag("checkpoint")) return {};
+  return arguments.text("output") + ".checkpoint";
+}
+
+void checkBuildArguments(const Arguments& arguments) {
+  const bool keeps = arguments.flag("checkpoint");
+  if (keeps && !arguments.has("output")) throw Error("checkpoint: it is kept beside the output; give output");
+  if (arguments.given("checkpoint-seconds") && !keeps)
+    throw Error("checkpoint-seconds belongs to checkpoint: give that too, or leave it out");
+}
+
+BuiltField buildAndKeep(const Console& console, const std::string& surface, const Arguments& arguments,
+                        const std::filesystem::path& checkpoint) {
+  try {
+    return buildField(console, surface, arguments, checkpoint);
+  } catch (const Cancelled&) {
+    if (!checkpoint.empty() && std::filesystem::exists(checkpoint))
+      console.err << fmt::format("hpsdf: note: {} keeps what was done: the same command goes on from it",
+                                 checkpoint.string())
+                  << std::endl;
+    throw;
+  }
+}
+
+/// The state of the construction is no longer needed, nor what a process left that was killed while it wrote the field.
+void tidyUp(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
+  std::error_code ignored;
+  std::filesystem::remove(checkpoint, ignored);
+  OutputFile::removeAbandoned(output);
+}
+
 void runBuild(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const std::string surface = arguments.text("mesh");
+  const std::filesystem::path checkpoint = checkpointFile(arguments);
   checkFieldOutput(arguments);
   const InterruptGuard guard;  // until the file is whole
-  BuiltField built = buildField(console, surface, arguments);
+  BuiltField built = buildAndKeep(console, surface, arguments, checkpoint);
   session.setField({std::move(built.field), arguments.textOr("output", surface), {}, surface});
   session.setExact(std::move(built.exact));
   saveMade(session, arguments);
+  if (!checkpoint.empty()) tidyUp(checkpoint, arguments.text("output"));
   if (session.wantsJson(arguments)) {
     Json json = madeJson(session, arguments);
     json["build_seconds"] = built.seconds;
@@ -247,10 +282,12 @@ Command buildCommand() {
           "or in millimetres. A hundredth of τ is about a tenth of the RMS error.\n"
           "\n"
           "Inside and outside are defined for closed meshes; a warning says when yours is not. Ctrl-C stops and writes "
-          "nothing. In a script, the field becomes the current one, and the output may be left out.",
+          "no field; with --checkpoint the same command goes on later from where it was. In a script, the field "
+          "becomes the current one, and the output may be left out.",
       .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
                    "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
-                   "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8"},
+                   "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
+                   "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint"},
       .parameters = {{.name = "mesh",
                       .type = ParameterType::text,
                       .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
@@ -258,8 +295,10 @@ Command buildCommand() {
                       .positional = true,
                       .need = Need::always},
                      fieldOutputParameter()},
-      .action = runBuild};
-  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
+      .action = runBuild,
+      .check = checkBuildArguments};
+  for (auto& parameters : {checkpointParameters(), buildParameters()})
+    for (const Parameter& parameter : parameters) command.parameters.push_back(parameter);
   return command;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <new>
 #include <ostream>
 
@@ -66,6 +67,11 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     return fail(console, failed.what(), kExitFailed);
   } catch (const Error& error) {
     return fail(console, error.what(), kExitBadInput);
+  } catch (const std::filesystem::filesystem_error& error) {  // such as a file that was removed while it was in use
+    return fail(console,
+                fmt::format("{}: {}; check that it is there, and its permissions", error.path1().string(),
+                            error.code().message()),
+                kExitBadInput);
   } catch (const std::bad_alloc&) {
     return fail(console, "not enough memory; a larger target error or a smaller grid needs less", kExitBadInput);
   } catch (const std::exception& error) {

@@ -14,7 +14,6 @@ constexpr double kRedrawSeconds = 0.1;
 constexpr double kQuietSeconds = 10;
 constexpr double kQuickSeconds = 0.3;  // work that ends sooner needs no words
 constexpr int kBarCells = 24;
-constexpr std::string_view kEraseLine = "\r\x1b[K";
 
 }  // namespace
 

@@ -7,6 +7,9 @@
 
 namespace hpsdf::app {
 
+/// Makes room for a message on a terminal that shows progress.
+constexpr std::string_view kEraseLine = "\r\x1b[K";
+
 /// Shows the progress of an operation, once it has taken a moment: on a terminal one line that is drawn again and again
 /// and erased at the end, elsewhere a line then, at every further quarter, and after ten quiet seconds.
 class ProgressLine {

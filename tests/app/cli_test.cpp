@@ -5,10 +5,12 @@
 #include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cerrno>
 #include <chrono>
@@ -17,12 +19,15 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "hpsdf/cubic_grid.h"
@@ -59,6 +64,7 @@ struct Call {
   std::string input = {};
   std::map<std::string, std::string> environment = {};
   fs::path folder = {};        ///< to run in; the caller's when empty
+  fs::path output = {};        ///< a file that takes standard output, instead of the test
   bool stdoutClosed = false;   ///< the reader of standard output has gone away
   bool keepInputOpen = false;  ///< standard input is not at its end: see `Process::type`
 };
@@ -79,6 +85,8 @@ class Process {
     posix_spawn_file_actions_adddup2(&actions, in[0], STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, out[1], STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, err[1], STDERR_FILENO);
+    if (!call.output.empty())
+      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, call.output.c_str(), O_WRONLY, 0);
     if (!call.folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, call.folder.c_str());
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
@@ -143,6 +151,22 @@ class Process {
   }
 
   void send(int signal) { kill(id_, signal); }
+
+  bool hasEnded() const {
+    siginfo_t info{};
+    waitid(P_PID, static_cast<id_t>(id_), &info, WEXITED | WNOHANG | WNOWAIT);
+    return info.si_pid != 0;
+  }
+
+  /// Sends the signal as soon as `now` is true; whether that came before its end.
+  bool sendWhen(const std::function<bool()>& now, int signal) {
+    while (!now()) {
+      if (hasEnded()) return false;
+      usleep(100);
+    }
+    send(signal);
+    return true;
+  }
 
   Outcome finish() {
     while (readSome()) {
@@ -1479,16 +1503,207 @@ TEST_F(Cli, aReaderThatWentAwayIsAnError) {
   EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
 }
 
-TEST_F(Cli, aFileThatMayNotBeSoLongIsAnError) {
-  rlimit before;
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit few{4096, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &few);
-  const Outcome outcome = run({{"export", field(), "-o", at("grid.cdf"), "--resolution", "9"}});
-  setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("grid.cdf: writing failed"));
-  EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+/// No file may be longer than that, as long as this lives, by this process and those that it starts.
+class ShortFiles {
+ public:
+  explicit ShortFiles(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit few{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &few);
+  }
+  ~ShortFiles() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+/// As on a full disk: what was there before is left as it was, and nothing half-written beside it.
+TEST_F(Cli, outputsThatDoNotFitLeaveTheOlderOnes) {
+  const std::vector<std::vector<std::string>> calls = {
+      {"build", "builtin:torus", "--target-error", "1e-4", "-o"},
+      {"build", "builtin:torus", "--target-error", "1e-4", "--checkpoint", "-o"},
+      {"smooth", field(), "-o"},
+      {"blend", field(), "-o"},
+      {"bounds", field(), "-o"},
+      {"export", field(), "--resolution", "9", "-o"},
+      {"jumps", field(), "-o"},
+      {"slice", field(), "--cpu", "--size", "64x64", "-o"},
+      {"render", field(), "--cpu", "--size", "64x64", "-o"},
+      {"docs", "-o"}};
+  for (std::vector<std::string> words : calls) {
+    const std::string output = at(words[0] == "export"                          ? "old.cdf"
+                                  : words[0] == "slice" || words[0] == "render" ? "old.png"
+                                  : words[0] == "jumps"                         ? "old.csv"
+                                                                                : "old.hpsdf");
+    words.push_back(output);
+    SCOPED_TRACE(words[0]);
+    writeFile(output, "old");
+    const Outcome outcome = [&] {
+      const ShortFiles limit(512);
+      return run({words});
+    }();
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("hpsdf: error: " + output + ": writing failed"));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_EQ(readFile(output), "old");
+    EXPECT_THAT(namesIn(folder_.path()), ElementsAre(fs::path(output).filename().string()));
+    fs::remove(output);
+  }
+}
+
+TEST_F(Cli, standardOutputOnAFullDiskIsAnError) {
+  for (const auto& words :
+       {std::vector<std::string>{"info", field()}, {"info", field(), "--json"}, {"query", field()}}) {
+    const Outcome outcome = run({.words = words, .input = "0 0 0\n", .output = "/dev/full"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
+    EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+  }
+}
+
+TEST_F(Cli, foldersThatTakeNothingAreRefusedBeforeTheWork) {
+  for (const std::string& output :
+       {std::string("/proc/f.hpsdf"), std::string("/dev/full"), at(std::string(300, 'x'))}) {
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12"}}, output);
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12", "--checkpoint"}}, output);
+  }
+  expectRefused({{"report", field(), "-o", at(std::string(300, 'x'))}}, "File name too long; check");
+}
+
+/// Another program puts it there and takes it away: its content, or one line that says what happened.
+TEST_F(Cli, aFileThatComesAndGoesIsReadOrRefused) {
+  std::atomic<bool> over = false;
+  std::thread other([&] {
+    for (bool there = false; !over; there = !there) {
+      if (there)
+        fs::remove(at("f.hpsdf"));
+      else
+        fs::create_hard_link(field(), at("f.hpsdf"));
+    }
+  });
+  int refused = 0, read = 0;
+  const auto start = Clock::now();
+  for (int n = 0; n < 300 || ((refused == 0 || read == 0) && Clock::now() - start < std::chrono::seconds(20)); ++n) {
+    const Outcome outcome = runHere({"info", at("f.hpsdf")});
+    ++(outcome.status == 0 ? read : refused);
+    if (outcome.status == 0) continue;
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("f.hpsdf"), Not(HasSubstr("fault of the program"))));
+  }
+  over = true;
+  other.join();
+  EXPECT_GT(refused, 0);
+  EXPECT_GT(read, 0);
+}
+
+// Checkpoints
+
+/// What tells a file that was written anew: nothing where there is none.
+std::optional<ino_t> identityOf(const fs::path& file) {
+  struct stat status {};
+  return stat(file.c_str(), &status) == 0 ? std::optional(status.st_ino) : std::nullopt;
+}
+
+class Checkpoints : public Cli {
+ protected:
+  /// A second's work, and the state kept as often as its share of the time allows.
+  Call build(std::vector<std::string> more = {}) const {
+    std::vector<std::string> words = {"build",          "builtin:gear", "-o",          at("f.hpsdf"),
+                                      "--target-error", "1e-6",         "--checkpoint"};
+    if (std::ranges::find(more, "--checkpoint-seconds") == more.end())
+      more.insert(more.end(), {"--checkpoint-seconds", "0"});
+    words.insert(words.end(), more.begin(), more.end());
+    return {words};
+  }
+  std::string state() const { return at("f.hpsdf.checkpoint"); }
+
+  /// Until a state is kept that was not there before.
+  std::function<bool()> newState() const {
+    return [file = state(), before = identityOf(state())] {
+      const auto now = identityOf(file);
+      return now && now != before;
+    };
+  }
+  /// While a state is being written.
+  std::function<bool()> halfState() const {
+    return [folder = folder_.path()] {
+      return std::ranges::any_of(namesIn(folder),
+                                 [](const std::string& name) { return name.starts_with("f.hpsdf.checkpoint.part-"); });
+    };
+  }
+};
+
+TEST_F(Checkpoints, whatIsKilledGoesOnToTheSameBytes) {
+  support::TemporaryDirectory elsewhere;
+  const std::string whole = (elsewhere / "whole.hpsdf").string();
+  ASSERT_EQ(run({{"build", "builtin:gear", "-o", whole, "--target-error", "1e-6"}}).status, 0);
+  int kills = 0;
+  for (int n = 0; n < 6; ++n) {
+    Process process(build({"--threads", std::to_string(n % 3)}));
+    if (process.sendWhen(n % 2 == 0 ? newState() : halfState(), SIGKILL)) ++kills;
+    process.finish();
+    if (!fs::exists(at("f.hpsdf"))) continue;
+    EXPECT_TRUE(readFile(at("f.hpsdf")) == readFile(whole)) << "it was faster than we";
+    fs::remove(at("f.hpsdf"));
+  }
+  EXPECT_GE(kills, 2);
+  if (!fs::exists(state())) {
+    Process process(build());
+    ASSERT_TRUE(process.sendWhen(newState(), SIGKILL));
+    process.finish();
+  }
+  const Outcome outcome = run(build());
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("note: going on from " + state() + ", after "));
+  EXPECT_TRUE(readFile(at("f.hpsdf")) == readFile(whole));
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
+}
+
+TEST_F(Checkpoints, othersAreRefused) {
+  Process process(build());
+  ASSERT_TRUE(process.sendWhen(newState(), SIGINT));
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr("note: " + state() + " keeps what was done"));
+  ASSERT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf.checkpoint"));
+  const std::string kept = readFile(state());
+  const auto refused = [&](const Call& call, const std::string& message) {
+    expectRefused(call, "error: " + state() + ": " + message);
+    EXPECT_TRUE(readFile(state()) == kept);
+  };
+  refused(build({"--nearness", "3"}), "is a checkpoint of a build with other options; delete it");
+  refused(build({"--bounds"}), "is a checkpoint of a build with other options");
+  Call other = build();
+  other.words[1] = "builtin:torus";
+  refused(other, "is a checkpoint of another surface; delete it");
+  writeFile(state(), kept.substr(0, kept.size() - 1));
+  expectRefused(build(), state() + ": the checkpoint is damaged: it ends too early; delete it");
+  fs::remove(state());
+  fs::create_directory(state());
+  expectRefused(build(), state() + ": is a folder");
+}
+
+TEST_F(Checkpoints, standBesideAnOutput) {
+  expectRefused({{"run", "-e", "build builtin:torus checkpoint=true"}}, "give output");
+  expectRefused({{"build", "builtin:torus", "-o", at("f.hpsdf"), "--checkpoint-seconds", "1"}},
+                "belongs to checkpoint");
+}
+
+/// A state, in double, does not fit where the field does.
+TEST_F(Checkpoints, thatCannotBeKeptAreWarnedAbout) {
+  Call call{
+      {"build", "builtin:torus", "-o", at("f.hpsdf"), "--grid", "10", "--max-steps", "0", "--coefficients", "float"}};
+  ASSERT_EQ(run(call).status, 0);
+  const std::string whole = readFile(at("f.hpsdf"));
+  call.words.insert(call.words.end(), {"--checkpoint", "--checkpoint-seconds", "0"});
+  const Outcome outcome = [&] {
+    const ShortFiles limit(whole.size());
+    return run(call);
+  }();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("warning: " + state() + ": writing failed"));
+  EXPECT_TRUE(readFile(at("f.hpsdf")) == whole);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
 }
 
 // Ctrl-C

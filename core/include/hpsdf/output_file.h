@@ -33,6 +33,9 @@ class OutputFile {
   /// process. Does only what a signal handler may do.
   static void removeUnfinished() noexcept;
 
+  /// Removes the temporary files that killed processes of this machine left beside `file` when they wrote it.
+  static void removeAbandoned(const std::filesystem::path& file);
+
  private:
   [[noreturn]] void fail();
 

@@ -19,9 +19,11 @@
 #include "field/build_options.h"
 #include "field/build_tree.h"
 #include "field/cell_fit.h"
+#include "field/checkpoint_file.h"
 #include "field/prune.h"
 #include "field/weak_continuity.h"
 #include "field/worst_error.h"
+#include "hpsdf/checkpoint.h"
 #include "hpsdf/error.h"
 #include "hpsdf/threads.h"
 
@@ -71,11 +73,21 @@ class Construction {
     tree_.grid = options.grid;
   }
 
+  /// Keeps its state there from now on, and goes on from the one that is there already, if any: whether there was.
+  bool resume(CheckpointFile& checkpoint) {
+    checkpoint_ = &checkpoint;
+    std::optional<CheckedReader> reader = checkpoint.open();
+    if (reader) takeUp(*reader);
+    return reader.has_value();
+  }
+
+  std::uint64_t steps() const { return steps_; }
+
   /// `afterStep` is called once the base cells are there, with 0, and after each step with their number.
   void grow(const std::function<void(std::uint64_t)>& afterStep = {}) {
-    fitBaseCells();
+    if (stage_ == Stage::baseCells) fitBaseCells();
     if (afterStep) afterStep(steps_);
-    if (growsByErrors()) refineWorstCells(afterStep);
+    if (stage_ == Stage::refining && growsByErrors()) refineWorstCells(afterStep);
     if (options_.maxError > 0) refineToMaxError(afterStep);
   }
 
@@ -184,25 +196,87 @@ class Construction {
   static constexpr std::size_t kLookRound = 256;
   static constexpr double kByteGrowth = 1.6;  // the same in bytes
 
+  /// Of those whose state is kept: what is to be done next. All before is done.
+  enum class Stage : std::uint8_t { baseCells, refining, looking };
+
+  /// What is kept beside the tree, for both directions. The rest follows from it: see `takeUp`.
+  template <typename Stream>
+  void numberItems(Stream& stream, std::uint64_t& evaluations) {
+    stream.item(stage_);
+    stream.item(fitted_);
+    stream.item(steps_);
+    stream.item(evaluations);
+    stream.item(nearness_.kind);
+    stream.item(nearness_.exponent);
+    for (double* number : {&totals_.weighted, &totals_.nearSquared, &totals_.nearVolume, &totals_.farSquared,
+                           &totals_.farVolume, &lastSum_, &measuredError_})
+      stream.item(*number);
+    stream.flag(full_);
+    stream.item(passed_);
+  }
+
+  void keepState() {
+    if (checkpoint_ == nullptr || !checkpoint_->isDue()) return;
+    checkpoint_->keep([&](CheckedWriter& writer) {
+      std::uint64_t evaluations = fitter_.evaluations();
+      numberItems(writer, evaluations);
+      treeItems(writer, tree_);
+      listItems(writer, aside_);
+      listItems(writer, waiting_);
+    });
+  }
+
+  void takeUp(CheckedReader& reader) {
+    std::uint64_t evaluations = 0;
+    numberItems(reader, evaluations);
+    if (stage_ > Stage::looking || nearness_.kind > NearnessKind::exponential)
+      reader.damaged("it is at an unknown stage");
+    treeItems(reader, tree_, fitted_, options_);
+    listItems(reader, aside_);
+    listItems(reader, waiting_);
+    reader.finish();
+    if ((fitted_ < tree_.baseCells() && stage_ != Stage::baseCells) || passed_ > waiting_.size())
+      reader.damaged("its numbers do not belong together");
+    const std::vector<bool> isAside = leavesAmong(reader, aside_);
+    leavesAmong(reader, std::span(waiting_).subspan(passed_));
+    fitter_.setEvaluations(evaluations);
+    if (stage_ == Stage::baseCells) return;
+    for (std::uint32_t n = 0; n < tree_.nodes.size(); ++n) {
+      if (tree_.nodes[n].firstChild != 0) continue;
+      coefficients_ += keptCoefficients(tree_.nodes[n].fit.degree);
+      if (stage_ == Stage::refining && !isAside[n]) enqueue(n);
+    }
+  }
+
+  /// By node: whether it is one of these, which must be leaves, each named once.
+  std::vector<bool> leavesAmong(const CheckedReader& reader, std::span<const std::uint32_t> nodes) const {
+    std::vector<bool> among(tree_.nodes.size());
+    for (const std::uint32_t n : nodes) {
+      if (n >= among.size() || among[n] || tree_.nodes[n].firstChild != 0)
+        reader.damaged("it names a cell that is none");
+      among[n] = true;
+    }
+    return among;
+  }
+
   void fitBaseCells() {
     const std::size_t count = tree_.baseCells();
-    tree_.nodes.resize(count);
-    for (std::size_t n = 0; n < count; ++n) {
-      tree_.nodes[n].place = {static_cast<std::uint32_t>(n % options_.grid[0]),
-                              static_cast<std::uint32_t>(n / options_.grid[0] % options_.grid[1]),
-                              static_cast<std::uint32_t>(n / options_.grid[0] / options_.grid[1])};
-    }
+    if (tree_.nodes.empty()) tree_.addBaseCells();
     const int degree = startDegree(options_);
-    for (std::size_t begin = 0; begin < count; begin += kChunk) {
-      report("fitting base cells", double(begin) / double(count));
-      tbb::parallel_for(begin, std::min(begin + kChunk, count),
+    while (fitted_ < count) {
+      report("fitting base cells", double(fitted_) / double(count));
+      const std::size_t end = std::min<std::size_t>(fitted_ + kChunk, count);
+      tbb::parallel_for(std::size_t(fitted_), end,
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
+      fitted_ = end;
+      keepState();
     }
     coefficients_ = count * keptCoefficients(degree);
     if (goal_.byDistance()) chooseNearness();
     sumTotals();
     checkBaseGridsBytes();
     for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
+    stage_ = Stage::refining;
   }
 
   void checkBaseGridsBytes() const {
@@ -242,6 +316,7 @@ class Construction {
       refineRound(afterStep);
       // rounding in the running total must end the construction neither early nor never
       if (reached() || totals_.weighted < 1e-6 * lastSum_) sumTotals();
+      keepState();
     }
   }
 
@@ -417,37 +492,39 @@ class Construction {
   };
 
   void refineToMaxError(const std::function<void(std::uint64_t)>& afterStep) {
-    std::vector<std::uint32_t> waiting;
-    for (std::uint32_t n = 0; n < tree_.nodes.size(); ++n)
-      if (tree_.nodes[n].firstChild == 0) waiting.push_back(n);
-    std::size_t done = 0;
-    while (done < waiting.size()) {
+    if (stage_ != Stage::looking) {
+      for (std::uint32_t n = 0; n < tree_.nodes.size(); ++n)
+        if (tree_.nodes[n].firstChild == 0) waiting_.push_back(n);
+      stage_ = Stage::looking;
+    }
+    while (passed_ < waiting_.size()) {
       checkFitsMemory(tree_.nodes.size(), coefficientsInMemory());
-      report("looking for the maximum error", double(done) / double(waiting.size()));
-      const std::size_t count = std::min(kLookRound, waiting.size() - done);
+      report("looking for the maximum error", double(passed_) / double(waiting_.size()));
+      const std::size_t count = std::min<std::size_t>(kLookRound, waiting_.size() - passed_);
       std::vector<Looked> looked(count);
       tbb::parallel_for(std::size_t{0}, count,
-                        [&](std::size_t i) { looked[i] = look(tree_.nodes[waiting[done + i]]); });
+                        [&](std::size_t i) { looked[i] = look(tree_.nodes[waiting_[passed_ + i]]); });
       for (std::size_t i = 0; i < count; ++i) {
-        const std::uint32_t node = waiting[done + i];
+        const std::uint32_t node = waiting_[passed_ + i];
         if (!looked[i].trial) {
           measuredError_ = std::max(measuredError_, looked[i].worst);
           continue;
         }
         if (!mayStep()) {
-          waiting.push_back(node);  // to be measured as it is
+          waiting_.push_back(node);  // to be measured as it is
           continue;
         }
         const std::size_t before = tree_.nodes.size();
         take(node, std::move(*looked[i].trial), looked[i].raises, afterStep);
         if (full_ || looked[i].raises) {
-          waiting.push_back(node);
+          waiting_.push_back(node);
         } else {
           for (std::size_t child = before; child < before + 8; ++child)
-            waiting.push_back(static_cast<std::uint32_t>(child));
+            waiting_.push_back(static_cast<std::uint32_t>(child));
         }
       }
-      done += count;
+      passed_ += count;
+      keepState();
     }
     sumTotals();
   }
@@ -505,16 +582,21 @@ class Construction {
   Nearness nearness_;
   CellFitter fitter_;
   BuildTree tree_;
+  Stage stage_ = Stage::baseCells;
+  std::uint64_t fitted_ = 0;  ///< base cells that have a fit
   std::priority_queue<Entry> queue_;
-  std::vector<std::uint32_t> aside_;  ///< leaves whose kind was exact enough when their turn came
-  ErrorTotals totals_;                ///< kept up step by step
-  double lastSum_ = 0;                ///< their weighted error when they were last summed anew
-  double measuredError_ = 0;          ///< greatest that `refineToMaxError` has left
-  bool full_ = false;                 ///< no more bytes may be taken
-  std::size_t coefficients_ = 0;      ///< that the field will keep of all leaves
+  std::vector<std::uint32_t> aside_;    ///< leaves whose kind was exact enough when their turn came
+  ErrorTotals totals_;                  ///< kept up step by step
+  double lastSum_ = 0;                  ///< their weighted error when they were last summed anew
+  std::vector<std::uint32_t> waiting_;  ///< for `refineToMaxError`, in the order of their turns
+  std::uint64_t passed_ = 0;            ///< of these, done with
+  double measuredError_ = 0;            ///< greatest that `refineToMaxError` has left
+  bool full_ = false;                   ///< no more bytes may be taken
+  std::size_t coefficients_ = 0;        ///< that the field will keep of all leaves
   std::uint64_t steps_ = 0;
   std::uint64_t ofFinishing_ = 0;  ///< calls of Φ for fields that were handed out on the way
   ProgressEstimate estimate_;
+  CheckpointFile* checkpoint_ = nullptr;
 };
 
 }  // namespace
@@ -524,6 +606,18 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
   checkBuild(domain, options);
   return Field(withThreads(options.threads, [&] {
     Construction construction(distance, domain, options, progress);
+    construction.grow();
+    return construction.finish(distance.source());
+  }));
+}
+
+Field buildResumably(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                     const Checkpoint& checkpoint, const Progress& progress) {
+  checkBuild(domain, options);
+  return Field(withThreads(options.threads, [&] {
+    CheckpointFile file(checkpoint, distance, domain, options);
+    Construction construction(distance, domain, options, progress);
+    if (construction.resume(file) && checkpoint.resumed) checkpoint.resumed(construction.steps());
     construction.grow();
     return construction.finish(distance.source());
   }));

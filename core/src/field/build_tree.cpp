@@ -21,17 +21,29 @@ Box BuildTree::boxOf(const BuildNode& node) const {
   return Box(lo, hi);
 }
 
+void BuildTree::addBaseCells() {
+  nodes.resize(baseCells());
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    nodes[n].place = {static_cast<std::uint32_t>(n % grid[0]), static_cast<std::uint32_t>(n / grid[0] % grid[1]),
+                      static_cast<std::uint32_t>(n / grid[0] / grid[1])};
+  }
+}
+
+void BuildTree::placeChildren(std::uint32_t parent) {
+  const BuildNode& above = nodes[parent];
+  for (std::uint32_t child = 0; child < 8; ++child) {
+    BuildNode& node = nodes[above.firstChild + child];
+    node.depth = above.depth + 1;
+    for (int axis = 0; axis < 3; ++axis) node.place[axis] = 2 * above.place[axis] + ((child >> axis) & 1);
+  }
+}
+
 void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own) {
   const auto first = static_cast<std::uint32_t>(nodes.size());
   nodes[leaf].firstChild = first;
   nodes[leaf].fit = std::move(own);
-  for (std::uint32_t child = 0; child < 8; ++child) {
-    BuildNode node;
-    node.depth = nodes[leaf].depth + 1;
-    for (int axis = 0; axis < 3; ++axis) node.place[axis] = 2 * nodes[leaf].place[axis] + ((child >> axis) & 1);
-    node.fit = std::move(children[child]);
-    nodes.push_back(std::move(node));
-  }
+  for (Fit& child : children) nodes.emplace_back().fit = std::move(child);
+  placeChildren(leaf);
 }
 
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {

@@ -26,6 +26,12 @@ struct BuildTree {
   std::size_t baseCells() const { return std::size_t(grid[0]) * grid[1] * grid[2]; }
   Box boxOf(const BuildNode& node) const;
 
+  /// Of an empty tree; without fits.
+  void addBaseCells();
+
+  /// Says where the eight children of a node are.
+  void placeChildren(std::uint32_t parent);
+
   /// Puts eight children, which take over their fits, below a leaf, whose own fit is replaced.
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };

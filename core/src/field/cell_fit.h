@@ -57,6 +57,8 @@ class CellFitter {
 
   /// Calls of Φ so far.
   std::uint64_t evaluations() const { return evaluations_; }
+  /// So many have gone before.
+  void setEvaluations(std::uint64_t evaluations) { evaluations_ = evaluations; }
 
  private:
   /// What all cells of one degree p share.

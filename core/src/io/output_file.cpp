@@ -1,13 +1,19 @@
 #include "hpsdf/output_file.h"
 
+#include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "hpsdf/error.h"
 
@@ -16,12 +22,31 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
+constexpr std::string_view kTemporary = ".part-";  // a process and a number follow
+
 /// Two writers of the same file, in one process or in two, must not share a temporary name.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
-  name += ".part-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+  name += std::string(kTemporary) + std::to_string(getpid()) + "-" + std::to_string(counter++);
   return name;
+}
+
+struct Opened {
+  std::filesystem::path name;
+  std::FILE* stream;
+};
+
+/// Another one where the name is taken: a process that was killed may have had our number.
+Opened openTemporary(const std::filesystem::path& file) {
+  constexpr int kTries = 100;
+  Opened opened;
+  for (int n = 0; n < kTries; ++n) {
+    opened = {temporaryBeside(file), nullptr};
+    opened.stream = std::fopen(opened.name.c_str(), "wbx");
+    if (opened.stream != nullptr || errno != EEXIST) break;
+  }
+  return opened;
 }
 
 /// What a symbolic link stands for, so that the rename replaces the file and keeps the link.
@@ -50,7 +75,40 @@ void forget(const char* name) {
   }
 }
 
+/// A file of ours, by its name without its path.
+bool isOurs(const std::filesystem::path& name) {
+  return std::ranges::any_of(unfinished, [&](const auto& slot) {
+    const char* ours = slot.load();
+    return ours != nullptr && name == std::filesystem::path(ours).filename();
+  });
+}
+
+/// The process in the name of a temporary file of `file`; nothing for other files.
+std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
+  const std::string text = name.filename(), before = file.filename().string() + std::string(kTemporary);
+  if (!text.starts_with(before)) return std::nullopt;
+  pid_t process = 0;
+  const auto [end, error] = std::from_chars(text.data() + before.size(), text.data() + text.size(), process);
+  if (error != std::errc() || process <= 0 || *end != '-') return std::nullopt;
+  return process;
+}
+
+bool isRunning(pid_t process) { return kill(process, 0) == 0 || errno != ESRCH; }
+
 }  // namespace
+
+void OutputFile::removeAbandoned(const std::filesystem::path& file) {
+  const std::filesystem::path target = resolved(file);
+  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
+  std::error_code ignored;
+  std::vector<std::filesystem::path> abandoned;
+  for (std::filesystem::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
+    const std::optional<pid_t> writer = writerOf(entry->path(), target);
+    if (writer && (*writer == getpid() ? !isOurs(entry->path().filename()) : !isRunning(*writer)))
+      abandoned.push_back(entry->path());
+  }
+  for (const std::filesystem::path& name : abandoned) std::filesystem::remove(name, ignored);
+}
 
 void OutputFile::removeUnfinished() noexcept {
   for (const auto& slot : unfinished)
@@ -65,8 +123,9 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw Error(file.string() + ": is not a regular file; give another name");
   if (!file_.has_filename()) throw Error(file.string() + ": names a folder; give a file name");
-  temporary_ = temporaryBeside(file_);
-  stream_ = std::fopen(temporary_.c_str(), "wbx");
+  Opened opened = openTemporary(file_);
+  temporary_ = std::move(opened.name);
+  stream_ = opened.stream;
   if (stream_ == nullptr) throw Error(file.string() + ": cannot be written (" + reason(errno) + "); check the folder");
   remember(temporary_.c_str());
 }

@@ -1,0 +1,410 @@
+// Constructions that are interrupted and taken up again.
+#include "hpsdf/checkpoint.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/output_file.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Two spheres, between which the distance has a kink.
+double spheres(const Vector3& x) {
+  return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
+}
+Box cube(double half = 1.1) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
+
+std::string readAll(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void writeAll(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
+
+std::set<std::string> namesIn(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename());
+  return names;
+}
+
+std::string bytesOf(const Field& field, const fs::path& folder) {
+  save(field, folder / "field");
+  return readAll(folder / "field");
+}
+
+/// As often as the construction can.
+Checkpoint alwaysAt(const fs::path& file) { return {.file = file, .seconds = 0, .share = 1}; }
+
+/// Ends a construction once it has asked so many times whether to.
+Progress endingAfter(std::atomic<int>& questions) {
+  return {.report = {}, .cancelled = [&questions] { return --questions < 0; }};
+}
+
+constexpr int kProbes = 4096;  // by which a distance without a fingerprint is told from another
+
+std::vector<BuildOptions> everyWay() {
+  BuildOptions paper = paperOptions();
+  paper.targetError = 1e-6;
+  paper.grid = {3, 3, 3};
+  return {
+      {.targetError = 1e-7, .grid = {3, 3, 3}},
+      paper,
+      {.targetError = 1e-6, .criterion = Criterion::optimal},
+      {.targetError = 1e-5, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .strategy = Strategy::h2},
+      {.targetError = 1e-6,
+       .grid = {2, 3, 4},
+       .maxSteps = 100,
+       .enrich = true,
+       .coefficients = CoefficientType::float64},
+      {.targetError = 0, .nearError = 3e-4, .farError = 3e-3, .band = 0.3},
+      {.targetError = 0, .nearError = 3e-4, .farError = 3e-4, .criterion = Criterion::optimal},  // puts cells aside
+      {.targetError = 0, .maxError = 0.02},
+      {.targetError = 1e-5, .maxError = 0.02, .band = 0.2},
+      {.targetError = 0, .grid = {3, 3, 3}, .maxError = 0.01, .maxBytes = 150000},
+      {.targetError = 0, .maxBytes = 200000, .criterion = Criterion::optimal},
+      {.targetError = 1e-5, .nearnessKind = NearnessKind::exponential, .estimator = Estimator::residual},
+      {.targetError = 1e-5, .continuityWeight = 0.1, .blend = 0.1, .bounds = true},
+      {.targetError = 1e-6, .grid = {17, 17, 17}, .maxSteps = 40},  // base cells in two parts
+  };
+}
+
+/// From the first state to the end, at random moments and with random numbers of threads; more than once. Every state
+/// on the way is, to the byte, one of those of a construction in one go: running sums and lists too.
+TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
+  support::TemporaryDirectory folder;
+  std::mt19937_64 random(7);
+  constexpr int kResumed = 4, kAttempts = 300;
+  int way = 0;
+  for (BuildOptions options : everyWay()) {
+    SCOPED_TRACE("way " + std::to_string(way++));
+    constexpr int kMany = 1 << 30;
+    std::atomic<int> left = kMany;
+    Checkpoint checkpoint = alwaysAt(folder / "state");
+    std::set<std::string> states;
+    Progress progress = endingAfter(left);
+    progress.report = [&](std::string_view, double) { states.insert(readAll(checkpoint.file)); };
+    const std::string whole = bytesOf(buildResumably(spheres, cube(), options, checkpoint, progress), folder.path());
+    states.insert(readAll(checkpoint.file));
+    EXPECT_TRUE(bytesOf(build(spheres, cube(), options), folder.path()) == whole);
+    const int all = kMany - left;
+    fs::remove(checkpoint.file);
+    progress.report = [&](std::string_view, double) { EXPECT_TRUE(states.contains(readAll(checkpoint.file))); };
+    int resumed = 0, ends = 0;
+    checkpoint.resumed = [&](std::uint64_t) { ++resumed; };
+    for (int n = 0; n < kAttempts && (resumed < kResumed || ends == 0); ++n) {
+      options.threads = 1 + static_cast<int>(random() % 3);
+      left = static_cast<int>(random() % std::uint64_t(all));
+      try {
+        const Field field = buildResumably(spheres, cube(), options, checkpoint, progress);
+        EXPECT_TRUE(bytesOf(field, folder.path()) == whole);
+        fs::remove(checkpoint.file);
+        ++ends;
+      } catch (const Cancelled&) {
+      }
+    }
+    EXPECT_GE(ends, 1);
+    EXPECT_GE(resumed, kResumed);
+    fs::remove(checkpoint.file);
+  }
+}
+
+/// Once more after the end: the last state gives the field without a step.
+TEST(Checkpoint, WhatWasDoneIsNotDoneAgain) {
+  support::TemporaryDirectory folder;
+  std::atomic<int> calls = 0;
+  const auto counting = [&](const Vector3& x) {
+    ++calls;
+    return spheres(x);
+  };
+  const BuildOptions options{.targetError = 1e-6};
+  const Field first = buildResumably(counting, cube(), options, alwaysAt(folder / "state"));
+  EXPECT_EQ(std::uint64_t(calls), kProbes + first.metadata().exactEvaluations);
+  calls = 0;
+  Checkpoint checkpoint = alwaysAt(folder / "state");
+  std::uint64_t steps = 0;
+  checkpoint.resumed = [&](std::uint64_t taken) { steps = taken; };
+  const Field again = buildResumably(counting, cube(), options, checkpoint);
+  EXPECT_EQ(calls, kProbes);
+  EXPECT_EQ(steps, first.metadata().steps);
+  EXPECT_TRUE(bytesOf(again, folder.path()) == bytesOf(first, folder.path()));
+}
+
+/// What a construction is, and how it is refused when it is not the one that was interrupted.
+class Refused : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::atomic<int> questions = 400;
+    EXPECT_THROW(buildResumably(distance(), cube(), options_, alwaysAt(file()), endingAfter(questions)), Cancelled);
+    state_ = readAll(file());
+    ASSERT_GT(state_.size(), 1000u);
+  }
+
+  DistanceFunction distance(const Source& source = {"two.obj", 1, 2, 3, cube(1)}) {
+    return DistanceFunction(
+        [this](const Vector3& x) {
+          ++calls_;
+          return spheres(x);
+        },
+        source);
+  }
+  fs::path file() const { return folder_ / "state"; }
+
+  /// The message of the error that ends it before anything is built; empty where the construction goes on.
+  std::string refusal(const DistanceFunction& phi, const Box& domain, const BuildOptions& options,
+                      const std::string& about = "") {
+    Checkpoint checkpoint = alwaysAt(file());
+    checkpoint.about = about;
+    calls_ = 0;
+    std::atomic<int> questions = 0;
+    try {
+      buildResumably(phi, domain, options, checkpoint, endingAfter(questions));
+    } catch (const Cancelled&) {
+      return "";
+    } catch (const Error& error) {
+      EXPECT_LE(calls_, kProbes);
+      EXPECT_EQ(namesIn(folder_.path()), std::set<std::string>({"state"}));
+      EXPECT_EQ(std::string(error.what()).find(file().string()), 0u) << error.what();
+      return error.what();
+    }
+    ADD_FAILURE() << "it went on to its end";
+    return "";
+  }
+  std::string refusal() { return refusal(distance(), cube(), options_); }
+  std::string refusalOf(const std::string& bytes) {
+    writeAll(file(), bytes);
+    return refusal();
+  }
+
+  support::TemporaryDirectory folder_;
+  BuildOptions options_{.targetError = 1e-6, .grid = {2, 2, 2}, .criterion = Criterion::optimal};
+  std::string state_;
+  std::atomic<int> calls_ = 0;
+};
+
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST_F(Refused, AreOthersStates) {
+  EXPECT_EQ(refusal(), "");
+  BuildOptions other = options_;
+  other.threads = 2;
+  EXPECT_EQ(refusal(distance(), cube(), other), "");
+  EXPECT_EQ(refusal(distance({"renamed.obj", 1, 2, 3, cube(1)}), cube(), options_), "");
+  EXPECT_TRUE(holds(refusal(distance({"two.obj", 2, 2, 3, cube(1)}), cube(), options_), "another surface"));
+  EXPECT_TRUE(holds(refusal(distance({"two.obj", 0, 2, 3, cube(1)}), cube(), options_), "another surface"));
+  EXPECT_TRUE(holds(refusal(distance(), cube(1.2), options_), "other options"));
+  EXPECT_TRUE(holds(refusal(distance(), cube(), options_, "winding"), "other options"));
+  const DistanceFunction moved([](const Vector3& x) { return spheres(x) + 1e-15; }, distance().source());
+  EXPECT_TRUE(holds(refusal(moved, cube(), options_), "another distance"));
+  std::vector<BuildOptions> others(9, options_);
+  others[0].targetError = 2e-6;
+  others[1].grid = {2, 2, 3};
+  others[2].maxSteps = 1000;
+  others[3].maxBytes = 1000000;
+  others[4].enrich = true;
+  others[5].continuityWeight = 1;
+  others[6].bounds = true;
+  others[7].coefficients = CoefficientType::float64;
+  others[8].cubature = CubatureKind::product;
+  for (const BuildOptions& options : others)
+    EXPECT_TRUE(holds(refusal(distance(), cube(), options), "other options; delete it"));
+}
+
+TEST_F(Refused, AreFilesThatAreNoStates) {
+  EXPECT_TRUE(holds(refusalOf("solid cube\nfacet normal 0 0 1\n"), "is no checkpoint"));
+  EXPECT_TRUE(holds(refusalOf(""), "is no checkpoint"));
+  std::string bytes = state_;
+  bytes[8] = 9;  // after the magic
+  EXPECT_TRUE(holds(refusalOf(bytes), "version 9"));
+  bytes = state_;
+  bytes[16] = '7';  // the program's version follows the length of its text
+  EXPECT_TRUE(holds(refusalOf(bytes), "of hpsdf 7"));
+  fs::remove(file());
+  fs::create_directory(file());
+  EXPECT_TRUE(holds(refusal(), "folder"));
+}
+
+TEST_F(Refused, AreTruncatedAndAlteredStates) {
+  std::size_t count = 0;
+  for (std::size_t length = 0; length < state_.size(); length += length < 200 ? 1 : state_.size() / 200, ++count)
+    ASSERT_NE(refusalOf(state_.substr(0, length)), "") << length << " of " << state_.size() << " bytes";
+  EXPECT_GT(count, 300u);
+  EXPECT_TRUE(holds(refusalOf(state_ + "x"), "too long"));
+  std::mt19937_64 random(2);
+  for (int n = 0; n < 400; ++n) {
+    std::string bytes = state_;
+    const std::size_t position = n < 200 ? std::size_t(n) : random() % state_.size();
+    bytes[position] = char(bytes[position] ^ (1 << (random() % 8)));
+    ASSERT_NE(refusalOf(bytes), "") << "byte " << position;
+  }
+  EXPECT_EQ(refusalOf(state_), "");
+}
+
+/// With a right checksum whatever is in it: refused, or a construction that ends in one of the known ways.
+TEST_F(Refused, ForgedStatesDoNoHarm) {
+  std::mt19937_64 random(3);
+  int refused = 0;
+  constexpr int kForged = 200;
+  for (int n = 0; n < kForged; ++n) {
+    std::string bytes = state_;
+    const std::size_t from = n < kForged / 2 ? 80 : bytes.size() - 300;  // numbers and first cells; lists of cells
+    for (int changes = 1 + static_cast<int>(random() % 3); changes-- > 0;)
+      bytes[from + random() % 200] = char(random() % 2 == 0 ? random() : random() % 9);
+    const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
+    std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
+    writeAll(file(), bytes);
+    std::atomic<int> questions = 60;
+    try {
+      buildResumably(distance(), cube(), options_, alwaysAt(file()), endingAfter(questions));
+    } catch (const Cancelled&) {
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, kForged / 10);
+  EXPECT_LT(refused, kForged) << "some get past the checks";
+}
+
+TEST(Checkpoint, TimesOutOfRangeAreRefused) {
+  support::TemporaryDirectory folder;
+  for (const auto& [seconds, share] : {std::pair(-1.0, 0.1), {NAN, 0.1}, {1e10, 0.1}, {1.0, 0.0}, {1.0, 1.5}})
+    EXPECT_THROW(buildResumably(spheres, cube(), {.targetError = 1e-3},
+                                {.file = folder / "state", .seconds = seconds, .share = share}),
+                 Error);
+  EXPECT_THROW(buildResumably(spheres, cube(), {.targetError = 1e-3}, {.file = folder / "none" / "state"}), Error);
+}
+
+/// No file may be longer than that, as long as this lives.
+class ShortFiles {
+ public:
+  explicit ShortFiles(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit few{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &few);
+  }
+  ~ShortFiles() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+/// How often it is tried to keep the state of one and the same construction.
+int attempts(const Checkpoint& checkpoint) {
+  const ShortFiles limit(1000);
+  int failures = 0;
+  Checkpoint counted = checkpoint;
+  counted.failed = [&](const Error& error) {
+    ++failures;
+    EXPECT_TRUE(holds(error.what(), "writing failed")) << error.what();
+  };
+  buildResumably(spheres, cube(), {.targetError = 1e-6}, counted);
+  return failures;
+}
+
+TEST(Checkpoint, StatesAreKeptNoMoreOftenThanAsked) {
+  support::TemporaryDirectory folder;
+  const int always = attempts(alwaysAt(folder / "state"));
+  EXPECT_GT(always, 5);
+  EXPECT_EQ(attempts({.file = folder / "state", .seconds = 1000, .share = 1}), 0);
+  EXPECT_EQ(attempts({.file = folder / "state", .seconds = 0, .share = 1e-9}), 1);
+}
+
+TEST(Checkpoint, AFullDiskLeavesTheOlderStateAndTheConstruction) {
+  support::TemporaryDirectory folder;
+  const fs::path file = folder / "state";
+  const BuildOptions options{.targetError = 1e-6};
+  std::atomic<int> questions = 600;
+  EXPECT_THROW(buildResumably(spheres, cube(), options, alwaysAt(file), endingAfter(questions)), Cancelled);
+  const std::string before = readAll(file);
+  ASSERT_GT(before.size(), 1000u);
+  {
+    const ShortFiles limit(1000);
+    EXPECT_THROW(buildResumably(spheres, cube(), options, alwaysAt(file)), Error);
+  }
+  EXPECT_EQ(namesIn(folder.path()), std::set<std::string>({"state"}));
+  EXPECT_TRUE(readAll(file) == before);
+  Checkpoint checkpoint = alwaysAt(file);
+  int failures = 0;
+  checkpoint.failed = [&](const Error&) { ++failures; };
+  const Field field = [&] {
+    const ShortFiles limit(1000);
+    return buildResumably(spheres, cube(), options, checkpoint);
+  }();
+  EXPECT_GT(failures, 0);
+  EXPECT_TRUE(readAll(file) == before);
+  EXPECT_TRUE(bytesOf(field, folder.path()) == bytesOf(build(spheres, cube(), options), folder.path()));
+}
+
+/// The number of a process that is no more.
+pid_t pastProcess() {
+  const pid_t child = fork();
+  if (child == 0) _exit(0);
+  waitpid(child, nullptr, 0);
+  return child;
+}
+
+TEST(OutputFile, LeftoversOfKilledProcessesAreRemoved) {
+  support::TemporaryDirectory folder;
+  const auto leftover = [&](const std::string& name, pid_t process, const std::string& rest) {
+    const std::string whole = name + ".part-" + std::to_string(process) + rest;
+    writeAll(folder / whole, "half");
+    return whole;
+  };
+  const pid_t past = pastProcess();
+  leftover("out", past, "-0");
+  leftover("out", past, "-17");
+  leftover("out", getpid(), "-999999");  // of one that had our number
+  const std::string running = leftover("out", getppid(), "-0"), other = leftover("out.txt", past, "-0"),
+                    foreign = leftover("out", past, "x");
+  OutputFile ours(folder / "out");
+  const std::size_t all = namesIn(folder.path()).size();
+  OutputFile::removeAbandoned(folder / "out");
+  const std::set<std::string> left = namesIn(folder.path());
+  EXPECT_EQ(left.size(), all - 3);
+  for (const std::string& name : {running, other, foreign}) EXPECT_TRUE(left.contains(name)) << name;
+  ours.commit();
+  EXPECT_NO_THROW(OutputFile::removeAbandoned(folder / "none" / "out"));
+}
+
+/// In a container the next process often has the number of the one that was killed.
+TEST(OutputFile, ATakenTemporaryNameIsNoObstacle) {
+  support::TemporaryDirectory folder;
+  unsigned next = 0;
+  {
+    const OutputFile output(folder / "out");
+    const std::string name = *namesIn(folder.path()).begin();
+    next = static_cast<unsigned>(std::stoul(name.substr(name.rfind('-') + 1))) + 1;
+  }
+  for (unsigned n = next; n < next + 3; ++n)
+    writeAll(folder / ("out.part-" + std::to_string(getpid()) + "-" + std::to_string(n)), "half");
+  OutputFile output(folder / "out");
+  output.write("whole");
+  output.commit();
+  EXPECT_EQ(readAll(folder / "out"), "whole");
+  EXPECT_EQ(namesIn(folder.path()).size(), 4u);
+}
+
+}  // namespace
+}  // namespace hpsdf
