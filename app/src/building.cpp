@@ -135,16 +135,21 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
   return options;
 }
 
-/// With the sign of a field that was made from `source`.
-std::shared_ptr<const ExactDistance> exactDistanceOf(const TriangleMesh& mesh, const Source& source) {
-  return std::make_shared<const ExactDistance>(mesh,
-                                               DistanceOptions{.sign = source.sign, .thickness = source.thickness});
-}
+/// Those of a field that was made from `source`.
+DistanceOptions distanceOptions(const Source& source) { return {.sign = source.sign, .thickness = source.thickness}; }
 
 /// Of a closed mesh without folds all expect the sign that it gets.
 void tellSign(const Console& console, const std::string& surface, const SignChoice& choice) {
   if (!choice.reason.empty() && choice.sign != Sign::pseudonormal)
     console.err << fmt::format("hpsdf: {}: sign by winding number: {}", surface, choice.reason) << std::endl;
+}
+
+std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
+                                                   const PreparedSurface& prepared, const DistanceOptions& options) {
+  if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
+  const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
+  tellSign(console, surface, exact->signChoice());
+  return distanceOf(exact, prepared.normalization);
 }
 
 /// ∇Φ of a shape in closed form, by differences across a millionth of it.
@@ -381,8 +386,8 @@ std::vector<Parameter> buildParameters() {
       {.name = "sign",
        .type = ParameterType::choice,
        .help = "How inside is told from outside. pseudonormal: by the normals of what is nearest, for closed meshes "
-               "that do "
-               "not meet themselves. winding: by how often the faces surround a place, for any mesh; holes are closed. "
+               "that do not meet themselves. winding: by how often the faces surround a place, for any mesh; holes are "
+               "closed. "
                "unsigned-shell: all is outside but a wall around the faces, --thickness wide, for sheets. auto: "
                "pseudonormal where the mesh is closed and both agree, else winding, and says why.",
        .defaultText = "pseudonormal",
@@ -524,14 +529,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     const DistanceOptions ofMesh = distanceOptions(arguments);
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
-    BuildInput input{nullptr, prepared.report, {}, options};
-    if (prepared.analytic) {
-      input.exact = std::make_shared<const DistanceFunction>(*prepared.analytic);
-    } else {
-      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, ofMesh);
-      tellSign(console, surface, exact->signChoice());
-      input.exact = distanceOf(exact, prepared.normalization);
-    }
+    BuildInput input{distanceTo(console, surface, prepared, ofMesh), prepared.report, {}, options};
     input.setUpSeconds = secondsSince(start);
     const Box& box = input.exact->source().box;
     input.domain = domainOf(arguments, box);
@@ -573,8 +571,7 @@ std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, co
                                                       const Source& source) {
   try {
     const PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
-    auto exact = prepared.analytic ? std::make_shared<const DistanceFunction>(*prepared.analytic)
-                                   : distanceOf(exactDistanceOf(prepared.mesh, source), prepared.normalization);
+    auto exact = distanceTo(console, surface, prepared, distanceOptions(source));
     if (!isMadeFrom(exact->source(), source))
       console.err << "hpsdf: warning: " << surface << " is not what the field was made from (" << nameOf(source) << ")"
                   << std::endl;
@@ -598,7 +595,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
         return differenceQuotient(*distance, x);
       };
     } else {
-      const auto exact = exactDistanceOf(prepared.mesh, source);
+      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, distanceOptions(source));
       reference.distance = distanceOf(exact, prepared.normalization);
       reference.mesh = std::move(prepared.mesh);
       // nearer than this, rounding decides the direction

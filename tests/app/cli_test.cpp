@@ -41,6 +41,7 @@
 #include "report_page.h"
 #include "summaries.h"
 #include "support/require_gl.h"
+#include "support/short_files.h"
 #include "support/temporary_directory.h"
 
 extern char** environ;
@@ -1503,20 +1504,6 @@ TEST_F(Cli, aReaderThatWentAwayIsAnError) {
   EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
 }
 
-/// No file may be longer than that, as long as this lives, by this process and those that it starts.
-class ShortFiles {
- public:
-  explicit ShortFiles(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit few{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &few);
-  }
-  ~ShortFiles() { setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
-
 /// As on a full disk: what was there before is left as it was, and nothing half-written beside it.
 TEST_F(Cli, outputsThatDoNotFitLeaveTheOlderOnes) {
   const std::vector<std::vector<std::string>> calls = {
@@ -1539,7 +1526,7 @@ TEST_F(Cli, outputsThatDoNotFitLeaveTheOlderOnes) {
     SCOPED_TRACE(words[0]);
     writeFile(output, "old");
     const Outcome outcome = [&] {
-      const ShortFiles limit(512);
+      const support::ShortFiles limit(512);
       return run({words});
     }();
     EXPECT_EQ(outcome.status, 2);
@@ -1697,7 +1684,7 @@ TEST_F(Checkpoints, thatCannotBeKeptAreWarnedAbout) {
   const std::string whole = readFile(at("f.hpsdf"));
   call.words.insert(call.words.end(), {"--checkpoint", "--checkpoint-seconds", "0"});
   const Outcome outcome = [&] {
-    const ShortFiles limit(whole.size());
+    const support::ShortFiles limit(whole.size());
     return run(call);
   }();
   EXPECT_EQ(outcome.status, 0) << outcome.err;

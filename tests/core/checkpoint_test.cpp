@@ -23,6 +23,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/output_file.h"
+#include "support/short_files.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -295,24 +296,15 @@ TEST(Checkpoint, TimesOutOfRangeAreRefused) {
   EXPECT_THROW(buildResumably(spheres, cube(), {.targetError = 1e-3}, {.file = folder / "none" / "state"}), Error);
 }
 
-/// No file may be longer than that, as long as this lives.
-class ShortFiles {
- public:
-  explicit ShortFiles(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit few{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &few);
-  }
-  ~ShortFiles() { setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
+/// Core leaves the signal to its caller.
+support::ShortFiles shortFiles(rlim_t bytes) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  return support::ShortFiles(bytes);
+}
 
 /// How often it is tried to keep the state of one and the same construction.
 int attempts(const Checkpoint& checkpoint) {
-  const ShortFiles limit(1000);
+  const support::ShortFiles limit = shortFiles(1000);
   int failures = 0;
   Checkpoint counted = checkpoint;
   counted.failed = [&](const Error& error) {
@@ -340,7 +332,7 @@ TEST(Checkpoint, AFullDiskLeavesTheOlderStateAndTheConstruction) {
   const std::string before = readAll(file);
   ASSERT_GT(before.size(), 1000u);
   {
-    const ShortFiles limit(1000);
+    const support::ShortFiles limit = shortFiles(1000);
     EXPECT_THROW(buildResumably(spheres, cube(), options, alwaysAt(file)), Error);
   }
   EXPECT_EQ(namesIn(folder.path()), std::set<std::string>({"state"}));
@@ -349,7 +341,7 @@ TEST(Checkpoint, AFullDiskLeavesTheOlderStateAndTheConstruction) {
   int failures = 0;
   checkpoint.failed = [&](const Error&) { ++failures; };
   const Field field = [&] {
-    const ShortFiles limit(1000);
+    const support::ShortFiles limit = shortFiles(1000);
     return buildResumably(spheres, cube(), options, checkpoint);
   }();
   EXPECT_GT(failures, 0);

@@ -14,6 +14,7 @@
 #include "distance/inside.h"
 #include "distance/pseudonormals.h"
 #include "distance/search.h"
+#include "distance/segment.h"
 #include "distance/sign_choice.h"
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
@@ -23,6 +24,7 @@
 namespace hpsdf {
 namespace {
 
+using distance::closestParameter;
 using distance::FramePoint;
 using distance::TriangleFrame;
 
@@ -42,13 +44,6 @@ void check(const DistanceOptions& options) {
   const bool isShell = options.sign == Sign::shell;
   if (isShell ? !(options.thickness > 0) || !std::isfinite(options.thickness) : options.thickness != 0)
     throw Error("a shell, and nothing else, has a thickness, a number above 0");
-}
-
-/// The point of segment ab closest to x, as its parameter in [0, 1].
-double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
-  const Vector3 direction = b - a;
-  const double squaredLength = direction.squaredNorm();
-  return squaredLength > 0 ? std::clamp((x - a).dot(direction) / squaredLength, 0.0, 1.0) : 0.0;
 }
 
 }  // namespace

@@ -1,53 +1,29 @@
 #include "distance/hole_rims.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <utility>
+
+#include "distance/segment.h"
+#include "mesh/sides.h"
 
 namespace hpsdf::distance {
 namespace {
 
-/// A triangle's side, by its lower and higher vertex.
-struct Edge {
-  std::uint32_t low, high;
-  int rising;  ///< 1: runs from low to high, else -1
-
-  auto key() const { return std::pair(low, high); }
-};
-
-std::vector<Edge> edgesOf(const Hierarchy& hierarchy) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * hierarchy.triangles().size());
-  for (const auto& corners : hierarchy.triangles())
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t from = corners[k], to = corners[(k + 1) % 3];
-      if (from != to) edges.push_back({std::min(from, to), std::max(from, to), from < to ? 1 : -1});
-    }
-  std::ranges::sort(edges, {}, &Edge::key);
-  return edges;
-}
-
 double distanceTo(const Vector3& x, const Vector3& a, const Vector3& b) {
-  const Vector3 along = b - a;
-  const double squared = along.squaredNorm();
-  const double t = squared > 0 ? std::clamp((x - a).dot(along) / squared, 0.0, 1.0) : 0.0;
-  return (x - a - t * along).norm();
+  return (x - a - closestParameter(x, a, b) * (b - a)).norm();
 }
 
 }  // namespace
 
 HoleRims::HoleRims(const Hierarchy& hierarchy) {
-  const std::vector<Edge> edges = edgesOf(hierarchy);
-  const auto vertices = hierarchy.vertices();
-  for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+  const std::vector<hpsdf::Side> sides = sidesByEdge(hierarchy.triangles());
+  const auto place = [&](std::uint32_t vertex) { return hierarchy.local(hierarchy.vertices()[vertex]); };
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
     int times = 0;
-    for (; end < edges.size() && edges[end].key() == edges[begin].key(); ++end) times += edges[end].rising;
-    if (times != 0)
-      sides_.push_back(
-          {hierarchy.local(vertices[edges[begin].low]), hierarchy.local(vertices[edges[begin].high]), double(times)});
+    for (; end < sides.size() && sides[end].edge == sides[begin].edge; ++end) times += sides[end].rising ? 1 : -1;
+    if (times != 0) sides_.push_back({place(sides[begin].low()), place(sides[begin].high()), double(times)});
   }
 }
 

@@ -19,9 +19,7 @@ class Inside {
   /// around it.
   Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh);
 
-  bool hasRims() const { return !rims_.empty(); }
   std::size_t rimSides() const { return rims_.size(); }
-  bool inside(const Vector3& x) const { return winding_.inside(x, level_); }
 
   /// Makes signed ones, in place, of distances to the triangles, with the fewer winding numbers the closer together the
   /// points lie. A point gets the same alone and among others.

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "chunks.h"
+
 namespace hpsdf::distance {
 namespace {
 
@@ -73,8 +75,7 @@ SignChoice chooseSign(const Hierarchy& hierarchy, const Pseudonormals& normals, 
                       const SignedByNormals& distances) {
   const std::vector<Vector3> places = placesToLookAt(hierarchy, normals, box);
   std::vector<double> byNormals(places.size()), byWinding(places.size());
-  tbb::parallel_for(std::size_t{0}, (places.size() + kTogether - 1) / kTogether, [&](std::size_t n) {
-    const std::size_t first = n * kTogether, count = std::min(kTogether, places.size() - first);
+  forEachChunk(places.size(), kTogether, [&](std::size_t, std::size_t first, std::size_t count) {
     const std::span at = std::span(places).subspan(first, count);
     const std::span found = std::span(byNormals).subspan(first, count),
                     other = std::span(byWinding).subspan(first, count);

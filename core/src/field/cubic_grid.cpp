@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "field/chunks.h"
+#include "chunks.h"
 #include "field/random_points.h"
 #include "field/sums.h"
 #include "hpsdf/error.h"

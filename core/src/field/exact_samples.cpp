@@ -9,7 +9,7 @@
 #include <sstream>
 #include <utility>
 
-#include "field/chunks.h"
+#include "chunks.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"
 #include "hpsdf/threads.h"

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <mutex>
 
+#include "chunks.h"
 #include "field/blend.h"
-#include "field/chunks.h"
 #include "field/evaluate.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"

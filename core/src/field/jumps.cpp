@@ -7,8 +7,8 @@
 #include <variant>
 
 #include "basis/legendre.h"
+#include "chunks.h"
 #include "field/blend.h"
-#include "field/chunks.h"
 #include "field/evaluate.h"
 #include "field/leaves.h"
 #include "hpsdf/error.h"

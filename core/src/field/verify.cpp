@@ -8,7 +8,7 @@
 #include <numeric>
 #include <set>
 
-#include "field/chunks.h"
+#include "chunks.h"
 #include "field/evaluate.h"
 #include "field/sums.h"
 #include "hpsdf/error.h"

@@ -6,30 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/sides.h"
+
 namespace hpsdf {
 namespace {
-
-/// One triangle's side, filed under its undirected edge.
-struct Side {
-  std::uint64_t edge;  ///< lower vertex in the high half, higher vertex in the low half
-  std::uint32_t face;
-  bool rising;  ///< runs from the lower to the higher vertex
-};
-
-std::vector<Side> sidesByEdge(const TriangleMesh& mesh) {
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.triangles.size());
-  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-    for (int i = 0; i < 3; ++i) {
-      const std::uint32_t from = mesh.triangles[f][i];
-      const std::uint32_t to = mesh.triangles[f][(i + 1) % 3];
-      if (from == to) continue;  // of a degenerate face: no edge
-      const auto [low, high] = std::minmax(from, to);
-      sides.push_back({std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), from < to});
-    }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.edge < b.edge; });
-  return sides;
-}
 
 /// Disjoint sets of faces (union-find with path halving).
 class FaceSets {
@@ -76,7 +56,7 @@ MeshReport inspect(const TriangleMesh& mesh) {
   report.area = surfaceArea(mesh);
   report.box = boundingBox(mesh);
 
-  const std::vector<Side> sides = sidesByEdge(mesh);
+  const std::vector<Side> sides = sidesByEdge(mesh.triangles);
   FaceSets parts(mesh.triangles.size());
   for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
     while (end < sides.size() && sides[end].edge == sides[begin].edge) {

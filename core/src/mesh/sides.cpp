@@ -1,0 +1,23 @@
+#include "mesh/sides.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace hpsdf {
+
+std::vector<Side> sidesByEdge(std::span<const std::array<std::uint32_t, 3>> triangles) {
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (std::size_t f = 0; f < triangles.size(); ++f)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t from = triangles[f][i];
+      const std::uint32_t to = triangles[f][(i + 1) % 3];
+      if (from == to) continue;  // of a degenerate face: no edge
+      const auto [low, high] = std::minmax(from, to);
+      sides.push_back({std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), from < to});
+    }
+  std::ranges::sort(sides, {}, &Side::edge);
+  return sides;
+}
+
+}  // namespace hpsdf
