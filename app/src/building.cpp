@@ -104,8 +104,6 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
     return prepared;
   }
   ImportedMesh imported = importSurface(console, surface);
-  if (const std::string warning = meshWarning(surface, imported.report); !warning.empty())
-    console.err << "hpsdf: warning: " << warning << std::endl;
   prepared.report = imported.report;
   if (toNormalize) prepared.normalization = normalizing(boundingBox(imported.mesh));
   prepared.mesh = toNormalize ? normalized(imported.mesh) : std::move(imported.mesh);
@@ -139,16 +137,18 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
 DistanceOptions distanceOptions(const Source& source) { return {.sign = source.sign, .thickness = source.thickness}; }
 
 /// Of a closed mesh without folds all expect the sign that it gets.
-void tellSign(const Console& console, const std::string& surface, const SignChoice& choice) {
+void tellSign(const Console& console, const std::string& surface, const MeshReport& report, const SignChoice& choice) {
   if (!choice.reason.empty() && choice.sign != Sign::pseudonormal)
     console.err << fmt::format("hpsdf: {}: sign by winding number: {}", surface, choice.reason) << std::endl;
+  if (choice.reason.empty() && choice.sign == Sign::pseudonormal && !report.closed())
+    console.err << "hpsdf: warning: " << unsureSigns(surface, report) << std::endl;
 }
 
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
-  tellSign(console, surface, exact->signChoice());
+  tellSign(console, surface, *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
 }
 
@@ -389,8 +389,8 @@ std::vector<Parameter> buildParameters() {
                "that do not meet themselves. winding: by how often the faces surround a place, for any mesh; holes are "
                "closed. "
                "unsigned-shell: all is outside but a wall around the faces, --thickness wide, for sheets. auto: "
-               "pseudonormal where the mesh is closed and both agree, else winding, and says why.",
-       .defaultText = "pseudonormal",
+               "pseudonormal where that is certain to be right, else winding, and says why.",
+       .defaultText = "auto",
        .choices = {"auto", "pseudonormal", "winding", "unsigned-shell"}},
       {.name = "thickness",
        .type = ParameterType::number,

@@ -281,7 +281,9 @@ Command buildCommand() {
           "metres "
           "or in millimetres. A hundredth of τ is about a tenth of the RMS error.\n"
           "\n"
-          "Inside and outside are defined for closed meshes; a warning says when yours is not. Ctrl-C stops and writes "
+          "Inside is what the mesh surrounds; where that is not plain, because it has holes or meets itself, a line "
+          "says "
+          "how it is decided (--sign). Ctrl-C stops and writes "
           "no field; with --checkpoint the same command goes on later from where it was. In a script, the field "
           "becomes the current one, and the output may be left out.",
       .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",

@@ -114,8 +114,8 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
                                           grouped(metadata.source.vertices), grouped(metadata.source.faces)));
   else
     rows.emplace_back("Source", metadata.source.name);
-  if (built != nullptr && built->mesh)
-    rows.emplace_back("Surface", built->mesh->closed() ? "closed" : "not closed: signs may be wrong");
+  if (built != nullptr && built->mesh) rows.emplace_back("Surface", closednessText(*built->mesh));
+  if (metadata.source.sign != Sign::automatic) rows.emplace_back("Sign by", signName(metadata.source.sign));
   rows.emplace_back("Leaf cells", grouped(counts.leaves));
   rows.emplace_back("Coefficients",
                     fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));

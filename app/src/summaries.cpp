@@ -141,6 +141,10 @@ std::string strategyName(Strategy strategy) {
   return "hp";
 }
 
+std::string closednessText(const MeshReport& report) {
+  return report.closed() ? "closed" : "not closed: " + faultyEdges(report);
+}
+
 Json meshJson(const std::string& name, const MeshReport& report) {
   return {{"name", name},
           {"vertices", report.vertices},
@@ -165,7 +169,7 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   std::string text = name + "\n";
   text += summaryRow("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
   text += summaryRow("parts", grouped(report.parts));
-  text += summaryRow("surface", report.closed() ? "closed" : "not closed: " + faultyEdges(report));
+  text += summaryRow("surface", closednessText(report));
   text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
   text += summaryRow("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
   if (report.weldedVertices > 0)
@@ -182,8 +186,7 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   return text;
 }
 
-std::string meshWarning(const std::string& name, const MeshReport& report) {
-  if (report.closed()) return {};
+std::string unsureSigns(const std::string& name, const MeshReport& report) {
   return fmt::format(
       "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "
       "without end; --sign auto closes the holes, and a lower max-depth bounds refinement",

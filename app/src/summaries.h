@@ -19,8 +19,13 @@ void printJson(std::ostream& out, const Json& json);
 Json meshJson(const std::string& name, const MeshReport& report);
 std::string meshText(const std::string& name, const MeshReport& report);
 
-/// One line for a mesh whose inside is not defined; "" for a closed one.
-std::string meshWarning(const std::string& name, const MeshReport& report);
+std::string closednessText(const MeshReport& report);
+
+/// As `--sign` has them; "unknown" for `automatic`.
+std::string signName(Sign sign);
+
+/// One line for a mesh that is not closed and yet is to have its sign by pseudonormals.
+std::string unsureSigns(const std::string& name, const MeshReport& report);
 
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);

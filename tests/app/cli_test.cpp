@@ -392,10 +392,16 @@ TEST_F(Cli, analyticShapesAreNormalizedToo) {
 
 TEST_F(Cli, openMeshesAreWarnedAbout) {
   writeFile(at("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const Outcome built =
-      run({{"build", at("open.obj"), "-o", at("f.hpsdf"), "--target-error", "1", "--domain", "-1,-1,-1,2,2,2"}});
-  EXPECT_EQ(built.status, 0) << built.err;
-  EXPECT_THAT(built.err, HasSubstr("open.obj: the surface is not closed (3 boundary"));
+  const auto built = [&](const std::string& sign) {
+    const Outcome outcome = run({{"build", at("open.obj"), "-o", at("f.hpsdf"), "--target-error", "1", "--domain",
+                                  "-1,-1,-1,2,2,2", "--sign", sign}});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(built("pseudonormal"),
+              HasSubstr("warning: " + at("open.obj") + ": the surface is not closed (3 boundary"));
+  EXPECT_THAT(built("auto"), HasSubstr("sign by winding number: 3 edges have a side without a neighbour"));
+  EXPECT_THAT(built("auto"), testing::Not(HasSubstr("warning")));
   const Json mesh = Json::parse(run({{"mesh", at("open.obj"), "--json"}}).out);
   EXPECT_EQ(mesh.at("closed"), false);
   EXPECT_EQ(mesh.at("boundary_edges"), 3);

@@ -249,8 +249,11 @@ void inTwoThreads(std::size_t count, Function function) {
   other.join();
 }
 
+/// For meshes that are not closed: triangles alone, no patches of holes.
+const DistanceOptions kByNormals{.sign = Sign::pseudonormal};
+
 void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& points) {
-  const ExactDistance distance(mesh);
+  const ExactDistance distance(mesh, kByNormals);
   const std::vector<TriangleFrame> frames = framesOf(mesh);
   std::vector<std::pair<double, std::uint32_t>> nearest(points.size());
   inTwoThreads(points.size(), [&](std::size_t i) { nearest[i] = bruteForce(frames, points[i]); });
@@ -383,7 +386,7 @@ TEST(ExactDistance, StacksOfEqualTriangles) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   mesh.triangles.assign(200'000, {0, 1, 2});
-  const ExactDistance distance(mesh);
+  const ExactDistance distance(mesh, kByNormals);
   for (const Vector3& x : {Vector3(0.25, 0.25, 0.5), Vector3(-1, -1, -1), Vector3(2, 0, 0)}) {
     EXPECT_EQ(distance.closestPoint(x).triangle, 0u);
     EXPECT_NEAR(std::abs(distance(x)), triangleReference(x, cornersOf(mesh, 0)), 1e-15);
@@ -585,7 +588,7 @@ TEST(ExactDistance, CollapsedTriangleWithinAMesh) {
 }
 
 TEST(ExactDistance, OneTriangleHasTwoSides) {
-  const ExactDistance distance(TriangleMesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, ""});
+  const ExactDistance distance(TriangleMesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, ""}, kByNormals);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, 2)), 2);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, -2)), -2);
   EXPECT_EQ(distance(Vector3(3, 0, 0)), 2);

@@ -24,7 +24,7 @@ struct ClosestPoint {
 };
 
 struct DistanceOptions {
-  Sign sign = Sign::pseudonormal;
+  Sign sign = Sign::automatic;
   double thickness = 0;  ///< of a shell, in world units: above 0 for one, else 0
   int threads = 0;       ///< at most, 0: all. The result does not depend on them.
 };
@@ -32,22 +32,16 @@ struct DistanceOptions {
 /// Which sign distances have, and why.
 struct SignChoice {
   Sign sign = Sign::pseudonormal;  ///< never automatic
-  std::string reason = {};         ///< half a sentence, such as "the mesh is closed, and …"
-  std::size_t openSides = 0;       ///< of triangles, which no neighbour takes back
-  /// Where pseudonormal and winding number were compared, how often they differed there, and the deepest such place.
-  std::size_t compared = 0, differing = 0;
-  Vector3 deepest = Vector3::Zero();
-  double depth = 0;  ///< its distance to the surface
+  std::string reason = {};         ///< half a sentence, such as "the mesh is closed and does not meet itself"
 };
 
 /// Exact signed distance to a triangle mesh in double precision.
 ///
 /// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time.
 ///
-/// Sign, one of three:
+/// Sign, one of three, or `Sign::automatic`: the first where it is certain to be right, else the second.
 /// * `Sign::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
-/// feature
-///   (Bærentzen & Aanæs 2005): right for closed meshes that do not intersect themselves.
+///   feature (Bærentzen & Aanæs 2005): right for closed meshes that do not meet themselves.
 /// * `Sign::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided as the
 ///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
 ///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.

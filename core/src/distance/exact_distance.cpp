@@ -6,7 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -19,7 +19,6 @@
 #include "distance/triangle_frame.h"
 #include "hpsdf/error.h"
 #include "hpsdf/threads.h"
-#include "mesh/message_prefix.h"
 
 namespace hpsdf {
 namespace {
@@ -27,18 +26,6 @@ namespace {
 using distance::closestParameter;
 using distance::FramePoint;
 using distance::TriangleFrame;
-
-void check(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) throw Error(messagePrefix(mesh) + "no faces; a distance needs at least one triangle");
-  if (mesh.triangles.size() > distance::Hierarchy::kMaxTriangles)
-    throw Error(messagePrefix(mesh) + std::to_string(mesh.triangles.size()) + " faces are more than the " +
-                std::to_string(distance::Hierarchy::kMaxTriangles) + " that a distance takes; simplify the mesh first");
-  requireValidIndices(mesh);
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    if (!mesh.vertices[v].allFinite())
-      throw Error(messagePrefix(mesh) + "vertex " + std::to_string(v + 1) +
-                  " has a coordinate that is not a finite number; repair or export the mesh again");
-}
 
 void check(const DistanceOptions& options) {
   const bool isShell = options.sign == Sign::shell;
@@ -61,11 +48,10 @@ struct ExactDistance::Data {
                            normals = distance::Pseudonormals(hierarchy);
                          });
     choice.sign = options.sign;
-    if (options.sign == Sign::automatic || options.sign == Sign::winding) inside = distance::Inside(hierarchy, mesh);
     if (options.sign == Sign::automatic)
-      choice =
-          chooseSign(hierarchy, normals, source.box, inside, [this](auto points, auto out) { byNormals(points, out); });
-    if (choice.sign != Sign::winding) inside = {};
+      std::tie(choice, inside) = distance::chooseSign(hierarchy, mesh);
+    else if (options.sign == Sign::winding)
+      inside = distance::Inside(hierarchy, mesh);
     source.sign = choice.sign;
   }
 
@@ -130,7 +116,7 @@ struct ExactDistance::Data {
 };
 
 ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options) {
-  check(mesh);
+  distance::requireSurface(mesh);
   check(options);
   data_ = withThreads(options.threads, [&] { return std::make_unique<const Data>(mesh, options); });
 }

@@ -8,11 +8,14 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "distance/float_box.h"
 #include "distance/search.h"
 #include "distance/triangle_tree.h"
+#include "hpsdf/error.h"
+#include "mesh/message_prefix.h"
 
 namespace hpsdf::distance {
 namespace {
@@ -153,6 +156,18 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::v
 }
 
 }  // namespace
+
+void requireSurface(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw Error(messagePrefix(mesh) + "no faces; a distance needs at least one triangle");
+  if (mesh.triangles.size() > Hierarchy::kMaxTriangles)
+    throw Error(messagePrefix(mesh) + std::to_string(mesh.triangles.size()) + " faces are more than the " +
+                std::to_string(Hierarchy::kMaxTriangles) + " that a distance takes; simplify the mesh first");
+  requireValidIndices(mesh);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    if (!mesh.vertices[v].allFinite())
+      throw Error(messagePrefix(mesh) + "vertex " + std::to_string(v + 1) +
+                  " has a coordinate that is not a finite number; repair or export the mesh again");
+}
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
   // halved first: the box of any finite mesh has a finite center, size and scale

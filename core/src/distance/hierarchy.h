@@ -13,6 +13,10 @@
 
 namespace hpsdf::distance {
 
+/// Throws `Error`, naming the mesh, unless a hierarchy can be made of it: it has triangles, not too many, of vertices
+/// that exist, and all coordinates are finite.
+void requireSurface(const TriangleMesh& mesh);
+
 /// The nearest triangle of a point.
 struct Nearest {
   std::uint32_t place = 0;  ///< see `Hierarchy::frameAt`; to start a neighbour's search from
@@ -64,7 +68,7 @@ class Hierarchy {
  public:
   Hierarchy() = default;
 
-  /// At least one triangle and at most `kMaxTriangles`, all indices valid, all coordinates finite. `box`: the mesh's.
+  /// Of what `requireSurface` accepts. `box`: the mesh's.
   Hierarchy(const TriangleMesh& mesh, const Box& box);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;

@@ -1,6 +1,7 @@
 #include "distance/hole_rims.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -9,16 +10,11 @@
 #include "mesh/sides.h"
 
 namespace hpsdf::distance {
-namespace {
+namespace {}  // namespace
 
-double distanceTo(const Vector3& x, const Vector3& a, const Vector3& b) {
-  return (x - a - closestParameter(x, a, b) * (b - a)).norm();
-}
+HoleRims::HoleRims(const Hierarchy& hierarchy) : HoleRims(hierarchy, sidesByEdge(hierarchy.triangles())) {}
 
-}  // namespace
-
-HoleRims::HoleRims(const Hierarchy& hierarchy) {
-  const std::vector<hpsdf::Side> sides = sidesByEdge(hierarchy.triangles());
+HoleRims::HoleRims(const Hierarchy& hierarchy, const std::vector<hpsdf::Side>& sides) {
   const auto place = [&](std::uint32_t vertex) { return hierarchy.local(hierarchy.vertices()[vertex]); };
   for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
     int times = 0;
@@ -27,25 +23,21 @@ HoleRims::HoleRims(const Hierarchy& hierarchy) {
   }
 }
 
-Vector3 HoleRims::gradient(const Vector3& local) const {
-  Vector3 sum = Vector3::Zero();
+HoleRims::Gradient HoleRims::gradient(const Vector3& local) const {
+  Gradient sum{Vector3::Zero(), 0, HUGE_VAL};
   for (const Side& side : sides_) {
-    const Vector3 a = side.from - local, b = side.to - local;
+    const Vector3 a = side.from - local, b = side.to - local, along = b - a;
     const double la = a.norm(), lb = b.norm(), product = la * lb;
     const double below = product * (product + a.dot(b));
-    if (below > 0) sum += side.times * (la + lb) / below * a.cross(b);
+    if (below > 0) sum.value += side.times * (la + lb) / below * a.cross(b);
+    const double nearest = (a + closestParameter(Vector3::Zero(), a, b) * along).norm();
+    // ∫2/r³ along the segment, as if all of it were as near, or it went on to both sides for ever
+    sum.change += 2 * std::abs(side.times) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
+    sum.nearest = std::min(sum.nearest, nearest);
   }
-  return sum / (4 * std::numbers::pi);
-}
-
-double HoleRims::greatestGradient(const Vector3& local, double within) const {
-  double sum = 0;
-  for (const Side& side : sides_) {
-    const double nearest = distanceTo(local, side.from, side.to) - within;
-    if (!(nearest > 0)) return HUGE_VAL;
-    sum += std::abs(side.times) * (side.to - side.from).norm() / (nearest * nearest);
-  }
-  return sum / (4 * std::numbers::pi);
+  sum.value /= 4 * std::numbers::pi;
+  sum.change /= 4 * std::numbers::pi;
+  return sum;
 }
 
 }  // namespace hpsdf::distance

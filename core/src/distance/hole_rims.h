@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "distance/hierarchy.h"
+#include "mesh/sides.h"
 
 namespace hpsdf::distance {
 
@@ -16,15 +17,19 @@ class HoleRims {
  public:
   HoleRims() = default;
   explicit HoleRims(const Hierarchy& hierarchy);
+  /// `sides`: of the hierarchy's triangles.
+  HoleRims(const Hierarchy& hierarchy, const std::vector<hpsdf::Side>& sides);
 
   bool empty() const { return sides_.empty(); }
   std::size_t size() const { return sides_.size(); }
 
-  /// Of the winding number, in the hierarchy's local coordinates, as are all here.
-  Vector3 gradient(const Vector3& local) const;
-
-  /// No gradient is longer within so much of a place; infinite where a rim may be there.
-  double greatestGradient(const Vector3& local, double within) const;
+  /// Of the winding number. Places and lengths are the hierarchy's local ones.
+  struct Gradient {
+    Vector3 value;
+    double change = 0;   ///< so much it changes at most, a way, beside here
+    double nearest = 0;  ///< so far is the nearest rim
+  };
+  Gradient gradient(const Vector3& local) const;
 
   std::size_t bytes() const { return sides_.size() * sizeof(Side); }
 

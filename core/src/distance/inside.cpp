@@ -11,20 +11,8 @@ namespace hpsdf::distance {
 namespace {
 
 constexpr std::size_t kTogether = 512;  // points that learn from each other
-constexpr double kSure = 0.05;          // so exact a winding number tells how far a hole's patch is
-
-struct Ball {
-  Vector3 center;
-  double radius;
-};
-
-Ball around(std::span<const Vector3> points) {
-  Box box;
-  for (const Vector3& x : points) box.extend(x);
-  Ball ball{box.center(), 0};
-  for (const Vector3& x : points) ball.radius = std::max(ball.radius, (x - ball.center).norm());
-  return ball;
-}
+/// So exact a winding number tells how far a hole's patch is: less would be noise that refinement chases.
+constexpr double kExact = 2e-3;
 
 /// By their order; what is no number comes last.
 std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
@@ -42,8 +30,24 @@ struct Inside::Known {
   Vector3 place;
   double free;     ///< no triangle is nearer
   double nearest;  ///< unsigned, patches of holes included
-  double slack;    ///< so far from the level the winding number is at least
   bool inside;
+  double slack;     ///< so far from the level the winding number is at least
+  double gradient;  ///< the winding number's is no longer
+  double change;    ///< nor does it change by more a way
+  double rim;       ///< none is nearer; no less than `free`
+
+  /// What follows for a place of which the distance to the triangles is known. After a way s every rim is at least
+  /// 1 − s/rim times as far, so that what changes with the cube of that does so by no more.
+  Known at(const Vector3& x, double distance) const {
+    const double squaredWay = (x - place).squaredNorm();
+    if (!(squaredWay < 0.998 * free * free)) return {x, distance, distance, inside, 0, 0, 0, 0};
+    const double way = std::sqrt(squaredWay), nearer = 1 - way / rim;
+    const double changes = change / (nearer * nearer * nearer), steepest = gradient + changes * way;
+    return {x, distance, distance, inside, slack - steepest * way, steepest, changes, std::max(rim - way, distance)};
+  }
+
+  /// The sign is certain, and the patch of a hole is farther than the triangles.
+  bool isSettled() const { return slack > 2 * kExact + 1.01 * gradient * free; }
 };
 
 Inside::Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh)
@@ -52,13 +56,25 @@ Inside::Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh)
 }
 
 Inside::Known Inside::find(const Vector3& x, double distance) const {
-  if (!std::isfinite(distance)) return {x, 0, distance, 0, false};
-  if (rims_.empty()) return {x, distance, distance, 0.5, winding_.inside(x, level_)};
-  const Winding::Estimate found = winding_.within(x, kSure);
-  const double away = std::abs(found.value - level_);
-  const bool inside = away > found.error ? found.value > level_ : winding_.inside(x, level_);
-  const double toPatch = away / (rims_.gradient(hierarchy_->local(x)).norm() * hierarchy_->scale());
-  return {x, distance, toPatch < distance ? toPatch : distance, away - found.error, inside};
+  if (!std::isfinite(distance)) return {x, 0, distance, false, 0, 0, 0, 0};
+  if (rims_.empty()) return {x, distance, distance, winding_.inside(x, level_), 0.5, 0, 0, HUGE_VAL};
+  const double scale = hierarchy_->scale();
+  const HoleRims::Gradient rims = rims_.gradient(hierarchy_->local(x));
+  const double gradient = rims.value.norm() * scale;
+  const auto away = [&](const Winding::Estimate& found) { return std::abs(found.value - level_); };
+  const Winding::Estimate found = winding_.within(x, kExact, [&](const Winding::Estimate& estimate) {
+    return away(estimate) - estimate.error > 1.01 * gradient * distance;
+  });
+  const bool inside = away(found) > found.error ? found.value > level_ : winding_.inside(x, level_);
+  const double toPatch = away(found) / gradient;
+  return {x,
+          distance,
+          toPatch < distance ? toPatch : distance,
+          inside,
+          away(found) - found.error,
+          gradient,
+          rims.change * scale * scale,
+          rims.nearest / scale};
 }
 
 void Inside::sign(std::span<const Vector3> points, std::span<double> distances) const {
@@ -71,26 +87,15 @@ void Inside::sign(std::span<const Vector3> points, std::span<double> distances) 
 
 void Inside::signTogether(std::span<const Vector3> points, std::span<double> distances,
                           std::vector<Known>& known) const {
-  const Ball ball = around(points);
-  const double scale = hierarchy_->scale();
-  const double greatest =
-      rims_.empty() ? 0 : scale * rims_.greatestGradient(hierarchy_->local(ball.center), scale * ball.radius);
   known.clear();
-  // Those first that are farthest from the triangles: around each of them, as far as its distance goes, there is none,
-  // so that the winding number changes there by no more than the greatest gradient times the way.
+  // Those first that are farthest from the triangles: they tell the most others, and the more certainly the nearer.
   for (const std::uint32_t i : farthestFirst(distances)) {
-    const Vector3& x = points[i];
-    const double distance = distances[i];
-    const auto slackFrom = [&](const Known& other) { return other.slack - greatest * (x - other.place).norm(); };
-    const auto tells = [&](const Known& other) {
-      // the sign is the same, and the patch of a hole is farther than the triangles
-      return (x - other.place).squaredNorm() < 0.999 * other.free * other.free &&
-             slackFrom(other) > 2 * kSure + 1.01 * greatest * distance;
-    };
-    const auto other = std::ranges::find_if(known, tells);
-    known.push_back(other == known.end() ? find(x, distance)
-                                         : Known{x, distance, distance, slackFrom(*other), other->inside});
-    distances[i] = known.back().inside ? -known.back().nearest : known.back().nearest;
+    Known here = {points[i], distances[i], distances[i], false, 0, 0, 0, 0};
+    for (const Known& other : known)
+      if (here = other.at(points[i], distances[i]); here.isSettled()) break;
+    if (!here.isSettled()) here = find(points[i], distances[i]);
+    known.push_back(here);
+    distances[i] = here.inside ? -here.nearest : here.nearest;
   }
 }
 

@@ -19,8 +19,6 @@ class Inside {
   /// around it.
   Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh);
 
-  std::size_t rimSides() const { return rims_.size(); }
-
   /// Makes signed ones, in place, of distances to the triangles, with the fewer winding numbers the closer together the
   /// points lie. A point gets the same alone and among others.
   void sign(std::span<const Vector3> points, std::span<double> distances) const;

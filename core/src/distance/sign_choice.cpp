@@ -1,66 +1,22 @@
 #include "distance/sign_choice.h"
 
-#include <tbb/parallel_for.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <numeric>
+#include <optional>
 #include <sstream>
-#include <utility>
+#include <string>
+#include <vector>
 
-#include "chunks.h"
+#include "distance/crossings.h"
+#include "mesh/face_sets.h"
+#include "mesh/sides.h"
 
 namespace hpsdf::distance {
 namespace {
 
-constexpr int kLattice = 16;                              // places along each axis
-constexpr std::uint32_t kBent = 512, kEverywhere = 1024;  // at most, of which both sides are looked at
-constexpr double kBeside = 1e-4;                          // of the box's diagonal: so far from a triangle
-constexpr std::size_t kTogether = 16;                     // places of one batch
-
-/// The cosine of the greatest angle between a triangle's normal and those of its corners: below 0 where the surface
-/// folds over.
-double straightness(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot) {
-  double least = 1;
-  for (const std::uint32_t vertex : hierarchy.triangles()[slot])
-    least = std::min(least, hierarchy.frames()[slot].normal.dot(normals.ofVertex(vertex).stableNormalized()));
-  return least;
-}
-
-/// Some all over the mesh, and those that are bent most.
-std::vector<std::uint32_t> trianglesToLookAt(const Hierarchy& hierarchy, const Pseudonormals& normals) {
-  const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
-  std::vector<double> straight(count);
-  tbb::parallel_for(std::uint32_t{0}, count,
-                    [&](std::uint32_t slot) { straight[slot] = straightness(hierarchy, normals, slot); });
-  std::vector<std::uint32_t> slots(count);
-  std::iota(slots.begin(), slots.end(), 0u);
-  const auto bent = slots.begin() + std::min(count, kBent);
-  std::ranges::partial_sort(slots, bent, {}, [&](std::uint32_t slot) { return std::pair(straight[slot], slot); });
-  slots.erase(bent, slots.end());
-  for (std::uint32_t slot = 0; slot < count; slot += 1 + (count - 1) / kEverywhere) slots.push_back(slot);
-  return slots;
-}
-
-/// The lattice is off the planes of symmetry, where features of the mesh are likely to be.
-std::vector<Vector3> placesToLookAt(const Hierarchy& hierarchy, const Pseudonormals& normals, const Box& box) {
-  std::vector<Vector3> places;
-  const Vector3 size = box.sizes();
-  for (int z = 0; z < kLattice; ++z)
-    for (int y = 0; y < kLattice; ++y)
-      for (int x = 0; x < kLattice; ++x)
-        places.push_back(box.min() + size.cwiseProduct((Vector3(x, y, z) + Vector3(0.47, 0.53, 0.51)) / kLattice));
-  for (const std::uint32_t slot : trianglesToLookAt(hierarchy, normals)) {
-    const auto& [a, b, c] = hierarchy.triangles()[slot];
-    const Vector3 middle = (hierarchy.vertices()[a] + hierarchy.vertices()[b] + hierarchy.vertices()[c]) / 3;
-    const Vector3 aside = kBeside * size.norm() * hierarchy.frames()[slot].normal;
-    places.push_back(middle + aside);
-    places.push_back(middle - aside);
-  }
-  return places;
-}
+constexpr int kLattice = 16;  // places along each axis
 
 std::string textOf(const Vector3& x) {
   std::ostringstream text;
@@ -69,44 +25,99 @@ std::string textOf(const Vector3& x) {
   return text.str();
 }
 
+/// Whether these places are inside, each by a winding number of its own: by distances of 0 they tell each other
+/// nothing.
+std::vector<bool> areInside(const Inside& inside, const std::vector<Vector3>& places) {
+  std::vector<double> distances(places.size());
+  inside.sign(places, distances);
+  std::vector<bool> result;
+  for (const double distance : distances) result.push_back(std::signbit(distance));
+  return result;
+}
+
+/// Whether an open mesh has an inside at any place of a lattice, which reaches beyond it, for it may be flat.
+bool surroundsAny(const Inside& inside, const Box& mesh) {
+  const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
+  const Box box(mesh.min() - beyond, mesh.max() + beyond);
+  std::vector<Vector3> places;
+  const Vector3 size = box.sizes();
+  for (int z = 0; z < kLattice; ++z)
+    for (int y = 0; y < kLattice; ++y)
+      for (int x = 0; x < kLattice; ++x)
+        places.push_back(box.min() + size.cwiseProduct((Vector3(x, y, z) + Vector3::Constant(0.5)) / kLattice));
+  const std::vector<bool> found = areInside(inside, places);
+  return std::ranges::find(found, true) != found.end();
+}
+
+/// The greatest triangle of each piece of the surface, by their slots.
+std::vector<std::uint32_t> greatestOfPieces(const Hierarchy& hierarchy, const std::vector<Side>& sides) {
+  const auto frames = hierarchy.frames();
+  FaceSets pieces(frames.size());
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].edge == sides[begin].edge) ++end;
+    if (end - begin == 2 && sides[begin].rising != sides[begin + 1].rising)
+      pieces.join(sides[begin].face, sides[begin + 1].face);
+  }
+  const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
+  std::vector<std::uint32_t> greatest(frames.size());
+  for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
+    const std::uint32_t first = pieces.first(slot);  // no later than this one
+    if (first == slot || area(slot) > area(greatest[first])) greatest[first] = slot;
+  }
+  std::vector<std::uint32_t> slots;
+  for (std::uint32_t slot = 0; slot < frames.size(); ++slot)
+    if (pieces.first(slot) == slot) slots.push_back(greatest[slot]);
+  return slots;
+}
+
+/// A place on a piece of the surface that has not the outside before it and the inside behind it.
+std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<std::uint32_t>& pieces,
+                                 const Inside& inside, const Box& box) {
+  const double largest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  const double aside = 1e-9 * box.sizes().norm() + 1e-14 * largest;  // beyond what rounds
+  std::vector<Vector3> middles, before, behind;
+  for (const std::uint32_t slot : pieces) {
+    const TriangleFrame& frame = hierarchy.frames()[slot];
+    if (!hasArea(frame)) continue;
+    const auto& [a, b, c] = hierarchy.triangles()[slot];
+    middles.push_back((hierarchy.vertices()[a] + hierarchy.vertices()[b] + hierarchy.vertices()[c]) / 3);
+    before.push_back(middles.back() + aside * frame.normal);
+    behind.push_back(middles.back() - aside * frame.normal);
+  }
+  const std::vector<bool> inFront = areInside(inside, before), inBack = areInside(inside, behind);
+  for (std::size_t i = 0; i < middles.size(); ++i)
+    if (inFront[i] || !inBack[i]) return middles[i];
+  return std::nullopt;
+}
+
 }  // namespace
 
-SignChoice chooseSign(const Hierarchy& hierarchy, const Pseudonormals& normals, const Box& box, const Inside& inside,
-                      const SignedByNormals& distances) {
-  const std::vector<Vector3> places = placesToLookAt(hierarchy, normals, box);
-  std::vector<double> byNormals(places.size()), byWinding(places.size());
-  forEachChunk(places.size(), kTogether, [&](std::size_t, std::size_t first, std::size_t count) {
-    const std::span at = std::span(places).subspan(first, count);
-    const std::span found = std::span(byNormals).subspan(first, count),
-                    other = std::span(byWinding).subspan(first, count);
-    distances(at, found);
-    std::ranges::transform(found, other.begin(), [](double d) { return std::abs(d); });
-    inside.sign(at, other);
-  });
-
-  SignChoice choice{.openSides = inside.rimSides(), .compared = places.size()};
-  bool surrounds = false;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    surrounds |= byWinding[i] < 0;
-    if ((byNormals[i] < 0) == (byWinding[i] < 0)) continue;
-    ++choice.differing;
-    if (std::abs(byNormals[i]) <= choice.depth) continue;
-    choice.depth = std::abs(byNormals[i]);
-    choice.deepest = places[i];
+std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
+  const auto byWinding = [](std::string reason, Inside inside) {
+    return std::pair(SignChoice{Sign::winding, std::move(reason)}, std::move(inside));
+  };
+  const Box box = boundingBox(mesh);
+  const std::vector<Side> sides = sidesByEdge(hierarchy.triangles());
+  if (const std::size_t open = HoleRims(hierarchy, sides).size(); open > 0) {
+    Inside inside(hierarchy, mesh);
+    std::string reason = std::to_string(open) + (open == 1 ? " edge has" : " edges have");
+    reason += " a side without a neighbour, and ";
+    reason += surroundsAny(inside, box)
+                  ? "holes are closed where the winding number is 1/2"
+                  : "the faces surround nothing that was found: a shell would give them a thickness";
+    return byWinding(std::move(reason), std::move(inside));
   }
-  choice.sign = choice.openSides > 0 || choice.differing > 0 ? Sign::winding : Sign::pseudonormal;
-  const std::string sides = std::to_string(choice.openSides) + (choice.openSides == 1 ? " side" : " sides");
-  if (choice.openSides > 0 && surrounds)
-    choice.reason = sides + " of faces have no neighbour, and holes are closed where the winding number is 1/2";
-  else if (choice.openSides > 0)
-    choice.reason = sides +
-                    " of faces have no neighbour, and they surround nothing that was found: a shell would give "
-                    "them a thickness";
-  else if (choice.differing > 0)
-    choice.reason = "the faces overlap or fold over, so that normals mislead, as at " + textOf(choice.deepest);
-  else
-    choice.reason = "the mesh is closed, and winding numbers agree wherever they were compared";
-  return choice;
+  if (const Crossings crossings = findCrossings(hierarchy, 1); !crossings.found.empty())
+    return byWinding("the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place),
+                     Inside(hierarchy, mesh));
+  const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
+  if (pieces.size() > 1) {
+    Inside inside(hierarchy, mesh);
+    if (const auto place = misplaced(hierarchy, pieces, inside, box))
+      return byWinding("a part lies within another, and looks the same way, as at " + textOf(*place),
+                       std::move(inside));
+  }
+  return {SignChoice{Sign::pseudonormal, "the mesh is closed and does not meet itself"}, Inside()};
 }
 
 }  // namespace hpsdf::distance

@@ -1,21 +1,18 @@
 #pragma once
 
-#include <functional>
-#include <span>
-#include <vector>
+#include <utility>
 
 #include "distance/inside.h"
-#include "distance/pseudonormals.h"
 #include "hpsdf/exact_distance.h"
 
 namespace hpsdf::distance {
 
-/// Many distances at once, signed by pseudonormals.
-using SignedByNormals = std::function<void(std::span<const Vector3>, std::span<double>)>;
-
-/// Which sign suits a mesh: the pseudonormal's, if the mesh is closed and the winding number says the same on a lattice
-/// and on both sides of some triangles, those first at whose corners the surface is bent most.
-SignChoice chooseSign(const Hierarchy& hierarchy, const Pseudonormals& normals, const Box& box, const Inside& inside,
-                      const SignedByNormals& distances);
+/// Which sign suits a mesh: the pseudonormal's where it is certain to be that of the winding number, which is cheaper
+/// to trust than to ask; and what gives the sign, if it is not that.
+///
+/// It is certain (Bærentzen & Aanæs 2005) of a mesh that has no rim and does not meet itself, if every piece of its
+/// surface has the outside before it and the inside behind it. Pieces are what hangs together by edges of two faces:
+/// along one of them neither changes.
+std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh);
 
 }  // namespace hpsdf::distance

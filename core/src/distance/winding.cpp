@@ -13,9 +13,6 @@ namespace {
 /// Of one cluster, at each level. Some hundred clusters make a sum.
 constexpr std::array<double, Winding::kLevels> kErrors = {1e-2, 5e-4, 2e-5, 5e-7};
 
-/// The rounding of a sum of up to `Hierarchy::kMaxTriangles` angles, with room to spare.
-constexpr double kRounding = 1e-7;
-
 double square(double x) { return x * x; }
 
 /// See `Winding`; `ratio` is t. Too great for any use where the series need not converge.
@@ -35,11 +32,34 @@ double squaredReach(double area, double radius, double error) {
   return low > 0 ? square(radius / low) : HUGE_VAL;
 }
 
-/// Half of the solid angle of a triangle with these corners, seen from the origin (van Oosterom and Strackee 1983);
-/// above 0 where the origin is behind it.
-double halfAngle(const Vector3& a, const Vector3& b, const Vector3& c) {
-  const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+/// A sum of angles, by the product of complex numbers that have them: one arc tangent at its end, and a count of whole
+/// turns.
+class AngleSum {
+ public:
+  /// The angle of x + iy, in (−π, π].
+  void add(double x, double y) {
+    if (x == 0 && y == 0) return;
+    const double real = real_ * x - imaginary_ * y, imaginary = real_ * y + imaginary_ * x + 0.0;  // no −0
+    if (y > 0 && imaginary_ >= 0 && imaginary < 0) ++turns_;
+    if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
+    const double size = std::abs(real) + std::abs(imaginary);
+    const double scale = size < 1e-100 ? 1e100 : size > 1e100 ? 1e-100 : 1;
+    real_ = scale * real;
+    imaginary_ = scale * imaginary;
+  }
+
+  double value() const { return std::atan2(imaginary_, real_) + 2 * std::numbers::pi * turns_; }
+
+ private:
+  double real_ = 1, imaginary_ = 0;
+  int turns_ = 0;
+};
+
+/// Adds half of the solid angle of a triangle with these corners, seen from the origin (van Oosterom and Strackee
+/// 1983); above 0 where the origin is behind it.
+void addHalfAngle(const Vector3& a, const Vector3& b, const Vector3& c, AngleSum& sum) {
+  const double la = a.norm(), lb = b.norm(), lc = c.norm(), product = la * lb * lc;
+  if (product > 0) sum.add(1 + (a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / product, a.dot(b.cross(c)) / product);
 }
 
 }  // namespace
@@ -153,17 +173,17 @@ Winding::Winding(const Hierarchy& hierarchy) : hierarchy_(&hierarchy), vertices_
 }
 
 double Winding::sum(const Vector3& local, std::uint32_t begin, std::uint32_t end) const {
-  double angles = 0;
+  AngleSum angles;
   for (std::uint32_t slot = begin; slot < end; ++slot) {
     const auto& [a, b, c] = hierarchy_->triangles()[slot];
-    angles += halfAngle(vertices_[a] - local, vertices_[b] - local, vertices_[c] - local);
+    addHalfAngle(vertices_[a] - local, vertices_[b] - local, vertices_[c] - local, angles);
   }
-  return angles / (2 * std::numbers::pi);
+  return angles.value() / (2 * std::numbers::pi);
 }
 
 Winding::Estimate Winding::estimate(const Vector3& x, int level) const {
   const Vector3 local = hierarchy_->local(x);
-  Estimate all;
+  Estimate all{0, kRounding};
   double series = 0;
   for (std::size_t n = 0; n < places_.size();) {
     const Place& place = places_[n];
@@ -185,21 +205,9 @@ double Winding::exact(const Vector3& x) const {
   return sum(hierarchy_->local(x), 0, static_cast<std::uint32_t>(hierarchy_->triangles().size()));
 }
 
-Winding::Estimate Winding::within(const Vector3& x, double error) const {
-  for (int level = 0; level < kLevels; ++level) {
-    Estimate found = estimate(x, level);
-    found.error += kRounding;
-    if (found.error <= error) return found;
-  }
-  return {exact(x), kRounding};
-}
-
 bool Winding::inside(const Vector3& x, double above) const {
-  for (int level = 0; level < kLevels; ++level) {
-    const Estimate found = estimate(x, level);
-    if (std::abs(found.value - above) > found.error + kRounding) return found.value > above;
-  }
-  return exact(x) > above;
+  const auto tells = [&](const Estimate& found) { return std::abs(found.value - above) > found.error; };
+  return within(x, 0, tells).value > above;
 }
 
 std::size_t Winding::bytes() const {

@@ -30,8 +30,11 @@ class Winding {
 
   struct Estimate {
     double value = 0;
-    double error = 0;  ///< so far from the exact sum at most, but for rounding
+    double error = 0;  ///< so far from the exact sum at most
   };
+
+  /// The rounding of a sum of up to `Hierarchy::kMaxTriangles` angles, with room to spare.
+  static constexpr double kRounding = 1e-7;
 
   /// Level 0 is the coarsest.
   static constexpr int kLevels = 4;
@@ -40,8 +43,13 @@ class Winding {
   /// The sum over all triangles, in the hierarchy's order.
   double exact(const Vector3& x) const;
 
-  /// By the coarsest level whose error is no more, or the sum itself.
-  Estimate within(const Vector3& x, double error) const;
+  /// By the coarsest level whose error is no more, or that is enough otherwise, or the sum itself.
+  template <typename Enough>
+  Estimate within(const Vector3& x, double error, Enough isEnough) const {
+    for (int level = 0; level < kLevels; ++level)
+      if (const Estimate found = estimate(x, level); found.error <= error || isEnough(found)) return found;
+    return {exact(x), kRounding};
+  }
 
   /// Whether the exact sum is above this: by the coarsest level that can tell, or the sum itself.
   bool inside(const Vector3& x, double above = 0.5) const;

@@ -2,41 +2,13 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
-#include <utility>
 #include <vector>
 
+#include "mesh/face_sets.h"
 #include "mesh/sides.h"
 
 namespace hpsdf {
 namespace {
-
-/// Disjoint sets of faces (union-find with path halving).
-class FaceSets {
- public:
-  explicit FaceSets(std::size_t faces) : parent_(faces), sets_(faces) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-  }
-
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    parent_[std::max(a, b)] = std::min(a, b);
-    --sets_;
-  }
-
-  std::size_t count() const { return sets_; }
-
- private:
-  std::uint32_t root(std::uint32_t face) {
-    while (parent_[face] != face) face = parent_[face] = parent_[parent_[face]];
-    return face;
-  }
-
-  std::vector<std::uint32_t> parent_;
-  std::size_t sets_;
-};
 
 std::size_t countUsedVertices(const TriangleMesh& mesh) {
   std::vector<bool> used(mesh.vertices.size(), false);

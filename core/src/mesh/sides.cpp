@@ -1,7 +1,10 @@
 #include "mesh/sides.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace hpsdf {
 
@@ -16,7 +19,9 @@ std::vector<Side> sidesByEdge(std::span<const std::array<std::uint32_t, 3>> tria
       const auto [low, high] = std::minmax(from, to);
       sides.push_back({std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), from < to});
     }
-  std::ranges::sort(sides, {}, &Side::edge);
+  tbb::parallel_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::pair(a.edge, a.face) < std::pair(b.edge, b.face);
+  });
   return sides;
 }
 

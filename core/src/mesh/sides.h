@@ -17,7 +17,7 @@ struct Side {
   std::uint32_t high() const { return static_cast<std::uint32_t>(edge); }
 };
 
-/// All sides but those between equal vertices, those of one edge side by side.
+/// All sides but those between equal vertices, those of one edge side by side, by their faces.
 std::vector<Side> sidesByEdge(std::span<const std::array<std::uint32_t, 3>> triangles);
 
 }  // namespace hpsdf

@@ -1,0 +1,231 @@
+// Where a mesh meets itself: against separating axes in whole numbers, and on meshes that are known.
+
+#include "hpsdf/crossings.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/mesh_import.h"
+#include "hpsdf/shapes.h"
+#include "hpsdf/threads.h"
+#include "mesh/orientation.h"
+#include "support/test_mesh.h"
+
+namespace hpsdf {
+namespace {
+
+using Whole = std::array<std::int64_t, 3>;
+
+Whole minus(const Whole& a, const Whole& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+std::int64_t dot(const Whole& a, const Whole& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Whole cross(const Whole& a, const Whole& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// Whether two convex sets, triangles or segments, have no point in common: a plane lies between them that stands on
+/// one of few directions.
+bool apart(const std::vector<Whole>& one, const std::vector<Whole>& other) {
+  std::vector<Whole> normals, edges, directions;
+  for (const auto* set : {&one, &other}) {
+    for (std::size_t i = 0; i < set->size(); ++i) edges.push_back(minus((*set)[(i + 1) % set->size()], (*set)[i]));
+    if (set->size() == 3) normals.push_back(cross(minus((*set)[1], (*set)[0]), minus((*set)[2], (*set)[0])));
+  }
+  directions = edges;
+  for (const Whole& n : normals) {
+    directions.push_back(n);
+    for (const Whole& e : edges) directions.push_back(cross(n, e));
+  }
+  for (const Whole& e : edges)
+    for (const Whole& f : edges) directions.push_back(cross(e, f));
+  return std::ranges::any_of(directions, [&](const Whole& direction) {
+    const auto range = [&](const std::vector<Whole>& set) {
+      std::int64_t low = INT64_MAX, high = INT64_MIN;
+      for (const Whole& x : set) {
+        low = std::min(low, dot(direction, x));
+        high = std::max(high, dot(direction, x));
+      }
+      return std::pair(low, high);
+    };
+    const auto [low, high] = range(one);
+    const auto [otherLow, otherHigh] = range(other);
+    return high < otherLow || otherHigh < low;
+  });
+}
+
+Vector3 inSpace(const Whole& x) { return {double(x[0]), double(x[1]), double(x[2])}; }
+
+TriangleMesh meshOf(const std::vector<Whole>& corners, std::array<std::uint32_t, 3> second) {
+  TriangleMesh mesh;
+  for (const Whole& x : corners) mesh.vertices.push_back(inSpace(x));
+  mesh.triangles = {{0, 1, 2}, second};
+  return mesh;
+}
+
+/// Pairs of triangles in a small grid, where points are often in a line or a plane.
+class GridPairs {
+ public:
+  Whole place() {
+    std::uniform_int_distribution<std::int64_t> whole(0, 3);
+    const std::int64_t x = whole(random_), y = whole(random_), z = whole(random_);
+    return {x, y, z};
+  }
+
+  /// Different ones that make triangles with an area: the first three, and `second`.
+  std::vector<Whole> places(std::size_t count, std::array<std::uint32_t, 3> second) {
+    for (;;) {
+      std::vector<Whole> all;
+      while (all.size() < count) {
+        const Whole x = place();
+        if (std::ranges::find(all, x) == all.end()) all.push_back(x);
+      }
+      const auto hasArea = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+        return cross(minus(all[b], all[a]), minus(all[c], all[a])) != Whole{0, 0, 0};
+      };
+      if (hasArea(0, 1, 2) && hasArea(second[0], second[1], second[2])) return all;
+    }
+  }
+
+ private:
+  std::mt19937_64 random_{7};
+};
+
+bool meet(const TriangleMesh& mesh) { return !findCrossings(mesh).found.empty(); }
+
+TEST(Crossings, OfStrangersAreThoseThatNoPlaneParts) {
+  GridPairs pairs;
+  int meeting = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto x = pairs.places(6, {3, 4, 5});
+    const bool expected = !apart({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
+    ASSERT_EQ(meet(meshOf(x, {3, 4, 5})), expected) << i;
+    meeting += expected;
+  }
+  EXPECT_GT(meeting, 4000);
+  EXPECT_LT(meeting, 16'000);
+}
+
+TEST(Crossings, OfNeighboursAtACornerAreThoseElsewhere) {
+  GridPairs pairs;
+  int meeting = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto x = pairs.places(5, {3, 1, 4});
+    const bool expected = !apart({x[0], x[2]}, {x[3], x[1], x[4]}) || !apart({x[3], x[4]}, {x[0], x[1], x[2]});
+    ASSERT_EQ(meet(meshOf(x, {3, 1, 4})), expected) << i;
+    meeting += expected;
+  }
+  EXPECT_GT(meeting, 2000);
+  EXPECT_LT(meeting, 18'000);
+}
+
+TEST(Crossings, OfNeighboursAtASideAreFoldedFlat) {
+  GridPairs pairs;
+  int meeting = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto x = pairs.places(4, {2, 1, 3});
+    const Whole side = minus(x[2], x[1]), normal = cross(side, minus(x[0], x[1]));
+    const bool flat = dot(normal, minus(x[3], x[1])) == 0;
+    const bool expected = flat && dot(cross(side, minus(x[3], x[1])), normal) > 0;
+    ASSERT_EQ(meet(meshOf(x, {2, 1, 3})), expected) << i;
+    meeting += expected;
+  }
+  EXPECT_GT(meeting, 200);
+}
+
+TEST(Crossings, AreDecidedWithoutRounding) {
+  // Far from the origin, corners one unit in the last place above a plane, in it and below it.
+  const Vector3 a(1e6, 1e6 + 1, 1e6), b(1e6 + 3, 1e6, 1e6 + 1), c(1e6 + 1, 1e6 + 5, 1e6 + 2);
+  const Vector3 inPlane = a + 0.5 * (b - a) + 0.25 * (c - a);  // a multiple of 1/4 in each coordinate
+  EXPECT_EQ(orientation(a, b, c, inPlane), 0);
+  for (int k = 0; k < 3; ++k) {
+    Vector3 above = inPlane, below = inPlane;
+    above[k] = std::nextafter(above[k], HUGE_VAL);
+    below[k] = std::nextafter(below[k], -HUGE_VAL);
+    EXPECT_EQ(orientation(a, b, c, above) * orientation(a, b, c, below), -1) << k;
+    EXPECT_EQ(orientation(a, b, c, above), (b - a).cross(c - a)[k] > 0 ? 1 : -1) << k;
+    EXPECT_EQ(orientation(b, a, c, above), -orientation(a, b, c, above)) << k;
+  }
+  EXPECT_EQ(orientation(std::array{0, 1}, a, b, Vector3(a + 0.5 * (b - a))), 0);
+}
+
+TEST(Crossings, OfMeshesThatAreEmbeddedAreNone) {
+  for (const char* shape : {"builtin:gear", "builtin:torus", "builtin:box", "builtin:sphere"}) {
+    const Crossings crossings = findCrossings(shapes::mesh(shape));
+    EXPECT_TRUE(crossings.found.empty()) << shape;
+    EXPECT_TRUE(crossings.all);
+  }
+}
+
+/// Two spheres that pass through each other.
+TriangleMesh lens() {
+  TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
+  const auto count = static_cast<std::uint32_t>(mesh.vertices.size());
+  const auto faces = mesh.triangles;
+  for (std::uint32_t v = 0; v < count; ++v) mesh.vertices.push_back(mesh.vertices[v] + Vector3(1, 0.01, 0.02));
+  for (const auto& [a, b, c] : faces) mesh.triangles.push_back({a + count, b + count, c + count});
+  return mesh;
+}
+
+TEST(Crossings, LieWhereTheSurfacesPass) {
+  const TriangleMesh mesh = lens();
+  const auto half = static_cast<std::uint32_t>(mesh.triangles.size() / 2);
+  const Crossings crossings = findCrossings(mesh);
+  EXPECT_TRUE(crossings.all);
+  EXPECT_GT(crossings.found.size(), 50u);
+  for (const Crossing& crossing : crossings.found) {
+    EXPECT_LT(crossing.triangles[0], half);
+    EXPECT_GE(crossing.triangles[1], half);
+    EXPECT_NEAR(crossing.place.x(), 0.5, 0.15);
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(crossings.found, {}, &Crossing::triangles));
+}
+
+TEST(Crossings, AreTheSameForAnyThreadsAndEndAtTheirLimit) {
+  const TriangleMesh mesh = lens();
+  const auto trianglesOf = [&](int threads, std::size_t limit) {
+    const Crossings crossings = withThreads(threads, [&] { return findCrossings(mesh, limit); });
+    std::vector<std::array<std::uint32_t, 2>> triangles;
+    for (const Crossing& crossing : crossings.found) triangles.push_back(crossing.triangles);
+    EXPECT_EQ(crossings.all, limit > 1000);
+    return triangles;
+  };
+  EXPECT_EQ(trianglesOf(1, 1'000'000), trianglesOf(4, 1'000'000));
+  const auto some = trianglesOf(1, 10), all = trianglesOf(1, 1'000'000);
+  EXPECT_EQ(some, trianglesOf(3, 10));
+  EXPECT_GE(some.size(), 10u);
+  EXPECT_LT(some.size(), all.size());
+  EXPECT_TRUE(std::ranges::includes(all, some));
+}
+
+TEST(Crossings, AreFoundAtAnyScale) {
+  for (const double scale : {1e-90, 1e-20, 1e20, 1e90}) {
+    TriangleMesh mesh = lens();
+    const std::size_t count = findCrossings(mesh).found.size();
+    for (Vector3& x : mesh.vertices) x *= scale;
+    EXPECT_NEAR(double(findCrossings(mesh).found.size()), double(count), 4) << scale;
+    EXPECT_NEAR(findCrossings(mesh).found[0].place.x() / scale, 0.5, 0.15);
+  }
+}
+
+TEST(Crossings, OfTheSameTriangleTwiceIsOne) {
+  EXPECT_TRUE(meet(meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 2, 1})));
+  EXPECT_FALSE(meet(meshOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 2, 1}))) << "without area";
+}
+
+TEST(Crossings, NeedASurface) { EXPECT_THROW(findCrossings({}), Error); }
+
+TEST(Crossings, OfRealMeshesAreWhereTheyAreKnown) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  const auto crossings = [](const char* file) { return findCrossings(importMesh(support::testMesh(file)).mesh); };
+  EXPECT_TRUE(crossings("paper/bunny_69k.obj").found.empty());
+  EXPECT_FALSE(crossings("broken/self_intersectA.obj").found.empty());
+}
+
+}  // namespace
+}  // namespace hpsdf
