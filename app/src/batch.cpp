@@ -198,12 +198,12 @@ class Batch {
     }
   }
 
-  /// The claim is ours: what other processes left beside it is abandoned, whatever machine they were on.
+  /// The claim is ours: what others have left half-written is abandoned, whatever machine they were on.
   CurrentField built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    OutputFile::removeAbandoned(output);
-    OutputFile::removeAbandoned(recordOf(mesh));
+    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
+      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
     // before the mesh is read: if it changes in between, the next run sees that
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;

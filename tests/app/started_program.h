@@ -105,10 +105,11 @@ class Process {
     }
   }
 
-  /// Until standard error holds this, or it has ended.
-  void waitForError(const std::string& text) {
-    while (outcome_.err.find(text) == std::string::npos && readSome()) {
-    }
+  /// Until standard error holds this, or it has ended; whether it does.
+  bool waitForError(const std::string& text) {
+    while (outcome_.err.find(text) == std::string::npos)
+      if (!readSome()) return false;
+    return true;
   }
 
   /// Until so many lines have come out, or it has ended.
@@ -130,7 +131,6 @@ class Process {
     in_ = -1;
   }
 
-  pid_t id() const { return id_; }
   void send(int signal) { kill(id_, signal); }
 
   bool hasEnded() const {
