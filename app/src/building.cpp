@@ -169,18 +169,6 @@ bool isMadeFrom(const Source& given, const Source& source) {
   return given.fingerprint == source.fingerprint && (source.fingerprint != 0 || given.name == source.name);
 }
 
-/// Everything that decides what a construction comes to, whatever an argument is for.
-std::string decidingArguments(const Arguments& arguments) {
-  std::string text;
-  for (const Parameter& parameter : buildParameters()) {
-    if (parameter.name == "threads" || !arguments.has(parameter.name)) continue;
-    const std::vector<double> numbers = arguments.numbers(parameter.name);
-    text += fmt::format("{}={}\n", parameter.name,
-                        numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));
-  }
-  return text;
-}
-
 Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
   Checkpoint checkpoint{.file = file, .seconds = arguments.number("checkpoint-seconds")};
   checkpoint.about = decidingArguments(arguments);
@@ -522,6 +510,25 @@ BuildOptions buildOptions(const Arguments& arguments) {
   options.threads = arguments.whole("threads");
   return options;
 }
+
+void requireConsistent(const Arguments& arguments) {
+  const Box any(Vector3::Constant(-1), Vector3::Constant(1));
+  distanceOptions(arguments);
+  checkBuild(domainOf(arguments, any), buildOptions(arguments));
+}
+
+std::string decidingArguments(const Arguments& arguments) {
+  std::string text;
+  for (const Parameter& parameter : buildParameters()) {
+    if (parameter.name == "threads" || !arguments.has(parameter.name)) continue;
+    const std::vector<double> numbers = arguments.numbers(parameter.name);
+    text += fmt::format("{}={}\n", parameter.name,
+                        numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));
+  }
+  return text;
+}
+
+std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   try {

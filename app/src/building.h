@@ -34,6 +34,15 @@ Parameter continuityWeightParameter();
 /// The options that such arguments ask for. --paper gives way to what is written beside it.
 BuildOptions buildOptions(const Arguments& arguments);
 
+/// Throws `Error` for arguments of `buildParameters` that no surface could be built with.
+void requireConsistent(const Arguments& arguments);
+
+/// Everything that decides what a construction comes to, whatever an argument is for.
+std::string decidingArguments(const Arguments& arguments);
+
+/// Where a construction keeps its state that ends in the file `output`.
+std::filesystem::path checkpointOf(const std::filesystem::path& output);
+
 /// The width of blended zones.
 Parameter blendWidthParameter(std::string name);
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <fstream>
 
+#include "batch.h"
 #include "building.h"
 #include "commands.h"
 #include "hpsdf/continuity.h"
@@ -56,11 +57,15 @@ void changeCurrent(Session& session, const Arguments& arguments, Field field) {
 
 /// Where the construction keeps its state; empty: nowhere.
 std::filesystem::path checkpointFile(const Arguments& arguments) {
-  if (!arguments.flag("checkpoint")) return {};
-  return arguments.text("output") + ".checkpoint";
+  return arguments.flag("checkpoint") ? checkpointOf(arguments.text("output")) : std::filesystem::path();
 }
 
 void checkBuildArguments(const Arguments& arguments) {
+  const bool many = arguments.has("batch");
+  if (many && arguments.has("mesh")) throw Error("batch: its list names the meshes; leave MESH out");
+  if (many && !arguments.has("output")) throw Error("batch: its fields go into a folder; give output");
+  if (!many && !arguments.has("mesh"))
+    throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
   const bool keeps = arguments.flag("checkpoint");
   if (keeps && !arguments.has("output")) throw Error("checkpoint: it is kept beside the output; give output");
   if (arguments.given("checkpoint-seconds") && !keeps)
@@ -89,6 +94,7 @@ void tidyUp(const std::filesystem::path& checkpoint, const std::filesystem::path
 
 void runBuild(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
+  if (arguments.has("batch")) return buildBatch(console, arguments);
   const std::string surface = arguments.text("mesh");
   const std::filesystem::path checkpoint = checkpointFile(arguments);
   checkFieldOutput(arguments);
@@ -285,18 +291,34 @@ Command buildCommand() {
           "says "
           "how it is decided (--sign). Ctrl-C stops and writes "
           "no field; with --checkpoint the same command goes on later from where it was. In a script, the field "
-          "becomes the current one, and the output may be left out.",
+          "becomes the current one, and the output may be left out.\n"
+          "\n"
+          "With --batch every mesh of a list becomes OUTPUT/name-hash.hpsdf, and a line of JSON on standard output "
+          "says what came of it. One that fails does not stop the others: the exit status is 3 at the end. Those that "
+          "are there already, made from the same contents with the same options, are skipped. Any number of processes "
+          "may work on one list and one folder: each mesh is built by one of them. docs/batch.md shows how, also with "
+          "GNU parallel and Slurm.",
       .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
                    "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
                    "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
-                   "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint"},
+                   "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
+                   "hpsdf build --batch list.txt -o fields"},
       .parameters = {{.name = "mesh",
                       .type = ParameterType::text,
                       .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
                       .valueName = "MESH",
-                      .positional = true,
-                      .need = Need::always},
-                     fieldOutputParameter()},
+                      .positional = true},
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "The field's file, usually *.hpsdf; with batch, the folder of the fields, made where it "
+                              "is not there.",
+                      .alias = 'o',
+                      .need = Need::onCommandLine},
+                     {.name = "batch",
+                      .type = ParameterType::path,
+                      .help = "In place of MESH: a list of many, one a line, files (from the current folder) and "
+                              "shapes; empty lines and # comments are passed over. - reads standard input.",
+                      .valueName = "LIST"}},
       .action = runBuild,
       .check = checkBuildArguments};
   for (auto& parameters : {checkpointParameters(), buildParameters()})

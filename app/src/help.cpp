@@ -121,7 +121,7 @@ std::string overviewHelp(const Registry& registry) {
       "the "
       "version.\nA script writes an option --name value as name=value. Exit status: 0 done, 1 a comparison failed, 2 "
       "bad "
-      "input, 130 cancelled.\n";
+      "input, 3 some\nmeshes of a batch failed, 130 cancelled.\n";
   return text;
 }
 

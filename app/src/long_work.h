@@ -1,6 +1,8 @@
 #pragma once
 
 #include <chrono>
+#include <string>
+#include <string_view>
 
 #include "hpsdf/error.h"
 #include "hpsdf/progress.h"
@@ -25,8 +27,8 @@ auto withProgress(const Console& console, const Work& work) {
   } const atEnd{listener};
   const Progress progress{
       .report =
-          [&line, listener](std::string_view task, double fraction) {
-            line.report(task, fraction);
+          [&line, &console, listener](std::string_view task, double fraction) {
+            line.report(console.work + std::string(task), fraction);
             if (listener != nullptr) listener->report(task, fraction);
           },
       .cancelled =

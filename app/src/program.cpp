@@ -8,7 +8,6 @@
 #include <ostream>
 
 #include "commands.h"
-#include "failed.h"
 #include "help.h"
 #include "hpsdf/error.h"
 #include "version.h"
@@ -60,11 +59,14 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     execute(words, registry, console);
     checkOutput(console);
     return kExitDone;
+  } catch (const CancelledPartway& cancelled) {
+    console.err << "hpsdf: cancelled; " << cancelled.kept() << std::endl;
+    return kExitCancelled;
   } catch (const Cancelled&) {
     console.err << "hpsdf: cancelled; nothing was written" << std::endl;
     return kExitCancelled;
   } catch (const Failed& failed) {
-    return fail(console, failed.what(), kExitFailed);
+    return fail(console, failed.what(), failed.status());
   } catch (const Error& error) {
     return fail(console, error.what(), kExitBadInput);
   } catch (const std::filesystem::filesystem_error& error) {  // such as a file that was removed while it was in use

@@ -3,12 +3,12 @@
 #include <span>
 #include <string>
 
+#include "failed.h"
 #include "session.h"
 
 namespace hpsdf::app {
 
 constexpr int kExitDone = 0;
-constexpr int kExitFailed = 1;  // an expectation, a comparison
 constexpr int kExitBadInput = 2;
 constexpr int kExitCancelled = 130;  // 128 + SIGINT, as shells count
 

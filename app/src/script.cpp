@@ -312,7 +312,7 @@ void runScript(Session& session, std::span<const Call> calls) {
     try {
       perform(*call.command, session, call.arguments);
     } catch (const Failed& error) {
-      throw Failed(call.where + ": " + error.what() + call.includedFrom);
+      throw Failed(call.where + ": " + error.what() + call.includedFrom, error.status());
     } catch (const Error& error) {
       throw Error(call.where + ": " + error.what() + call.includedFrom);
     }

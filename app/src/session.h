@@ -38,7 +38,8 @@ struct Console {
   bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
   WorkListener* listener = nullptr;
   std::filesystem::path meshReader =
-      {};  ///< program that mesh files are read by (mesh_process.h); empty: by this process
+      {};                 ///< program that mesh files are read by (mesh_process.h); empty: by this process
+  std::string work = {};  ///< what progress is told of, in front of it, where that is one of many
 };
 
 /// The field that commands work on.

@@ -60,6 +60,7 @@ std::string shellWord(const std::string& word);
 /// An indented line of a summary.
 std::string summaryRow(std::string_view label, const std::string& value);
 
+std::string signName(Sign sign);  ///< as --sign has it; "unknown" where it is not known
 std::string strategyName(Strategy strategy);
 std::string nearnessName(NearnessKind kind);
 std::string estimatorName(Estimator estimator);

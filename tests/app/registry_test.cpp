@@ -38,7 +38,7 @@ Arguments parse(const std::string& verb, const std::string& line) {
 std::string complaint(const std::string& verb, const std::string& line) {
   try {
     parse(verb, line);
-  } catch (const ArgumentError& error) {
+  } catch (const Error& error) {
     return error.what();
   }
   return "no complaint";
@@ -260,6 +260,7 @@ TEST(Arguments, mistakesSayWhatWasExpected) {
       {"build", "m -o", "-o: needs a value"},
       {"build", "m", "--output is missing"},
       {"build", "-o f", "mesh is missing"},
+      {"build", "m --batch l -o f", "leave MESH out"},
       {"build", "m other -o f", "unexpected 'other'"},
       {"slice", "-o x.png", "field is missing"},
       {"slice", "f -o x.png --axis w", "expected x, y or z, found 'w'"},

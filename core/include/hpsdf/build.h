@@ -87,6 +87,10 @@ enum class DomainShape : std::uint8_t { cube, box };
 Box domainAround(const Box& surface, DomainShape shape = DomainShape::cube, double margin = 0.1);
 Box domainAround(const TriangleMesh& mesh, DomainShape shape = DomainShape::cube, double margin = 0.1);
 
+/// Throws `Error` for the first setting or domain that is out of range; for a base grid that memory cannot hold, too.
+/// `build` does it first.
+void checkBuild(const Box& domain, const BuildOptions& options);
+
 /// Builds the field of Φ over `domain`. What Φ says of its source goes into the metadata; a box there gives L.
 ///
 /// Throws `Error` for options or a domain out of range, a tree that would not fit into memory, or a Φ that returns a

@@ -33,8 +33,14 @@ class OutputFile {
   /// process. Does only what a signal handler may do.
   static void removeUnfinished() noexcept;
 
-  /// Removes the temporary files that killed processes of this machine left beside `file` when they wrote it.
-  static void removeAbandoned(const std::filesystem::path& file);
+  /// Whose temporary files beside a file are abandoned.
+  enum class Writers {
+    killed,  ///< processes of this machine that are no more
+    others,  ///< all but this process: for who knows that nobody else is writing the file now
+  };
+
+  /// Removes the temporary files that such writers left beside `file` when they wrote it.
+  static void removeAbandoned(const std::filesystem::path& file, Writers writers = Writers::killed);
 
  private:
   [[noreturn]] void fail();

@@ -7,9 +7,6 @@
 
 namespace hpsdf {
 
-/// Throws `Error` for the first setting or domain that is out of range; for a base grid that memory cannot hold, too.
-void checkBuild(const Box& domain, const BuildOptions& options);
-
 /// The degree with which base cells start.
 int startDegree(const BuildOptions& options);
 

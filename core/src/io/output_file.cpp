@@ -97,15 +97,15 @@ bool isRunning(pid_t process) { return kill(process, 0) == 0 || errno != ESRCH; 
 
 }  // namespace
 
-void OutputFile::removeAbandoned(const std::filesystem::path& file) {
+void OutputFile::removeAbandoned(const std::filesystem::path& file, Writers writers) {
   const std::filesystem::path target = resolved(file);
   const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
   std::error_code ignored;
   std::vector<std::filesystem::path> abandoned;
   for (std::filesystem::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
     const std::optional<pid_t> writer = writerOf(entry->path(), target);
-    if (writer && (*writer == getpid() ? !isOurs(entry->path().filename()) : !isRunning(*writer)))
-      abandoned.push_back(entry->path());
+    if (!writer || isOurs(entry->path().filename())) continue;
+    if (writers == Writers::others || *writer == getpid() || !isRunning(*writer)) abandoned.push_back(entry->path());
   }
   for (const std::filesystem::path& name : abandoned) std::filesystem::remove(name, ignored);
 }

@@ -1,0 +1,477 @@
+// Many meshes into one folder: by one process, by several, by some that are killed.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "batch_list.h"
+#include "hpsdf/field_file.h"
+#include "started_program.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using started::Call;
+using started::lineCount;
+using started::namesIn;
+using started::Process;
+using started::readFile;
+using started::run;
+using started::writeFile;
+using testing::AllOf;
+using testing::Contains;
+using testing::Each;
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+using testing::StartsWith;
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Lists
+
+std::vector<std::string> surfacesIn(std::string_view list) {
+  std::vector<std::string> surfaces;
+  for (const BatchMesh& mesh : parseBatchList(list)) surfaces.push_back(mesh.surface);
+  return surfaces;
+}
+
+std::string nameOf(const std::string& surface) {
+  const std::vector<BatchMesh> meshes = parseBatchList(surface);
+  return meshes.size() == 1 ? meshes[0].name : "";
+}
+
+TEST(BatchLists, holdAMeshALine) {
+  EXPECT_THAT(surfacesIn("a.obj\n# no mesh\n\n  b c.stl\t\r\n#d.obj\n./#e.obj\nbuiltin:torus,major=1\nlast.ply"),
+              ElementsAre("a.obj", "b c.stl", "./#e.obj", "builtin:torus,major=1", "last.ply"));
+  EXPECT_THAT(surfacesIn("\xef\xbb\xbf# as some editors begin\na.obj\r\n"), ElementsAre("a.obj"));
+  EXPECT_THAT(surfacesIn("a.obj\nb.obj\n a.obj\n"), ElementsAre("a.obj", "b.obj")) << "each once";
+  EXPECT_THAT(surfacesIn(" \n\r\n# \n"), IsEmpty());
+}
+
+TEST(BatchLists, namesAreSafeAndOfTheLineAlone) {
+  EXPECT_THAT(nameOf("scans/bunny.obj"), testing::MatchesRegex("bunny-[0-9a-f]{16}"));
+  EXPECT_THAT(nameOf("builtin:torus,major=0.7,minor=0.2"), StartsWith("torus_major_0.7_minor_0.2-"));
+  EXPECT_THAT(nameOf("../a b$(c)'\"*\xc3\xa4.stl"), StartsWith("a_b__c______-"));
+  EXPECT_THAT(nameOf("a/.stl"), StartsWith("_stl-")) << "a hidden file looks like none";
+  EXPECT_THAT(nameOf("../.."), Not(HasSubstr("/")));
+  EXPECT_LT(nameOf(std::string(255, 'x')).size(), 200u);
+  EXPECT_EQ(nameOf("b.obj"), parseBatchList("a.obj\nb.obj\nc.obj")[1].name) << "whatever else is in the list";
+  std::set<std::string> names;
+  for (const char* surface : {"a/t.obj", "b/t.obj", "a/t.stl", "./a/t.obj", "builtin:box", "analytic:box", "box",
+                              "builtin:box,width=1", "builtin:box,width_1"})
+    names.insert(nameOf(surface));
+  EXPECT_THAT(names, SizeIs(9));
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// One process
+
+std::string tetrahedron(double height) {
+  return fmt::format("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", height);
+}
+
+std::vector<Json> linesOf(const Outcome& outcome) {
+  std::vector<Json> lines;
+  std::istringstream text(outcome.out);
+  for (std::string line; std::getline(text, line);) lines.push_back(Json::parse(line));
+  return lines;
+}
+
+std::vector<std::string> statusesOf(const Outcome& outcome) {
+  std::vector<std::string> statuses;
+  for (const Json& line : linesOf(outcome)) statuses.push_back(line.at("status"));
+  return statuses;
+}
+
+class Batches : public testing::Test {
+ protected:
+  std::string at(const std::string& name) const { return (folder_ / name).string(); }
+  fs::path fields() const { return folder_ / "fields"; }
+  /// Where the field of a line of the list goes.
+  fs::path fieldOf(const std::string& surface) const { return fields() / (nameOf(surface) + ".hpsdf"); }
+
+  /// The program on what is in `list`, with options.
+  Call batch(const std::string& list, const std::vector<std::string>& options = {}) const {
+    writeFile(folder_ / "list", list);
+    Call call{.words = {"build", "--batch", "list", "-o", "fields"}, .folder = folder_.path()};
+    call.words.insert(call.words.end(), options.begin(), options.end());
+    return call;
+  }
+
+  /// What a construction by itself gives.
+  std::string loneBytes(const std::string& surface, const std::vector<std::string>& options) const {
+    Call call{.words = {"build", surface, "-o", "lone.hpsdf"}, .folder = folder_.path()};
+    call.words.insert(call.words.end(), options.begin(), options.end());
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return readFile(folder_ / "lone.hpsdf");
+  }
+
+  /// Without what the batch keeps for itself.
+  std::set<std::string> fieldNames() const {
+    std::set<std::string> names = namesIn(fields());
+    EXPECT_EQ(names.erase(".batch"), 1u);
+    return names;
+  }
+
+  void expectRefused(const Call& call, const std::string& message) const {
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+    EXPECT_THAT(outcome.err, AllOf(StartsWith("hpsdf: error: "), HasSubstr(message)));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_FALSE(fs::is_directory(fields()));
+  }
+
+  support::TemporaryDirectory folder_;
+};
+
+const std::vector<std::string> kCoarse = {"--target-error", "1e-3", "--grid", "2"};
+
+std::vector<std::string> coarseAnd(const std::vector<std::string>& more) {
+  std::vector<std::string> options = kCoarse;
+  options.insert(options.end(), more.begin(), more.end());
+  return options;
+}
+
+TEST_F(Batches, aBadMeshDoesNotStopTheOthers) {
+  writeFile(folder_ / "t.obj", tetrahedron(1));
+  writeFile(folder_ / "bad.obj", "this is no mesh\n");
+  const Outcome outcome = run(batch("t.obj\nbad.obj\nbuiltin:tours\n# no mesh\nanalytic:sphere\n", kCoarse));
+  EXPECT_EQ(outcome.status, 3);
+  const std::vector<Json> lines = linesOf(outcome);
+  ASSERT_THAT(statusesOf(outcome), ElementsAre("built", "failed", "failed", "built"));
+  EXPECT_EQ(lines[0].at("file"), "t.obj");
+  EXPECT_EQ(lines[0].at("output"), "fields/" + nameOf("t.obj") + ".hpsdf");
+  EXPECT_EQ(lines[0].at("sign"), "pseudonormal");
+  EXPECT_TRUE(lines[0].at("error").is_null());
+  EXPECT_GT(lines[0].at("seconds"), 0);
+  const Field field = load(fieldOf("t.obj"));
+  EXPECT_EQ(lines[0].at("leaves"), statistics(field).leaves);
+  EXPECT_EQ(lines[0].at("bytes"), statistics(field).bytes);
+  EXPECT_EQ(lines[0].at("file_bytes"), fs::file_size(fieldOf("t.obj")));
+  EXPECT_EQ(lines[0].at("rms_estimate"), field.metadata().rmsEstimate(field.domain()));
+  EXPECT_THAT(lines[1].at("error").get<std::string>(), StartsWith("bad.obj: "));
+  EXPECT_TRUE(lines[1].at("leaves").is_null());
+  EXPECT_TRUE(lines[3].at("sign").is_null()) << "no mesh, no way to find its sign";
+  EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: error: 2 of 4: bad.obj: "));
+  EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: error: 3 of 4: shape 'builtin:tours': there is no shape"));
+  EXPECT_THAT(outcome.err, HasSubstr("\n4 of 4: analytic:sphere: built, "));
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: error: list: 2 of 4 meshes failed; the lines above say why\n"));
+  EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf", nameOf("t.obj") + ".hpsdf"));
+  for (const char* surface : {"t.obj", "analytic:sphere"})
+    EXPECT_TRUE(readFile(fieldOf(surface)) == loneBytes(surface, kCoarse)) << surface;
+}
+
+TEST_F(Batches, whatIsFinishedIsSkipped) {
+  writeFile(folder_ / "t.obj", tetrahedron(1));
+  const Call call = batch("t.obj\nbuiltin:box\nanalytic:box\n", coarseAnd({"--normalize"}));
+  ASSERT_EQ(run(call).status, 0);
+  std::map<std::string, fs::file_time_type> written;
+  for (const auto& entry : fs::recursive_directory_iterator(fields())) written[entry.path()] = entry.last_write_time();
+  EXPECT_THAT(written, SizeIs(8)) << "fields, what they are made of, the folder of that, the claims";
+  const std::string before = readFile(fieldOf("t.obj"));
+  const Outcome again = run(call);
+  EXPECT_EQ(again.status, 0);
+  EXPECT_THAT(statusesOf(again), ElementsAre("skipped", "skipped", "skipped"));
+  EXPECT_EQ(linesOf(again)[0].at("leaves"), statistics(load(fieldOf("t.obj"))).leaves);
+  EXPECT_THAT(again.err, HasSubstr("0 built, 3 skipped, 0 built elsewhere, 0 failed"));
+  for (const auto& entry : fs::recursive_directory_iterator(fields()))
+    EXPECT_EQ(entry.last_write_time(), written.at(entry.path())) << entry.path();
+  EXPECT_TRUE(readFile(fieldOf("t.obj")) == before);
+  // neither threads nor what else is in the list, nor a checkpoint, makes another field
+  EXPECT_THAT(
+      statusesOf(run(batch("builtin:box\nt.obj", coarseAnd({"--normalize", "--threads", "1", "--checkpoint"})))),
+      ElementsAre("skipped", "skipped"));
+}
+
+TEST_F(Batches, whatHasChangedIsBuiltAnew) {
+  writeFile(folder_ / "t.obj", tetrahedron(1));
+  writeFile(folder_ / "other.obj", tetrahedron(1));
+  const std::string list = "t.obj\nother.obj\n";
+  const auto statuses = [&](const std::vector<std::string>& options) { return statusesOf(run(batch(list, options))); };
+  EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
+  // the mesh, its size and its time as before
+  const auto time = fs::last_write_time(folder_ / "t.obj");
+  writeFile(folder_ / "t.obj", tetrahedron(2));
+  fs::last_write_time(folder_ / "t.obj", time);
+  EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "skipped"));
+  EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", kCoarse));
+  // options
+  for (const char* option : {"--bounds", "--normalize"}) {
+    EXPECT_THAT(statuses(coarseAnd({option})), ElementsAre("built", "built")) << option;
+    EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", coarseAnd({option})));
+  }
+  EXPECT_THAT(statuses(coarseAnd({"--paper"})), ElementsAre("built", "built"));
+  EXPECT_THAT(statuses(coarseAnd({"--paper", "--quadrature", "3"})), ElementsAre("built", "built"))
+      << "the default, which is not what --paper takes";
+  EXPECT_THAT(statuses(coarseAnd({"--paper", "--quadrature", "3"})), ElementsAre("skipped", "skipped"));
+  EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
+  // a mesh that is gone: its field stays
+  fs::remove(folder_ / "t.obj");
+  EXPECT_THAT(statuses(kCoarse), ElementsAre("failed", "skipped"));
+  EXPECT_TRUE(fs::exists(fieldOf("t.obj")));
+}
+
+TEST_F(Batches, whatIsDamagedIsBuiltAnew) {
+  const std::string list = "builtin:box\nbuiltin:box,width=1\n";
+  const Call call = batch(list, kCoarse);
+  ASSERT_EQ(run(call).status, 0);
+  const fs::path field = fieldOf("builtin:box");
+  const std::string good = readFile(field);
+  std::string flipped = good;
+  flipped[good.size() / 2] = char(flipped[good.size() / 2] ^ 1);
+  const std::string other = readFile(fieldOf("builtin:box,width=1"));
+  for (const std::string& bytes : {flipped, good.substr(0, good.size() / 2), std::string(), good + good, other}) {
+    writeFile(field, bytes);
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(statusesOf(outcome), ElementsAre("built", "skipped"));
+    EXPECT_TRUE(readFile(field) == good);
+    if (bytes == flipped) {
+      EXPECT_THAT(outcome.err, AllOf(HasSubstr("hpsdf: note: "), HasSubstr("; building it anew\n")));
+    }
+  }
+  // without what tells of which options it is
+  fs::remove(fields() / ".batch" / (nameOf("builtin:box") + ".json"));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "skipped"));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
+}
+
+/// The file itself stays the same.
+TEST_F(Batches, whatAGltfFileNamesCounts) {
+  const auto corners = [&](float height) {
+    const std::array<float, 12> numbers = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, height};
+    writeFile(folder_ / "t.bin", {reinterpret_cast<const char*>(numbers.data()), sizeof numbers});
+  };
+  writeFile(folder_ / "t.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+                                R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+                                R"("buffers":[{"byteLength":48,"uri":"t.bin"},)"
+                                R"({"byteLength":12,"uri":"data:application/octet-stream;base64,AAIBAAEDAQIDAAMC"}],)"
+                                R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":1,"byteLength":12}],)"
+                                R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+                                R"({"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}]})");
+  const Call call = batch("t.gltf\n", kCoarse);
+  corners(1);
+  const Outcome first = run(call);
+  EXPECT_THAT(statusesOf(first), ElementsAre("built")) << first.err;
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped"));
+  corners(2);
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+}
+
+TEST_F(Batches, listsMayBeTyped) {
+  Call call{.words = {"build", "--batch", "-", "-o", at("fields"), "--json"}, .input = "builtin:box\n"};
+  call.words.insert(call.words.end(), kCoarse.begin(), kCoarse.end());
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+  EXPECT_THAT(fieldNames(), ElementsAre(nameOf("builtin:box") + ".hpsdf"));
+}
+
+TEST_F(Batches, scriptsTakeThem) {
+  writeFile(folder_ / "list", "builtin:box\nmissing.obj\n");
+  const Outcome outcome = run(
+      {.words = {"run", "-e", "build batch=list output=fields target-error=1e-3 grid=2"}, .folder = folder_.path()});
+  EXPECT_EQ(outcome.status, 3);
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("built", "failed"));
+  EXPECT_THAT(outcome.err, HasSubstr("hpsdf: error: -e:1:1: list: 1 of 2 meshes failed"));
+}
+
+TEST_F(Batches, mistakesAreRefusedBeforeWork) {
+  const std::string list = "builtin:box\nbuiltin:gear\n";
+  Call both = batch(list);
+  both.words.emplace_back("builtin:box");
+  expectRefused(both, "leave MESH out");
+  expectRefused({{"run", "-e", "build batch=list"}}, "give output");
+  expectRefused({{"build", "--batch", at("none"), "-o", at("fields")}}, at("none") + ": no such file");
+  expectRefused(batch("# none\n\n"), "list: names no mesh");
+  expectRefused(batch(list, {"--near-error", "1e-3"}), "near error and far error belong together");
+  expectRefused(batch(list, {"--continuity-weight", "1"}), "continuity-weight belongs to");
+  expectRefused(batch(list, {"--sign", "unsigned-shell"}), "thickness");
+  expectRefused(batch(list, {"--domain", "1,1,1,0,0,0"}), "expected lower corner");
+  expectRefused(batch(list, {"--grid", "100000"}), "base grid 100000");
+  const Call call = batch(list);
+  writeFile(fields(), "a file\n");
+  expectRefused(call, "fields: cannot make this folder (");
+}
+
+TEST_F(Batches, aReaderThatGoesEndsTheWork) {
+  Call call = batch("builtin:box\nbuiltin:gear\n", kCoarse);
+  call.stdoutClosed = true;
+  const Outcome outcome = run(call);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err,
+              EndsWith("hpsdf: error: cannot write to standard output: its reader has gone, or the disk is full\n"));
+  EXPECT_THAT(fieldNames(), SizeIs(1));
+}
+
+TEST_F(Batches, anInterruptLeavesWhatIsDone) {
+  const std::string list = "analytic:sphere\nbuiltin:gear\nbuiltin:box\n";
+  Process process(batch(list, {"--target-error", "1e-10"}));
+  process.waitForLines(1);
+  process.send(SIGINT);
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("built"));
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; 1 of 3 meshes were done and stay; the same command goes on with "
+                                    "the others\n"));
+  EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf"));
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Several processes
+
+/// Whether a process has taken some mesh of the folder.
+bool isAtWork(const fs::path& fields) {
+  const int file = open((fields / ".batch" / "claims").c_str(), O_RDWR | O_CLOEXEC);
+  if (file < 0) return false;
+  struct flock range = {};
+  range.l_type = F_WRLCK;
+  range.l_whence = SEEK_SET;
+  fcntl(file, F_GETLK, &range);
+  close(file);
+  return range.l_type != F_UNLCK;
+}
+
+/// The one has a mesh and is made to stand still; the other waits for it.
+class TwoProcesses : public Batches {
+ protected:
+  /// Takes some tenths of a second.
+  const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
+  const std::string kShape = "builtin:gear";
+
+  void SetUp() override {
+    first_ = std::make_unique<Process>(batch(kShape, kOptions));
+    ASSERT_TRUE(first_->sendWhen([this] { return isAtWork(fields()); }, SIGSTOP));
+    second_ = std::make_unique<Process>(batch(kShape, kOptions));
+    ASSERT_TRUE(second_->waitForError("waiting for 1 of 1 meshes"));
+    ASSERT_FALSE(second_->hasEnded());
+  }
+
+  std::unique_ptr<Process> first_, second_;
+};
+
+TEST_F(TwoProcesses, theOneTakesOverFromTheOtherThatIsKilled) {
+  first_->send(SIGKILL);
+  const Outcome outcome = second_->finish();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("built"));
+  EXPECT_EQ(first_->finish().status, -SIGKILL);
+  EXPECT_TRUE(readFile(fieldOf(kShape)) == loneBytes(kShape, kOptions));
+}
+
+TEST_F(TwoProcesses, theOneWaitsForTheOther) {
+  first_->send(SIGCONT);
+  const Outcome outcome = second_->finish();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("elsewhere"));
+  EXPECT_THAT(statusesOf(first_->finish()), ElementsAre("built"));
+  EXPECT_TRUE(fs::exists(fieldOf(kShape)));
+}
+
+TEST_F(TwoProcesses, whoWaitsCanBeInterrupted) {
+  second_->send(SIGINT);
+  const Outcome outcome = second_->finish();
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; 0 of 1 meshes were done and stay; the same command goes on with "
+                                    "the others\n"));
+  EXPECT_THAT(outcome.out, IsEmpty());
+  first_->send(SIGKILL);
+  first_->finish();
+}
+
+/// What a killed process has left half-written or half-done is gone on with or swept away.
+TEST_F(Batches, aCheckpointIsTakenOver) {
+  const std::string shape = "builtin:gear";
+  const auto options = [](const char* target) {
+    return std::vector<std::string>{"--target-error", target, "--checkpoint", "--checkpoint-seconds", "0"};
+  };
+  const fs::path state = fieldOf(shape).string() + ".checkpoint";
+  const auto kill = [&] {
+    Process process(batch(shape, options("1e-6")));
+    ASSERT_TRUE(process.sendWhen([&] { return fs::exists(state); }, SIGKILL));
+    process.finish();
+    ASSERT_TRUE(fs::exists(state));
+    ASSERT_FALSE(fs::exists(fieldOf(shape)));
+  };
+  kill();
+  const Outcome other = run(batch(shape, options("1e-3")));
+  EXPECT_EQ(other.status, 3);
+  EXPECT_THAT(other.err, HasSubstr("is a checkpoint of a build with other options; delete it"));
+  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
+  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
+  const Outcome outcome = run(batch(shape, options("1e-6")));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr(".checkpoint, after "));
+  EXPECT_TRUE(readFile(fieldOf(shape)) == loneBytes(shape, {"--target-error", "1e-6"}));
+  EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
+}
+
+TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
+  constexpr int kShapes = 40;
+  const std::vector<std::string> options = {"--target-error", "1e-4", "--grid", "3", "--threads", "1"};
+  std::vector<std::string> shapes;
+  for (int i = 0; i < kShapes; ++i)
+    shapes.push_back(i % 2 == 0 ? fmt::format("builtin:box,width={}", 1 + 0.03 * i)
+                                : fmt::format("builtin:gear,teeth={},segments=1", 4 + i / 2));
+  std::string list;
+  for (const std::string& shape : shapes) list += shape + "\n";
+  const Call call = batch(list, options);
+
+  std::vector<std::unique_ptr<Process>> processes;
+  for (int i = 0; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
+  processes[0]->waitForLines(1);
+  processes[0]->send(SIGKILL);
+  std::map<std::string, int> timesBuilt;
+  int builtByVictim = 0;
+  for (const auto& process : processes) {
+    const bool killed = process == processes[0];
+    const Outcome outcome = process->finish();
+    EXPECT_EQ(outcome.status, killed ? -SIGKILL : 0) << outcome.err;
+    const std::vector<Json> lines = linesOf(outcome);
+    EXPECT_TRUE(killed ? lines.size() < kShapes : lines.size() == kShapes) << lines.size();
+    for (const Json& line : lines) {
+      EXPECT_NE(line.at("status"), "failed") << line;
+      if (line.at("status") != "built") continue;
+      ++timesBuilt[line.at("file")];
+      if (killed) ++builtByVictim;
+    }
+  }
+  EXPECT_GE(builtByVictim, 1) << "it was in the middle of its work";
+  // killed after a field was whole and before it could say so: then nobody tells of that one
+  EXPECT_GE(timesBuilt.size(), std::size_t{kShapes - 1});
+  for (const auto& [shape, times] : timesBuilt) EXPECT_EQ(times, 1) << shape;
+  EXPECT_THAT(fieldNames(), SizeIs(kShapes)) << "and nothing half-written";
+  for (const std::string& shape : shapes) {
+    std::vector<std::string> words = {"build", shape, "-o", at("lone.hpsdf")};
+    words.insert(words.end(), options.begin(), options.end());
+    ASSERT_EQ(runHere(words).status, 0);
+    EXPECT_NO_THROW(load(fieldOf(shape))) << shape;
+    EXPECT_TRUE(readFile(fieldOf(shape)) == readFile(folder_ / "lone.hpsdf")) << shape;
+  }
+  const std::vector<std::string> statuses = statusesOf(run(call));
+  EXPECT_THAT(statuses, AllOf(SizeIs(kShapes), Each("skipped")));
+}
+
+}  // namespace
+}  // namespace hpsdf::app

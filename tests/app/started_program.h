@@ -1,0 +1,230 @@
+#pragma once
+// The program as its user meets it: started as a process of its own.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "outcome.h"
+
+extern char** environ;
+
+namespace hpsdf::app::started {
+
+namespace fs = std::filesystem;
+
+struct Call {
+  std::vector<std::string> words;
+  std::string input = {};
+  std::map<std::string, std::string> environment = {};
+  fs::path folder = {};        ///< to run in; the caller's when empty
+  fs::path output = {};        ///< a file that takes standard output, instead of the test
+  bool stdoutClosed = false;   ///< the reader of standard output has gone away
+  bool keepInputOpen = false;  ///< standard input is not at its end: see `Process::type`
+};
+
+inline std::size_t lineCount(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count(text, '\n'));
+}
+
+/// The program at work. Its output is read while it runs, so that it never waits for us.
+class Process {
+ public:
+  explicit Process(const Call& call) {
+    int in[2];
+    int out[2];
+    int err[2];
+    if (pipe2(in, O_CLOEXEC) != 0 || pipe2(out, O_CLOEXEC) != 0 || pipe2(err, O_CLOEXEC) != 0)
+      throw std::runtime_error("pipe");
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, in[0], STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, out[1], STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, err[1], STDERR_FILENO);
+    if (!call.output.empty())
+      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, call.output.c_str(), O_WRONLY, 0);
+    if (!call.folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, call.folder.c_str());
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    sigset_t defaults;
+    sigemptyset(&defaults);
+    sigaddset(&defaults, SIGINT);  // a test run in the background inherits an ignored one
+    sigaddset(&defaults, SIGPIPE);
+    posix_spawnattr_setsigdefault(&attributes, &defaults);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    if (call.stdoutClosed) close(out[0]);
+    const int error = spawn(call, actions, attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    close(in[0]);
+    close(out[1]);
+    close(err[1]);
+    out_ = call.stdoutClosed ? -1 : out[0];
+    err_ = err[0];
+    if (error != 0) throw std::runtime_error(std::string(HPSDF_PROGRAM ": ") + std::strerror(error));
+    in_ = in[1];
+    if (!call.keepInputOpen) {
+      type(call.input);
+      closeInput();
+    }
+  }
+
+  ~Process() {
+    if (running_) {
+      kill(id_, SIGKILL);
+      waitpid(id_, nullptr, 0);
+    }
+    if (in_ >= 0) close(in_);
+    if (out_ >= 0) close(out_);
+    if (err_ >= 0) close(err_);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// Until the first line on standard error is whole, or it has ended.
+  void waitForErrorLine() {
+    while (outcome_.err.find('\n') == std::string::npos && readSome()) {
+    }
+  }
+
+  /// Until standard error holds this, or it has ended; whether it does.
+  bool waitForError(const std::string& text) {
+    while (outcome_.err.find(text) == std::string::npos)
+      if (!readSome()) return false;
+    return true;
+  }
+
+  /// Until so many lines have come out, or it has ended.
+  void waitForLines(std::size_t count) {
+    while (lineCount(outcome_.out) < count && readSome()) {
+    }
+  }
+
+  /// Inputs of these tests fit into a pipe, so that this does not wait. A program that refuses its files first may
+  /// be gone before it reads any.
+  void type(const std::string& input) {
+    std::signal(SIGPIPE, SIG_IGN);
+    if (!input.empty() && write(in_, input.data(), input.size()) < 0 && errno != EPIPE)
+      ADD_FAILURE() << "writing the input: " << std::strerror(errno);
+  }
+
+  void closeInput() {
+    close(in_);
+    in_ = -1;
+  }
+
+  void send(int signal) { kill(id_, signal); }
+
+  bool hasEnded() const {
+    siginfo_t info{};
+    waitid(P_PID, static_cast<id_t>(id_), &info, WEXITED | WNOHANG | WNOWAIT);
+    return info.si_pid != 0;
+  }
+
+  /// Sends the signal as soon as `now` is true; whether that came before its end.
+  bool sendWhen(const std::function<bool()>& now, int signal) {
+    while (!now()) {
+      if (hasEnded()) return false;
+      usleep(100);
+    }
+    send(signal);
+    return true;
+  }
+
+  Outcome finish() {
+    while (readSome()) {
+    }
+    int status = 0;
+    waitpid(id_, &status, 0);
+    running_ = false;
+    outcome_.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+    return outcome_;
+  }
+
+ private:
+  int spawn(const Call& call, const posix_spawn_file_actions_t& actions, const posix_spawnattr_t& attributes) {
+    std::vector<std::string> words = {HPSDF_PROGRAM};
+    words.insert(words.end(), call.words.begin(), call.words.end());
+    std::vector<std::string> variables;
+    for (char** entry = environ; *entry != nullptr; ++entry)
+      if (!call.environment.contains(std::string(*entry, std::strcspn(*entry, "=")))) variables.emplace_back(*entry);
+    for (const auto& [name, value] : call.environment) variables.push_back(name + "=" + value);
+    auto pointers = [](std::vector<std::string>& texts) {
+      std::vector<char*> result;
+      for (std::string& text : texts) result.push_back(text.data());
+      result.push_back(nullptr);
+      return result;
+    };
+    return posix_spawn(&id_, HPSDF_PROGRAM, &actions, &attributes, pointers(words).data(), pointers(variables).data());
+  }
+
+  /// Reads what is there; false once both streams have ended.
+  bool readSome() {
+    pollfd streams[] = {{out_, POLLIN, 0}, {err_, POLLIN, 0}};
+    if (out_ < 0 && err_ < 0) return false;
+    poll(streams, 2, -1);
+    if (streams[0].revents != 0) readFrom(out_, outcome_.out);
+    if (streams[1].revents != 0) readFrom(err_, outcome_.err);
+    return true;
+  }
+
+  static void readFrom(int& stream, std::string& text) {
+    char buffer[65536];
+    const ssize_t count = read(stream, buffer, sizeof buffer);
+    if (count > 0) {
+      text.append(buffer, static_cast<std::size_t>(count));
+    } else {
+      close(stream);
+      stream = -1;
+    }
+  }
+
+  pid_t id_ = 0;
+  bool running_ = true;
+  int in_ = -1;
+  int out_ = -1;
+  int err_ = -1;
+  Outcome outcome_;
+};
+
+inline Outcome run(const Call& call) { return Process(call).finish(); }
+
+inline void writeFile(const fs::path& file, std::string_view text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  ASSERT_TRUE(stream.flush()) << file;
+}
+
+inline std::string readFile(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  EXPECT_TRUE(stream) << file;
+  return text.str();
+}
+
+inline std::set<std::string> namesIn(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+}  // namespace hpsdf::app::started
