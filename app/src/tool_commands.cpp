@@ -10,6 +10,7 @@
 #include "hpsdf/output_file.h"
 #include "hpsdf/shapes.h"
 #include "machine.h"
+#include "mesh_command.h"
 #include "pictures.h"
 #include "script.h"
 #include "session.h"
@@ -60,15 +61,6 @@ void runSet(Session& session, const Arguments& arguments) {
 
 void runInclude(Session& session, const Arguments& arguments) {
   if (session.wantsJson(arguments)) printJson(session.console().out, {{"included", arguments.text("script")}});
-}
-
-void runMesh(Session& session, const Arguments& arguments) {
-  const std::string surface = arguments.text("mesh");
-  const MeshReport report = importSurface(session.console(), surface).report;
-  if (session.wantsJson(arguments)) return printJson(session.console().out, meshJson(surface, report));
-  session.console().out << meshText(surface, report);
-  if (!report.closed())
-    session.console().out << "  note                   inside and outside are not defined everywhere\n";
 }
 
 Json shapesJson() {
@@ -213,19 +205,7 @@ Command doctorCommand() {
 
 void addToolCommands(Registry& registry) {
   registry.add(runCommand());
-  registry.add({.name = "mesh",
-                .summary = "Tell what was found in a mesh file.",
-                .help =
-                    "Counts after welding equal positions, parts, edges that are open, shared by more than two faces "
-                    "or run against each other, volume, area, box, and what was dropped or turned on import.",
-                .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json"},
-                .parameters = {{.name = "mesh",
-                                .type = ParameterType::text,
-                                .help = "Mesh file or builtin:SHAPE.",
-                                .valueName = "MESH",
-                                .positional = true,
-                                .need = Need::always}},
-                .action = runMesh});
+  registry.add(meshCommand());
   registry.add({.name = "shapes",
                 .summary = "List the built-in shapes and their parameters.",
                 .help = "builtin:NAME is a shape's triangle mesh, analytic:NAME its distance in closed form.",

@@ -1,5 +1,6 @@
 // The program as its user meets it: most tests start the real one.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -221,6 +222,27 @@ TEST_F(Cli, openMeshesAreWarnedAbout) {
   const Json mesh = Json::parse(run({{"mesh", at("open.obj"), "--json"}}).out);
   EXPECT_EQ(mesh.at("closed"), false);
   EXPECT_EQ(mesh.at("boundary_edges"), 3);
+}
+
+/// Two tetrahedra, one of which reaches into the other.
+TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
+  std::string text;
+  for (const double x : {0.0, 0.2}) text += fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 1 0\nv {0} 0 1\n", x, x + 1);
+  text += "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 8 7\n";
+  writeFile(at("two.obj"), text);
+  const Outcome told = run({{"mesh", at("two.obj"), "--check-sign", "500"}});
+  EXPECT_EQ(told.status, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("pairs of faces, as at ("));
+  EXPECT_THAT(told.out, HasSubstr("winding: the mesh meets itself"));
+  EXPECT_THAT(told.out, HasSubstr("wrong signs            0\n"));
+  const Json json = Json::parse(run({{"mesh", at("two.obj"), "--json", "--places", "1", "--check-sign", "500"}}).out);
+  EXPECT_GT(json.at("crossings").at("count"), 1);
+  EXPECT_EQ(json.at("crossings").at("places").size(), 1u);
+  EXPECT_EQ(json.at("sign").at("by"), "winding");
+  EXPECT_EQ(json.at("sign_check").at("wrong"), 0);
+  EXPECT_THAT(run({{"mesh", "builtin:gear"}}).out,
+              AllOf(HasSubstr("meets itself           nowhere"), HasSubstr("pseudonormal: the mesh is closed")));
+  EXPECT_THAT(run({{"mesh", "builtin:gear", "--seed", "2"}}).err, HasSubstr("seed belongs to check-sign"));
 }
 
 TEST_F(Cli, infoTellsWhatTheFieldHolds) {

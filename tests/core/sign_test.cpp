@@ -16,6 +16,8 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
+#include "hpsdf/sign_check.h"
+#include "hpsdf/threads.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
@@ -26,7 +28,7 @@ using distance::Winding;
 
 /// The winding number by all triangles, each an integral of its own: the solid angle from the three angles between the
 /// planes through x (Girard), unlike the library's formula.
-double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
+double sumOfAngles(const TriangleMesh& mesh, const Vector3& x) {
   long double sum = 0;
   using Long = Eigen::Matrix<long double, 3, 1>;
   for (const auto& triangle : mesh.triangles) {
@@ -94,7 +96,7 @@ TEST(Winding, EstimatesAreAsNearAsTheySay) {
     const Winding winding(hierarchy);
     double greatest = 0;
     for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
-      const double exact = windingNumber(mesh, x);
+      const double exact = sumOfAngles(mesh, x);
       EXPECT_NEAR(winding.exact(x), exact, 1e-9);
       for (int level = 0; level < Winding::kLevels; ++level) {
         const Winding::Estimate estimate = winding.estimate(x, level);
@@ -176,7 +178,7 @@ TEST(Sign, IsRightWhereAClosedMeshFoldsOver) {
   for (int n = 0; n < 2000; ++n) {
     const double a = u(random), b = u(random), c = u(random);
     const Vector3 x = mesh.vertices[vertex] + Vector3(a, b, c);
-    const double exact = windingNumber(mesh, x);
+    const double exact = sumOfAngles(mesh, x);
     if (std::abs(distance(x)) < 1e-9) continue;
     EXPECT_EQ(distance(x) < 0, exact > 0.5) << x.transpose();
     misled += (byNormals(x) < 0) != (exact > 0.5);
@@ -273,6 +275,28 @@ TEST(Sign, IsTheSameAtAnyScale) {
   }
 }
 
+TEST(Sign, IsCheckedAgainstTheWholeSum) {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
+  const TriangleMesh mesh = joined(ball, moved(ball, {1, 0, 0}));
+  for (const Vector3& x : placesIn(boundingBox(mesh), 50))
+    EXPECT_NEAR(windingNumber(mesh, x), sumOfAngles(mesh, x), 1e-9);
+  const SignCheck right = checkSign(mesh, ExactDistance(mesh), 4000);
+  EXPECT_EQ(right.wrong, 0u);
+  EXPECT_EQ(right.places, 4000u);
+  EXPECT_LT(right.tooNear, 100u);
+  // What is inside of one looks outside to normals, beside the surface of the other.
+  const ExactDistance byNormals(mesh, {.sign = Sign::pseudonormal});
+  const SignCheck wrong = checkSign(mesh, byNormals, 4000), other = checkSign(mesh, byNormals, 4000, 2);
+  EXPECT_GT(wrong.wrong, 100u);
+  EXPECT_GT(wrong.depth, 0.1);
+  EXPECT_DOUBLE_EQ(std::abs(byNormals(wrong.worst)), wrong.depth);
+  EXPECT_GT(sumOfAngles(mesh, wrong.worst), 0.5);
+  EXPECT_NE(wrong.worst, other.worst);
+  const SignCheck alone = withThreads(1, [&] { return checkSign(mesh, byNormals, 4000); });
+  EXPECT_EQ(alone.wrong, wrong.wrong);
+  EXPECT_EQ(alone.worst, wrong.worst);
+}
+
 /// Real meshes, closed and broken, at fewer places than `hpsdf mesh --check-sign` takes.
 TEST(Sign, OfRealMeshesIsTheWindingNumbers) {
   HPSDF_SKIP_WITHOUT_MESHES();
@@ -283,7 +307,7 @@ TEST(Sign, OfRealMeshesIsTheWindingNumbers) {
     const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
     for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
       if (std::abs(distance(x)) < 1e-6 * boundingBox(mesh).sizes().maxCoeff()) continue;
-      const bool inside = windingNumber(mesh, x) > 0.5;
+      const bool inside = sumOfAngles(mesh, x) > 0.5;
       EXPECT_EQ(byWinding(x) < 0, inside) << name << " at " << x.transpose();
       EXPECT_EQ(distance(x) < 0, inside) << name << " at " << x.transpose();
     }

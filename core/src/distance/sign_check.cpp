@@ -1,0 +1,71 @@
+#include "hpsdf/sign_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "chunks.h"
+#include "distance/solid_angle.h"
+#include "field/random_points.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+constexpr std::size_t kTogether = 16;  // places of one piece of work
+
+/// Even numbers in a box, odd ones beside a triangle.
+Vector3 placeOf(const TriangleMesh& mesh, const Box& box, Random random, std::size_t number) {
+  if (number % 2 == 0) return random.inBox(box);
+  const auto count = static_cast<double>(mesh.triangles.size());
+  const auto& [a, b, c] = mesh.triangles[static_cast<std::size_t>(random.unit() * count)];
+  double u = random.unit(), v = random.unit();
+  if (u + v > 1) u = 1 - u, v = 1 - v;
+  const Vector3 foot = (1 - u - v) * mesh.vertices[a] + u * mesh.vertices[b] + v * mesh.vertices[c];
+  return foot + random.inBall(0.01 * box.sizes().maxCoeff());
+}
+
+}  // namespace
+
+double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
+  distance::AngleSum angles;
+  for (const auto& [a, b, c] : mesh.triangles)
+    addHalfAngle(mesh.vertices[a] - x, mesh.vertices[b] - x, mesh.vertices[c] - x, angles);
+  return angles.value() / (2 * std::numbers::pi);
+}
+
+SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std::size_t places, std::uint64_t seed,
+                    const Progress& progress) {
+  const Box& surface = distance.source().box;
+  const double size = surface.sizes().maxCoeff();
+  const Vector3 beyond = Vector3::Constant(0.1 * size);
+  const Box box(surface.min() - beyond, surface.max() + beyond);
+  std::vector<Vector3> place(places);
+  std::vector<double> found(places);
+  std::vector<char> inside(places);
+  forEachChunk(places, kTogether, progress, "asking all triangles",
+               [&](std::size_t, std::size_t first, std::size_t count) {
+                 for (std::size_t i = first; i < first + count; ++i) {
+                   place[i] = placeOf(mesh, box, Random(seed, i), i);
+                   found[i] = distance(place[i]);
+                   inside[i] = windingNumber(mesh, place[i]) > 0.5;
+                 }
+               });
+  SignCheck check{.places = places, .nearest = 1e-6 * size};
+  for (std::size_t i = 0; i < places; ++i) {
+    const double away = std::abs(found[i]);
+    if (!(away > check.nearest)) {
+      ++check.tooNear;
+    } else if ((found[i] < 0) != bool(inside[i])) {
+      ++check.wrong;
+      if (away > check.depth) {
+        check.depth = away;
+        check.worst = place[i];
+      }
+    }
+  }
+  return check;
+}
+
+}  // namespace hpsdf
