@@ -365,8 +365,8 @@ TEST(DataTable, brokenFilesAreRefusedByName) {
     writeFile(folder / "a.csv", text);
     EXPECT_THROW(loadData(folder / "a.csv"), Error) << text;
   }
-  for (const char* text :
-       {"", "Pf\n1 1\n-1.0\n12", "PF\n1 1\n-1.0\n1234", "Pf\n1 1\n1.0\n1234", "Pf\n1 1\n-1.0\n12345"}) {
+  for (const char* text : {"", "Pf\n1 1\n-1.0\n12", "PF\n1 1\n-1.0\n1234", "Pf\n1 1\n1.0\n1234", "Pf\n1 1\n-1.0\n12345",
+                           "Pf\n-1 -1\n-1.0\n1234", "Pf\n9223372036854775808 2\n-1.0\n"}) {
     writeFile(folder / "a.pfm", text);
     EXPECT_THROW(loadData(folder / "a.pfm"), Error) << text;
   }
