@@ -20,7 +20,7 @@ namespace {
 
 using namespace hpsdf;
 
-constexpr std::size_t kVersionAt = 8, kChecksumBytes = 8;
+constexpr std::size_t kVersionAt = 8;
 constexpr std::uint8_t kVersion = 4;  // before it a field was written with less
 
 /// Within the domain, on its sides, around it, and places that are none.

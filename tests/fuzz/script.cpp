@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     writeIncluded();
     return app::makeRegistry();
   }();
-  const std::string name = fuzz::fileOf("fuzz.hps", "").string();
+  static const std::string name = fuzz::fileOf("fuzz.hps", "").string();
   fuzz::reads([&] {
     for (const app::Call& call : app::parseScript(registry, name, fuzz::textOf(data, size), {{"mesh", "bunny.obj"}})) {
       fuzz::require(call.command != nullptr && call.line > 0, "a call has a command and a line");
