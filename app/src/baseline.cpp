@@ -1,5 +1,7 @@
 #include "baseline.h"
 
+#include <algorithm>
+
 #include "data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/output_file.h"
@@ -9,12 +11,20 @@
 namespace hpsdf::app {
 namespace {
 
+/// Whole numbers as they stand: nlohmann's JSON would convert any.
+std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
+  const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
+  if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))
+    throw Error(file + ": size: expected two whole numbers");
+  return json.get<std::array<std::size_t, 2>>();
+}
+
 /// Throws what nlohmann's JSON throws, or `Error`, for anything that is not what `saveFacts` writes.
 BaselineFacts factsOf(const std::string& file, const Json& json) {
   BaselineFacts facts;
   for (const auto& [key, value] : json.items()) {
     if (key == "size")
-      value.get_to(facts.size);
+      facts.size = sizeOf(file, value);
     else if (key == "renderer")
       value.get_to(facts.renderer);
     else if (key == "version")
