@@ -5,6 +5,7 @@
 #include "data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/output_file.h"
+#include "printable.h"
 #include "script.h"
 #include "summaries.h"
 
@@ -34,7 +35,7 @@ BaselineFacts factsOf(const std::string& file, const Json& json) {
     else if (key == "bound")
       facts.bound = value.get<double>();
     else
-      throw Error(file + ": unknown key '" + key + "'");
+      throw Error(file + ": unknown key '" + printable(key) + "'");
   }
   if (facts.budget && !(*facts.budget >= 0 && *facts.budget <= 1))
     throw Error(file + ": budget: expected a share from 0 to 1");
@@ -55,7 +56,7 @@ BaselineFacts loadFacts(const std::filesystem::path& baseline) {
   try {
     return factsOf(file, Json::parse(readTextFile(file)));
   } catch (const Json::exception& error) {
-    throw Error(file + ": is not the JSON of a baseline (" + error.what() +
+    throw Error(file + ": is not the JSON of a baseline (" + printable(error.what()) +
                 "); remove it and accept the picture again");
   }
 }

@@ -267,7 +267,7 @@ TEST_F(Check, budgetsAreThoseOfTheBaseline) {
   saveFacts(facts, baseline("looks/a.png"));
   EXPECT_EQ(check().status, 0);
   for (const char* bad : {R"({"budgett": 1})", R"({"budget": 2})", R"({"budget": "all"})", R"({"size": [3, 1e300]})",
-                          R"({"size": [3, -1]})", R"({"size": [3]})", "x", "3"}) {
+                          R"({"size": [3, -1]})", R"({"size": [3]})", R"({"a\nb": 1})", "x", "3"}) {
     writeFile(factsFile(baseline("looks/a.png")), bad);
     EXPECT_THAT(results(), ElementsAre("looks/a.png: unreadable")) << bad;
     EXPECT_THAT(check().out, HasSubstr("a.json")) << bad;
