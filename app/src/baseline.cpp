@@ -1,20 +1,31 @@
 #include "baseline.h"
 
+#include <algorithm>
+
 #include "data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/output_file.h"
+#include "printable.h"
 #include "script.h"
 #include "summaries.h"
 
 namespace hpsdf::app {
 namespace {
 
+/// Whole numbers as they stand: nlohmann's JSON would convert any.
+std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
+  const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
+  if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))
+    throw Error(file + ": size: expected two whole numbers");
+  return json.get<std::array<std::size_t, 2>>();
+}
+
 /// Throws what nlohmann's JSON throws, or `Error`, for anything that is not what `saveFacts` writes.
 BaselineFacts factsOf(const std::string& file, const Json& json) {
   BaselineFacts facts;
   for (const auto& [key, value] : json.items()) {
     if (key == "size")
-      value.get_to(facts.size);
+      facts.size = sizeOf(file, value);
     else if (key == "renderer")
       value.get_to(facts.renderer);
     else if (key == "version")
@@ -24,7 +35,7 @@ BaselineFacts factsOf(const std::string& file, const Json& json) {
     else if (key == "bound")
       facts.bound = value.get<double>();
     else
-      throw Error(file + ": unknown key '" + key + "'");
+      throw Error(file + ": unknown key '" + printable(key) + "'");
   }
   if (facts.budget && !(*facts.budget >= 0 && *facts.budget <= 1))
     throw Error(file + ": budget: expected a share from 0 to 1");
@@ -45,7 +56,7 @@ BaselineFacts loadFacts(const std::filesystem::path& baseline) {
   try {
     return factsOf(file, Json::parse(readTextFile(file)));
   } catch (const Json::exception& error) {
-    throw Error(file + ": is not the JSON of a baseline (" + error.what() +
+    throw Error(file + ": is not the JSON of a baseline (" + printable(error.what()) +
                 "); remove it and accept the picture again");
   }
 }

@@ -60,9 +60,11 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   double scale = 0;
   stream >> kind >> table.columns >> table.rows >> scale;
   const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
+  // more of either than bytes: their product may be anything
+  const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
   const std::size_t count = table.columns * table.rows;
-  if (!stream || kind != "Pf" || scale >= 0 || begin > text.size() || (text.size() - begin) / sizeof(float) != count ||
-      (text.size() - begin) % sizeof(float) != 0)
+  if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||
+      (text.size() - begin) / sizeof(float) != count || (text.size() - begin) % sizeof(float) != 0)
     throw Error(file + ": is no whole .pfm file of one little-endian channel; write it anew with 'hpsdf slice'");
   table.values.resize(count);
   for (std::size_t n = 0; n < count; ++n) {

@@ -277,7 +277,7 @@ void limit(decltype(RLIMIT_CORE) resource, double most) {
   setrlimit(resource, &now);
 }
 
-void confine(double seconds, double bytes) {
+void confine(double seconds, [[maybe_unused]] double bytes) {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   prctl(PR_SET_DUMPABLE, 0);  // a limit does not hold for cores that go to a program

@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <type_traits>
+
+#include "printable.h"
 
 namespace hpsdf::app {
 namespace {
@@ -75,10 +76,11 @@ Header headerOf(std::span<const std::byte> bytes) {
   std::memcpy(&header, bytes.data(), sizeof header);
   if (header.magic != kMagic) throw DamagedReply("it does not begin like one");
   const bool isMesh = header.kind == std::uint64_t(MeshReply::Kind::mesh);
+  const bool mayHaveText = header.kind == std::uint64_t(MeshReply::Kind::refusal);
   if (header.kind > std::uint64_t(MeshReply::Kind::outOfMemory)) throw DamagedReply("its kind is unknown");
   if (header.vertices > kMostVertices || header.triangles > kMostTriangles || header.textBytes > kLongestText)
     throw DamagedReply("its counts are too large");
-  if (isMesh != (header.triangles > 0) || (!isMesh && header.vertices > 0) || (isMesh && header.textBytes > 0))
+  if (isMesh != (header.triangles > 0) || (!isMesh && header.vertices > 0) || (!mayHaveText && header.textBytes > 0))
     throw DamagedReply("its counts do not fit its kind");
   return header;
 }
@@ -122,14 +124,6 @@ TriangleMesh meshOf(std::span<const std::byte> vertices, std::span<const std::by
   return mesh;
 }
 
-/// As part of one line, on any terminal.
-std::string printable(std::span<const std::byte> bytes) {
-  std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  std::ranges::replace_if(
-      text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
-  return text;
-}
-
 }  // namespace
 
 const std::size_t kReplyHeaderBytes = sizeof(Header);
@@ -150,7 +144,7 @@ MeshReply parseReply(std::span<const std::byte> bytes) {
   if (header.checksum != checksumOf(header, vertices, triangles, text)) throw DamagedReply("its checksum is wrong");
   MeshReply reply;
   reply.kind = MeshReply::Kind(header.kind);
-  reply.refusal = printable(text);
+  reply.refusal = printable({reinterpret_cast<const char*>(text.data()), text.size()});
   if (reply.kind != MeshReply::Kind::mesh) return reply;
   reply.imported.report = reportOf(header);
   reply.imported.mesh = meshOf(vertices, triangles);

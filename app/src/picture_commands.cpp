@@ -369,7 +369,7 @@ std::vector<int> levelList(const std::string& text, const char* name, int most) 
     start = end + 1;
   }
   std::ranges::sort(levels);
-  levels.erase(std::ranges::unique(levels).begin(), levels.end());
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
   return levels;
 }
 

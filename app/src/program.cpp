@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "help.h"
 #include "hpsdf/error.h"
+#include "printable.h"
 #include "version.h"
 
 namespace hpsdf::app {
@@ -45,9 +46,8 @@ void checkOutput(const Console& console) {
   if (!console.out.flush()) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
 }
 
-int fail(const Console& console, std::string message, int status) {
-  std::ranges::replace(message, '\n', ' ');
-  console.err << "hpsdf: error: " << message << std::endl;
+int fail(const Console& console, const std::string& message, int status) {
+  console.err << "hpsdf: error: " << printable(message) << std::endl;
   return status;
 }
 

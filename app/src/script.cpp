@@ -13,12 +13,14 @@
 #include "hpsdf/error.h"
 #include "hpsdf/nearest_name.h"
 #include "hpsdf/output_file.h"
-#include "session.h"
 
 namespace hpsdf::app {
 namespace {
 
 constexpr std::size_t kDeepestInclude = 16;  // as deep as `run` goes
+// A few lines can ask for any amount of memory, by variables made of variables and by files that include others twice.
+constexpr std::size_t kMostCalls = 100'000;
+constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // put in for $name, altogether
 
 bool isLower(char c) { return c >= 'a' && c <= 'z'; }
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
@@ -48,9 +50,9 @@ struct Statement {
 /// Splits a script into statements and words.
 class Scanner {
  public:
-  /// `includedFrom` ends every message: see `Call`.
-  Scanner(std::string_view name, std::string_view text, std::string_view includedFrom)
-      : name_(name), text_(text), includedFrom_(includedFrom) {}
+  /// `includedFrom` ends every message: see `Call`. `variableBytes` counts what is put in for variables.
+  Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
+      : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 
   /// The next statement that has words; an empty one at the end of the text.
   Statement next(const Variables& variables) {
@@ -151,6 +153,10 @@ class Scanner {
     if (!isIdentifier(name)) fail(line_, column, "expected a variable's name after $; a plain dollar sign is $$");
     const auto found = variables.find(name);
     if (found == variables.end()) fail(line_, column, unknownVariable(name, variables));
+    variableBytes_ += found->second.size();
+    if (variableBytes_ > kMostVariableBytes)
+      fail(line_, column,
+           fmt::format("the script's variables make more than {} characters; take some out", kMostVariableBytes));
     out += found->second;
   }
 
@@ -166,6 +172,7 @@ class Scanner {
   std::string_view name_;
   std::string_view text_;
   std::string_view includedFrom_;
+  std::size_t& variableBytes_;
   std::size_t position_ = 0;
   int line_ = 1;
   int column_ = 1;
@@ -192,7 +199,7 @@ class ScriptReader {
   void add(std::string_view name, std::string_view text) {
     const std::string includedFrom = includedFromText();
     open_.push_back({std::string(name)});
-    Scanner scanner(name, text, includedFrom);
+    Scanner scanner(name, text, includedFrom, variableBytes_);
     for (;;) {
       const Statement statement = scanner.next(variables_);
       if (statement.words.empty()) break;
@@ -212,6 +219,9 @@ class ScriptReader {
     const auto rest = std::span(statement.words).subspan(1);
     std::optional<Included> included;
     try {
+      if (calls_.size() == kMostCalls)
+        throw Error(
+            fmt::format("more than {} commands, those of included scripts among them; take some out", kMostCalls));
       const Command& command = registry_.command(verb.text);
       if (command.commandLineOnly)
         throw Error(fmt::format("'{}' is a command of the command line: hpsdf {} …", verb.text, verb.text));
@@ -240,6 +250,10 @@ class ScriptReader {
     if (std::ranges::any_of(open_, isThat))
       throw Error(
           fmt::format("{}: includes itself, directly or by others; take one of the includes out", path.string()));
+    if (std::error_code missing; std::filesystem::exists(path, missing) &&
+                                 !std::filesystem::is_regular_file(path, missing) &&
+                                 !std::filesystem::is_directory(path, missing))
+      throw Error(path.string() + ": is not a regular file; include a script");  // a device may have no end
     if (open_.size() > kDeepestInclude)
       throw Error(
           fmt::format("{}: more than {} scripts include each other; take some apart", path.string(), kDeepestInclude));
@@ -258,6 +272,7 @@ class ScriptReader {
   Variables variables_;
   std::vector<Open> open_;  // the script itself first
   std::vector<Call> calls_;
+  std::size_t variableBytes_ = 0;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "current_field.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/render/picture.h"
@@ -40,17 +41,6 @@ struct Console {
   std::filesystem::path meshReader =
       {};                 ///< program that mesh files are read by (mesh_process.h); empty: by this process
   std::string work = {};  ///< what progress is told of, in front of it, where that is one of many
-};
-
-/// The field that commands work on.
-struct CurrentField {
-  Field field;
-  std::string name;                              ///< file or mesh that it came from
-  std::optional<std::uintmax_t> fileBytes = {};  ///< of one that was loaded or saved
-  std::string surface = {};                      ///< mesh file or shape that it was built from just now
-
-  /// What it can be built from again: as far as is known.
-  const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
 
 /// Which renderer draws.

@@ -175,7 +175,7 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
   std::optional<CurrentField> shown;
   std::optional<render::Drawn> drawn;
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
-    shown.emplace(shot.field, shot.field.metadata().source.name);
+    shown = CurrentField{shot.field, shot.field.metadata().source.name};
     drawn = std::move(shot.drawn);
     session.setLastRenderer(shot.renderer);
   });

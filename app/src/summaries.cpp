@@ -6,6 +6,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "printable.h"
+
 namespace hpsdf::app {
 namespace {
 
@@ -69,6 +71,7 @@ std::string bytesText(double bytes) {
 }
 
 std::string shortNumber(double number) {
+  if (!std::isfinite(number)) return fmt::format("{}", number);  // strangers' files hold such
   const double size = std::abs(number);
   if (number == 0 || (size >= 0.01 && size < 1e5)) return fmt::format("{:.3g}", number);
   std::string mantissa = fmt::format("{:.2e}", number);
@@ -280,7 +283,7 @@ std::string fieldText(const CurrentField& current) {
   const auto& grid = field.grid();
   const bool fromMesh = metadata.source.faces > 0;
   std::string text = current.name + "\n";
-  text += summaryRow("made from", metadata.source.name.empty() ? "a function" : metadata.source.name);
+  text += summaryRow("made from", metadata.source.name.empty() ? "a function" : printable(metadata.source.name));
   if (fromMesh) {
     text += summaryRow("vertices, faces",
                        fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));

@@ -6,8 +6,8 @@
 #include <ostream>
 #include <string>
 
+#include "current_field.h"
 #include "hpsdf/mesh_report.h"
-#include "session.h"
 
 namespace hpsdf::app {
 

@@ -194,7 +194,7 @@ std::string figureTable(const Verification& figures) {
   text += row("mean error", [](F f) { return f.error.mean; });
   for (const auto& [percent, unused] : figures.uniform.error.percentiles)
     text += row(fmt::format("{} % of the errors are within", percent),
-                [&](F f) { return f.error.percentiles.at(percent); });
+                [at = percent](F f) { return f.error.percentiles.at(at); });
   text += row("greatest error", [](F f) { return f.error.max; });
   text += countRow("wrong signs", [](F f) { return f.signs.mismatches; });
   text += row("  the farthest from the surface", [](F f) { return f.signs.deepest; });

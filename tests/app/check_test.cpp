@@ -266,7 +266,8 @@ TEST_F(Check, budgetsAreThoseOfTheBaseline) {
   facts.budget = 1;
   saveFacts(facts, baseline("looks/a.png"));
   EXPECT_EQ(check().status, 0);
-  for (const char* bad : {R"({"budgett": 1})", R"({"budget": 2})", R"({"budget": "all"})", "x", "3"}) {
+  for (const char* bad : {R"({"budgett": 1})", R"({"budget": 2})", R"({"budget": "all"})", R"({"size": [3, 1e300]})",
+                          R"({"size": [3, -1]})", R"({"size": [3]})", R"({"a\nb": 1})", "x", "3"}) {
     writeFile(factsFile(baseline("looks/a.png")), bad);
     EXPECT_THAT(results(), ElementsAre("looks/a.png: unreadable")) << bad;
     EXPECT_THAT(check().out, HasSubstr("a.json")) << bad;
@@ -365,8 +366,8 @@ TEST(DataTable, brokenFilesAreRefusedByName) {
     writeFile(folder / "a.csv", text);
     EXPECT_THROW(loadData(folder / "a.csv"), Error) << text;
   }
-  for (const char* text :
-       {"", "Pf\n1 1\n-1.0\n12", "PF\n1 1\n-1.0\n1234", "Pf\n1 1\n1.0\n1234", "Pf\n1 1\n-1.0\n12345"}) {
+  for (const char* text : {"", "Pf\n1 1\n-1.0\n12", "PF\n1 1\n-1.0\n1234", "Pf\n1 1\n1.0\n1234", "Pf\n1 1\n-1.0\n12345",
+                           "Pf\n-1 -1\n-1.0\n1234", "Pf\n9223372036854775808 2\n-1.0\n"}) {
     writeFile(folder / "a.pfm", text);
     EXPECT_THROW(loadData(folder / "a.pfm"), Error) << text;
   }

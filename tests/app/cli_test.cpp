@@ -23,6 +23,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
+#include <random>
 #include <set>
 #include <sstream>
 #include <string>
@@ -39,6 +40,7 @@
 #include "report_page.h"
 #include "started_program.h"
 #include "summaries.h"
+#include "support/one_leaf_field.h"
 #include "support/require_gl.h"
 #include "support/short_files.h"
 #include "support/temporary_directory.h"
@@ -273,6 +275,38 @@ TEST_F(Cli, infoTellsWhatTheFieldHolds) {
   const Outcome text = run({{"info", field()}});
   EXPECT_THAT(text.out, HasSubstr("leaves"));
   EXPECT_THAT(text.out, HasSubstr("▇"));
+}
+
+TEST_F(Cli, damagedFieldsAreRefused) {
+  const std::string whole = readFile(field());
+  std::mt19937_64 random(5);
+  for (int n = 0; n < 40; ++n) {
+    std::string bytes = whole;
+    const std::size_t at = random() % (n % 4 < 2 ? 400 : whole.size());
+    if (n % 2 == 0)
+      bytes.resize(at);
+    else
+      bytes[at] = char(bytes[at] ^ (1 << random() % 8));
+    writeFile(this->at("damaged.hpsdf"), bytes);
+    expectRefused({{"info", this->at("damaged.hpsdf")}}, "damaged.hpsdf: ");
+  }
+}
+
+/// A stranger's field whose figures are no numbers and whose name would clear the screen.
+TEST_F(Cli, infoTellsOfAnyFieldThatLoads) {
+  FieldData data = oneLeafField(1, 2).data();
+  data.metadata.source.name = "evil\n\x1b[2J\xff.obj";
+  data.metadata.targetError = NAN;
+  data.metadata.totalError = -INFINITY;
+  save(Field(data), at("evil.hpsdf"));
+  const Outcome text = run({{"info", at("evil.hpsdf")}});
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("evil  [2J\xff.obj\n"));
+  EXPECT_THAT(text.out, HasSubstr("-inf, nan"));
+  EXPECT_THAT(text.out, Not(HasSubstr("\x1b")));
+  const Outcome json = run({{"info", at("evil.hpsdf"), "--json"}});
+  EXPECT_EQ(json.status, 0) << json.err;
+  EXPECT_TRUE(Json::parse(json.out).at("target_error").is_null());
 }
 
 TEST_F(Cli, smoothIsWhatBuildDoesWithWeakContinuity) {
@@ -695,6 +729,8 @@ TEST_F(Cli, badPointsAreRefusedByLine) {
     writeFile(at("points.txt"), "0 0 0\n" + std::string(bad) + "\n");
     expectRefused({{"query", field(), at("points.txt"), "-o", at("out.csv")}}, "points.txt:2: expected three finite");
   }
+  writeFile(at("points.txt"), "1 2 \x1b[2J\n");
+  expectRefused({{"query", field(), at("points.txt")}}, "found '1 2  [2J'");
   const Outcome first = run({{"query", field()}, "nan,nan,nan\n"});
   EXPECT_EQ(first.status, 2);
   EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));
@@ -1223,6 +1259,8 @@ TEST(Summaries, numbersAreReadable) {
   EXPECT_EQ(shortNumber(2.5e12), "2.5e12");
   EXPECT_EQ(shortNumber(0.125), "0.125");
   EXPECT_EQ(shortNumber(0), "0");
+  EXPECT_EQ(shortNumber(-INFINITY), "-inf");
+  EXPECT_EQ(shortNumber(NAN), "nan");
   EXPECT_EQ(grouped(1234567), "1,234,567");
   EXPECT_EQ(grouped(999), "999");
   EXPECT_EQ(bytesText(8.4e6), "8.40 MB");

@@ -169,6 +169,13 @@ TEST(MeshReplies, areNotBelievedForTheirChecksum) {
   }
 }
 
+TEST(MeshReplies, bringTextWithRefusalsAlone) {
+  Bytes bytes = refusalOf("t.off: no mesh");
+  const auto outOfMemory = std::uint64_t(MeshReply::Kind::outOfMemory);
+  std::memcpy(bytes.data() + 16, &outOfMemory, 8);  // behind magic and checksum
+  EXPECT_EQ(damageOf(bytes), "its counts do not fit its kind");
+}
+
 /// Counts stand where `mesh_reply.cpp` puts them: behind magic, checksum and kind.
 TEST(MeshReplies, takeNoMemoryForWhatTheyPromise) {
   const auto promising = [](std::uint64_t vertices, std::uint64_t triangles) {

@@ -118,6 +118,16 @@ TEST_F(ScriptTest, setGivesVariablesToTheLinesBelow) {
   EXPECT_THAT(complaint("set n=1 2nd=3"), HasSubstr("expected name=value, found '2nd=3'"));
 }
 
+TEST_F(ScriptTest, muchTextFromFewVariablesIsRefused) {
+  const auto doubled = [](int times) {
+    std::string text = "set a=0123456789\n";
+    for (int n = 0; n < times; ++n) text += "set a=$a$a\n";
+    return text;
+  };
+  EXPECT_EQ(complaint(doubled(19)), "no complaint");
+  EXPECT_THAT(complaint(doubled(60)), HasSubstr("variables make more than 16777216 characters"));
+}
+
 TEST_F(ScriptTest, mistakesNameFileLineAndColumn) {
   EXPECT_EQ(complaint("say a\n  sya b"), "test.hps:2:3: unknown command 'sya'; did you mean 'say'?");
   EXPECT_EQ(complaint("say a\nsay b  coutn=2"), "test.hps:2:8: say: unknown option 'coutn'; did you mean 'count'?");
@@ -204,6 +214,21 @@ TEST_F(IncludeTest, includesGoSixteenScriptsDeep) {
   EXPECT_THAT(complaintNamed(at("a.hps"), "include d1.hps"), HasSubstr("more than 16 scripts include each other"));
   EXPECT_EQ(complaintNamed(at("a.hps"), "include d4.hps"), "no complaint");
   EXPECT_THAT(said_, ElementsAre("[deep]"));
+}
+
+TEST_F(IncludeTest, manyCommandsFromFewLinesAreRefused) {
+  for (int depth = 1; depth < 6; ++depth) {
+    std::string ten;
+    for (int n = 0; n < 10; ++n) ten += "include d" + std::to_string(depth + 1) + ".hps\n";
+    write("d" + std::to_string(depth) + ".hps", ten);
+  }
+  write("d6.hps", "");
+  EXPECT_THAT(complaintNamed(at("a.hps"), "include d1.hps"), HasSubstr("more than 100000 commands"));
+  EXPECT_EQ(complaintNamed(at("a.hps"), "include d2.hps"), "no complaint");
+}
+
+TEST_F(IncludeTest, devicesAreNotRead) {
+  EXPECT_THAT(complaintNamed(at("a.hps"), "include /dev/zero"), HasSubstr("/dev/zero: is not a regular file"));
 }
 
 TEST_F(IncludeTest, includedCallsBelongToTheLineOfTheInclude) {

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
@@ -100,6 +102,57 @@ TEST(FieldFile, EveryFlippedBitIsRefused) {
     writeAll(file, bytes);
     ASSERT_FALSE(refusal(file).empty()) << "byte " << position;
   }
+}
+
+std::vector<std::string> everyKind() {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "kind.hpsdf";
+  const BuildOptions plain{.targetError = 1e-3, .grid = {2, 2, 1}, .maxDegree = 4, .maxDepth = 2};
+  std::vector<BuildOptions> kinds(7, plain);
+  kinds[0].coefficients = CoefficientType::float32;
+  kinds[1].coefficients = CoefficientType::float64;
+  kinds[2].band = 0.2;
+  kinds[3].bounds = true;
+  kinds[4].blend = 0.1;
+  kinds[5].continuityWeight = 1;
+  kinds[6].maxSteps = 0;
+  std::vector<std::string> files;
+  for (const BuildOptions& options : kinds) {
+    save(build(torus, Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)), options), file);
+    files.push_back(readAll(file));
+  }
+  return files;
+}
+
+/// Cut off, cut open, or with up to eight other bits, of a few bytes or of all; every place as often as another, and
+/// half of them in the header.
+TEST(FieldFile, TwoThousandDamagedFilesOfEveryKindAreRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "damaged.hpsdf";
+  const std::vector<std::string> files = everyKind();
+  std::mt19937_64 random(3);
+  int refused = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const std::string& whole = files[n % files.size()];
+    const auto place = [&] {
+      return random() % (random() % 2 == 0 ? std::min<std::size_t>(400, whole.size()) : whole.size());
+    };
+    std::string bytes = whole;
+    if (n % 3 == 0)
+      bytes.resize(place());
+    else if (n % 10 == 1)
+      bytes.erase(place(), 1 + random() % 64);
+    else
+      for (std::uint64_t bits = 1 + random() % 8; bits > 0 || bytes == whole; bits -= bits > 0) {
+        char& byte = bytes[place()];
+        byte = char(byte ^ (1 << (random() % 8)));
+      }
+    writeAll(file, bytes);
+    const std::string message = refusal(file);
+    refused += !message.empty();
+    EXPECT_TRUE(message.starts_with(file.string() + ": ") && message.find('\n') == std::string::npos) << n << message;
+  }
+  EXPECT_EQ(refused, 2000);
 }
 
 TEST(FieldFile, OtherFilesAreNamedForWhatTheyAre) {

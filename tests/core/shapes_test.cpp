@@ -358,6 +358,8 @@ TEST(NearestName, FindsSlipsAndBeginnings) {
   EXPECT_EQ(nearestName("zzzz", known), "");
   EXPECT_EQ(nearestName("", known), "");
   EXPECT_EQ(nearestName("build", {}), "");
+  const std::string endless(1'000'000, 'x');  // to compare it with another would take a trillion steps
+  EXPECT_EQ(nearestName(endless + "y", std::vector{endless}), "");
   EXPECT_EQ(nearestName("x", std::vector<std::string>{"y", "z"}), "");
 }
 

@@ -348,7 +348,7 @@ void Explorer::drawPicture(int shrink) {
     levels(figures());
     levels(statistics(*other));
     std::ranges::sort(scale.levels);
-    scale.levels.erase(std::ranges::unique(scale.levels).begin(), scale.levels.end());
+    scale.levels.erase(std::unique(scale.levels.begin(), scale.levels.end()), scale.levels.end());
   }
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, evidence, scale, shrink);
   std::optional<render::Drawn> beside;
@@ -402,7 +402,8 @@ std::optional<Readout> Explorer::readout() {
   if (work || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
-  const auto pickIn = [&](const Field& field, const std::optional<render::Drawn>& drawn, const UiRect& rect) {
+  const auto pickIn = [&, x = x, y = y](const Field& field, const std::optional<render::Drawn>& drawn,
+                                        const UiRect& rect) {
     const bool inside = drawn && rect.contains(x, y) && x - rect.x0 < drawn->image.width;
     return inside ? render::pickAt(field, *drawn, int(x - rect.x0), int(y - rect.y0)) : std::nullopt;
   };

@@ -35,12 +35,15 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
 
 /// The known name that was probably meant, for "did you mean" in messages; the first of equally near ones. Empty when
 /// nothing is near: a name is near when at most a third of the letters (at least one) differ, or when what was asked
-/// for is its beginning, three letters or more.
+/// for is its beginning, three letters or more. Names of more than 64 letters are not compared: strangers' files have
+/// some without end.
 inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
+  constexpr std::size_t kLongest = 64;
   std::string best;
   std::size_t bestDistance = std::string::npos;
   for (const std::string& name : known) {
     const std::size_t letters = std::max(wanted.size(), name.size());
+    if (letters > kLongest) continue;
     std::size_t distance = editDistance(wanted, name);
     const bool isBeginning = wanted.size() >= 3 && name.starts_with(wanted);
     if (isBeginning) distance = std::min(distance, std::size_t{1});

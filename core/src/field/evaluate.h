@@ -183,7 +183,8 @@ ValueAndGradient evaluateWithGradient(const T* c, int degree, const std::array<d
 /// As one condition: six branches would cost more than the comparisons. NaN is not within.
 inline bool contains(const GridFrame& domain, const Vector3& x) {
   bool within = true;
-  for (int axis = 0; axis < 3; ++axis) within &= (x[axis] >= domain.lower[axis]) & (x[axis] <= domain.upper[axis]);
+  for (int axis = 0; axis < 3; ++axis)
+    within &= static_cast<int>(x[axis] >= domain.lower[axis]) & static_cast<int>(x[axis] <= domain.upper[axis]);
   return within;
 }
 

@@ -1,0 +1,37 @@
+#pragma once
+// The constructions whose states the target `checkpoint` takes up, and which its corpus holds.
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "hpsdf/checkpoint.h"
+
+namespace hpsdf::fuzz {
+
+/// Each ends soon whatever its state: there are not many cells to refine.
+inline std::array<BuildOptions, 3> constructions() {
+  BuildOptions paper{.targetError = 1e-3, .grid = {2, 1, 1}, .maxDegree = 2, .maxDepth = 2, .threads = 1};
+  BuildOptions optimal = paper;
+  optimal.criterion = Criterion::optimal;
+  BuildOptions byDistance = paper;
+  byDistance.targetError = 0;
+  byDistance.nearError = 3e-2;
+  byDistance.farError = 1e-1;
+  byDistance.maxError = 0.1;
+  return {paper, optimal, byDistance};
+}
+
+inline double sphere(const Vector3& x) { return (x - Vector3(0.1, 0.2, 0)).norm() - 0.5; }
+inline Box domain() { return Box(Vector3::Constant(-1), Vector3::Constant(1)); }
+
+/// Of a checkpoint's bytes, those before the state: what it is, of which version, and what it is of.
+inline std::size_t bytesBeforeState(std::string_view checkpoint) {
+  constexpr std::size_t kLengthAt = 8 + 4;  // of the program's version, behind which are three digests
+  std::uint32_t length = 0;
+  checkpoint.copy(reinterpret_cast<char*>(&length), sizeof length, kLengthAt);
+  return kLengthAt + sizeof length + length + 3 * 8;
+}
+
+}  // namespace hpsdf::fuzz

@@ -1,0 +1,104 @@
+// A `.hpsdf` file: what loads answers wherever it is asked, and is written again as it was.
+#include "hpsdf/field_file.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "current_field.h"
+#include "hpsdf/line.h"
+#include "hpsdf/safe_distance.h"
+#include "summaries.h"
+#include "target.h"
+
+namespace {
+
+using namespace hpsdf;
+
+constexpr std::size_t kVersionAt = 8;
+constexpr std::uint8_t kVersion = 4;  // before it a field was written with less
+
+/// Within the domain, on its sides, around it, and places that are none.
+std::vector<Vector3> placesOf(const Box& domain) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr std::array kParts = {-0.5, 0.0, 0.137, 0.5, 0.71, 1.0, 1.0 + 1e-15, 3.0};
+  std::vector<Vector3> places = {Vector3::Constant(NAN), Vector3::Constant(kInfinity), Vector3::Constant(-1e300)};
+  for (const double x : kParts)
+    for (const double y : kParts)
+      for (const double z : kParts)
+        places.push_back(domain.min() + Vector3(x, y, z).cwiseProduct(domain.max() - domain.min()));
+  return places;
+}
+
+bool isSame(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+
+void askEverywhere(const Field& field) {
+  const std::vector<Vector3> places = placesOf(field.domain());
+  std::vector<double> values(places.size());
+  std::vector<ValueAndGradient> answers(places.size());
+  field.values(places, values);
+  field.valuesAndGradients(places, answers);
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    fuzz::require(isSame(field.value(places[n]), values[n]), "a batch has the value of one point");
+    fuzz::require(isSame(field.valueAndGradient(places[n]).value, answers[n].value), "and with the gradient");
+  }
+}
+
+void lookAtCells(const Field& field) {
+  std::size_t leaves = 0;
+  field.forEachCell([&](const Cell& cell) {
+    ++leaves;
+    const Cell found = field.cellAt(cell.box.center());
+    const bool isThin = (cell.box.sizes().array() <= 1e-12 * field.domain().sizes().array()).any() ||
+                        (cell.box.center().cwiseAbs().array() * 1e-9 > cell.box.sizes().array()).any();
+    fuzz::require(isThin || found.id == cell.id, "a leaf is found at its centre");
+  });
+  fuzz::require(statistics(field).leaves == leaves, "there are as many leaves as are visited");
+}
+
+void goThrough(const Field& field) {
+  const Vector3 from = field.domain().min(), to = field.domain().max();
+  fuzz::reads([&] { jumpsAlong(sampleLine(field, from, to, 9)); });
+  if (field.data().bounds.empty()) return;
+  boundAt(field, from);
+  safeDistance(field, to);
+}
+
+void describe(const Field& field) {
+  const app::CurrentField current{field, "fuzz.hpsdf", std::nullopt, {}};
+  for (const unsigned char c : app::fieldText(current))
+    fuzz::require(c == '\n' || (c >= ' ' && c != 127), "a summary has no characters that steer a terminal");
+  app::fieldLine(field);
+  app::fieldJson(current).dump(2, ' ', false, app::Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t maxSize,
+                                               unsigned seed) {
+  size = LLVMFuzzerMutate(data, size, maxSize);
+  if (seed % 8 != 0) fuzz::mendChecksum(data, size);
+  return size;
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view bytes = fuzz::textOf(data, size);
+  const auto file = fuzz::fileOf("in.hpsdf", bytes);
+  std::optional<Field> field;
+  if (!fuzz::reads([&] { field.emplace(load(file)); })) return 0;
+  askEverywhere(*field);
+  lookAtCells(*field);
+  goThrough(*field);
+  describe(*field);
+  save(*field, file);
+  const std::string saved = fuzz::bytesOf(file);
+  if (data[kVersionAt] == kVersion) fuzz::require(saved == bytes, "what was read is written as it was");
+  save(load(file), file);
+  fuzz::require(fuzz::bytesOf(file) == saved, "what was written is read");
+  return 0;
+}

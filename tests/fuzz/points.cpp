@@ -1,0 +1,43 @@
+// The points of `hpsdf query`: what is answered is a line, or an object of JSON, for each.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+
+#include "point_query.h"
+#include "support/one_leaf_field.h"
+#include "target.h"
+
+namespace {
+
+using namespace hpsdf;
+
+struct Answers {
+  bool all = false;
+  std::size_t points = 0;
+  std::string text;
+};
+
+Answers answer(const Field& field, std::string_view points, app::PointFormat format) {
+  Answers answers;
+  std::istringstream in{std::string(points)};
+  answers.all = fuzz::reads([&] {
+    answers.points =
+        app::queryPoints(field, in, "points.csv", format, [&](std::string_view text) { answers.text += text; });
+  });
+  return answers;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Field field = oneLeafField(1, 3);
+  const Answers csv = answer(field, fuzz::textOf(data, size), app::PointFormat::csv),
+                json = answer(field, fuzz::textOf(data, size), app::PointFormat::json);
+  fuzz::require(csv.all == json.all && csv.points == json.points, "both formats take the same points");
+  if (!csv.all) return 0;
+  fuzz::require(std::size_t(std::ranges::count(csv.text, '\n')) == csv.points + 1, "a line a point, and the names");
+  const auto parsed = nlohmann::json::parse(json.text, nullptr, false);
+  fuzz::require(parsed.is_array() && parsed.size() == json.points, "an object a point");
+  return 0;
+}

@@ -1,0 +1,111 @@
+// Writes the corpus's files that are not text: fields of every kind, states of constructions, replies about meshes, raw
+// values. usage: fuzz_seeds tests/fuzz/corpus
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "checkpoint.h"
+#include "hpsdf/build.h"
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+#include "mesh_reply.h"
+#include "target.h"
+
+namespace {
+
+using namespace hpsdf;
+namespace fs = std::filesystem;
+
+void write(const fs::path& file, const std::string& bytes) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+void writeFields(const fs::path& folder) {
+  fs::create_directories(folder);
+  const BuildOptions plain{.targetError = 1e-2, .grid = {2, 1, 1}, .maxDegree = 3, .maxDepth = 2, .threads = 1};
+  const auto add = [&](const std::string& name, const auto& change) {
+    BuildOptions options = plain;
+    change(options);
+    Source source{"sphere.obj", 7, 8, 12, fuzz::domain()};
+    source.sign = Sign::pseudonormal;
+    save(build(DistanceFunction(fuzz::sphere, source), fuzz::domain(), options), folder / (name + ".hpsdf"));
+  };
+  add("double", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::float64; });
+  add("float", [](BuildOptions& o) { o.coefficients = CoefficientType::float32; });
+  add("band", [](BuildOptions& o) { o.targetError = 1e-4, o.band = 0.2; });
+  add("bounds", [](BuildOptions& o) { o.bounds = true; });
+  add("blended", [](BuildOptions& o) { o.targetError = 1e-4, o.blend = 0.1, o.bounds = true; });
+  add("weak", [](BuildOptions& o) { o.targetError = 1e-3, o.continuityWeight = 1, o.enrich = true; });
+  add("h2", [](BuildOptions& o) { o.targetError = 1e-3, o.strategy = Strategy::h2, o.criterion = Criterion::optimal; });
+  add("cell", [](BuildOptions& o) { o.grid = {1, 1, 1}, o.maxSteps = 0; });
+  add("wide", [](BuildOptions& o) { o.grid = {5, 4, 3}, o.maxDegree = 1, o.maxDepth = 0; });
+}
+
+void writeStates(const fs::path& folder) {
+  constexpr int kMiddle = 12;  // questions whether to go on
+  std::uint8_t which = 0;
+  for (const BuildOptions& options : fuzz::constructions()) {
+    int questions = 0;
+    for (const int last : {kMiddle, 1 << 30}) {  // from the middle and from the end
+      const auto file = fuzz::fileOf("state", "");
+      fs::remove(file);
+      try {
+        questions = 0;
+        buildResumably(fuzz::sphere, fuzz::domain(), options, {.file = file, .seconds = 0, .share = 1},
+                       {.report = {}, .cancelled = [&] { return ++questions > last; }});
+      } catch (const Cancelled&) {
+      }
+      const std::string whole = fuzz::bytesOf(file);
+      const std::size_t begin = fuzz::bytesBeforeState(whole);
+      write(folder / ("state-" + std::to_string(which) + (last == kMiddle ? "-middle" : "-end")),
+            std::string(1, static_cast<char>(which)) + whole.substr(begin, whole.size() - 8 - begin));
+    }
+    ++which;
+  }
+}
+
+void writeReplies(const fs::path& folder) {
+  std::string bytes;
+  const app::ReplySink sink = [&](std::span<const std::byte> piece) {
+    bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+  };
+  const auto keep = [&](const std::string& name) { write(folder / name, std::exchange(bytes, {})); };
+  ImportedMesh mesh;
+  mesh.mesh.vertices = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, -0.0}};
+  mesh.mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  mesh.report = {.vertices = 4, .faces = 4, .parts = 1, .turned = true, .volume = 2.5, .area = 12.5, .box = {}};
+  app::writeMesh(mesh, sink);
+  keep("mesh");
+  app::writeRefusal("t.off: no mesh", sink);
+  keep("refusal");
+  app::writeRefusal("t.off: no\nmesh \x1b[2J", sink);
+  keep("refusal-with-escapes");
+  app::writeOutOfMemory(sink);
+  keep("out-of-memory");
+}
+
+void writeTables(const fs::path& folder) {
+  const std::array<float, 6> values = {0.5f, -1.25f, 3e38f, NAN, INFINITY, 0};
+  std::string bytes(sizeof values, '\0');
+  std::memcpy(bytes.data(), values.data(), sizeof values);
+  write(folder / "slice.pfm", "Pf\n3 2\n-1.0\n" + bytes);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: " << argv[0] << " FOLDER" << std::endl;
+    return 1;
+  }
+  const fs::path corpus = argv[1];
+  writeFields(corpus / "field_file");
+  writeStates(corpus / "checkpoint");
+  writeReplies(corpus / "mesh_reply");
+  writeTables(corpus / "data_table");
+}
