@@ -22,6 +22,8 @@
 namespace hpsdf::app {
 namespace {
 
+constexpr std::uint64_t kMemoryUnlessTold = 100'000'000;  // of the construction, where nothing says how fine to be
+
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
 
@@ -296,6 +298,15 @@ std::vector<Parameter> buildParameters() {
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},
+      {.name = "memory-limit",
+       .type = ParameterType::wholeNumber,
+       .help =
+           "Memory that the construction may take. Where more will be needed it stops as soon as that is plain, and "
+           "says how much. Left out: 1e8, some 240,000 cells, where the target error is left out too, for which most "
+           "meshes take less than 100,000; else three quarters of the machine's memory.",
+       .unit = "bytes",
+       .minimum = 1,
+       .maximum = 1e15},
       {.name = "estimator",
        .type = ParameterType::choice,
        .help = "What stands for a cell's error: embedded, what the top degree adds, as in the paper, or residual, what "
@@ -507,6 +518,11 @@ BuildOptions buildOptions(const Arguments& arguments) {
   requireOwner(arguments, "blend-width", "continuity exact", exact);
   requireOwner(arguments, "near-distance", "near-error", options.nearError > 0);
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
+  const bool untold = arguments.has("target-error") && !arguments.given("target-error") && !endsOtherwise;
+  if (arguments.given("memory-limit"))
+    options.memoryLimit = static_cast<std::uint64_t>(arguments.number("memory-limit"));
+  else if (untold)
+    options.memoryLimit = kMemoryUnlessTold;
   options.threads = arguments.whole("threads");
   return options;
 }
@@ -520,7 +536,7 @@ void requireConsistent(const Arguments& arguments) {
 std::string decidingArguments(const Arguments& arguments) {
   std::string text;
   for (const Parameter& parameter : buildParameters()) {
-    if (parameter.name == "threads" || !arguments.has(parameter.name)) continue;
+    if (parameter.name == "threads" || parameter.name == "memory-limit" || !arguments.has(parameter.name)) continue;
     const std::vector<double> numbers = arguments.numbers(parameter.name);
     text += fmt::format("{}={}\n", parameter.name,
                         numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));

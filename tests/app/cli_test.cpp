@@ -226,6 +226,27 @@ TEST_F(Cli, openMeshesAreWarnedAbout) {
   EXPECT_EQ(mesh.at("boundary_edges"), 3);
 }
 
+TEST_F(Cli, memoryIsLimitedWhereNothingSaysHowFineToBe) {
+  std::string soup;  // triangles here and there, which surround nothing
+  std::uint32_t random = 1;
+  const auto number = [&] { return double((random = random * 1664525 + 1013904223) >> 8) / 0x1p24; };
+  for (int v = 0; v < 300; ++v) {
+    const double x = number(), y = number(), z = number();
+    soup += fmt::format("v {} {} {}\n", x, y, z);
+  }
+  for (int t = 0; t < 100; ++t) soup += fmt::format("f {} {} {}\n", 3 * t + 1, 3 * t + 2, 3 * t + 3);
+  writeFile(at("soup.obj"), soup);
+  const auto built = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", at("soup.obj"), "-o", at("soup.hpsdf"), "--sign", "pseudonormal"});
+    return run({more});
+  };
+  const Outcome limited = built({"--memory-limit", "1e6"});
+  EXPECT_EQ(limited.status, 2);
+  EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1 MB allowed"));
+  EXPECT_FALSE(std::filesystem::exists(at("soup.hpsdf")));
+  EXPECT_EQ(built({"--memory-limit", "1e8", "--target-error", "1e-3"}).status, 0);
+}
+
 /// Two tetrahedra, one of which reaches into the other.
 TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
   std::string text;

@@ -1,5 +1,6 @@
 #include "hpsdf/build.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -287,6 +288,32 @@ TEST(Build, AutomaticPrecisionComparesRoundingWithTheEstimate) {
   }
   EXPECT_GT(floats, 0);
   EXPECT_GT(doubles, 0);
+}
+
+/// By the estimate of build.h: 250 bytes a node, 8 a coefficient.
+TEST(Build, SaysEarlyThatMemoryWillNotDo) {
+  std::atomic<std::uint64_t> taken = 0;
+  const auto counted = [&](const Vector3& x) {
+    ++taken;
+    return torus(x);
+  };
+  BuildOptions options{.targetError = 1e-8};
+  const Field whole = build(counted, cube(), options);
+  const std::uint64_t all = taken.exchange(0);
+  const double needed = 250.0 * double(whole.data().nodes.size()) + 8.0 * double(statistics(whole).coefficients);
+  options.memoryLimit = std::uint64_t(1.1 * needed);
+  EXPECT_EQ(build(counted, cube(), options).data().nodes, whole.data().nodes);
+  EXPECT_EQ(taken.exchange(0), all);
+  options.memoryLimit = std::uint64_t(needed / 3);
+  try {
+    build(counted, cube(), options);
+    FAIL() << "it holds no more than a third";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("of memory are needed, more than the"));
+  }
+  EXPECT_LT(taken.load(), all / 4) << "more than it takes to fill that third";
+  options.memoryLimit = 10'000;
+  EXPECT_THROW(build(counted, cube(), options), Error) << "not even the base grid";
 }
 
 TEST(Build, LimitsHold) {

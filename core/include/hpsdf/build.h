@@ -75,6 +75,10 @@ struct BuildOptions {
   double blend = 0;     ///< exact continuity: `FieldData::blend` of the finished field, 0 to `kMaxBlend`
   bool bounds = false;  ///< for each leaf keeps what is certain of its error, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
+  /// Bytes that the growing octree may take, by a generous estimate; nothing: three quarters of the machine's memory.
+  /// `build` throws when more are needed, and before, where the way in which the error falls says that half as much
+  /// again will be.
+  std::optional<std::uint64_t> memoryLimit = {};
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };
 
@@ -93,8 +97,8 @@ void checkBuild(const Box& domain, const BuildOptions& options);
 
 /// Builds the field of Φ over `domain`. What Φ says of its source goes into the metadata; a box there gives L.
 ///
-/// Throws `Error` for options or a domain out of range, a tree that would not fit into memory, or a Φ that returns a
-/// non-finite value; `Cancelled` when asked to stop.
+/// Throws `Error` for options or a domain out of range, a tree that would not fit into memory (what it would need), or
+/// a Φ that returns a non-finite value; `Cancelled` when asked to stop.
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options = {},
             const Progress& progress = {});
 

@@ -47,6 +47,17 @@ class ProgressEstimate {
     return fraction_;
   }
 
+  /// How many times the work so far there will be in all, at least: as if the error fell from now on exponentially, no
+  /// slower than it does at present. 1 until it has fallen by a decade, before which there is little to read.
+  double leastGrowth(double work, double error, double target) const {
+    if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
+    const Point* back = &history_.front();
+    for (const Point& point : history_)
+      if (point.error > 3 * error) back = &point;
+    if (!(work > back->work)) return 1;
+    return 1 + std::log(error / target) * std::log(work / back->work) / std::log(back->error / error);
+  }
+
  private:
   struct Point {
     double work, error;
@@ -141,7 +152,7 @@ class Construction {
     std::size_t coefficients = 0;
     for (const BuildNode& node : tree.nodes)
       if (node.firstChild == 0) coefficients += coefficientCount(raised(node));
-    checkFitsMemory(tree.nodes.size(), coefficients);
+    checkFitsMemory({tree.nodes.size(), coefficients}, options_);
     for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
       report("raising every degree", double(begin) / double(tree.nodes.size()));
       tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
@@ -387,6 +398,11 @@ class Construction {
 
   bool mayStep() const { return !full_ && (!options_.maxSteps || steps_ < *options_.maxSteps); }
 
+  double leastGrowth() const {
+    if (goal_.byDistance() || options_.maxSteps || options_.maxBytes || !(growthGoal_.weighted > 0)) return 1;
+    return estimate_.leastGrowth(double(fitter_.evaluations()), totals_.weighted, growthGoal_.weighted);
+  }
+
   double fractionDone() {
     double fraction = 0;
     if (goal_.byDistance()) {
@@ -401,8 +417,8 @@ class Construction {
   }
 
   void refineRound(const std::function<void(std::uint64_t)>& afterStep) {
-    checkFitsMemory(tree_.nodes.size(), coefficientsInMemory());
     report("refining", fractionDone());
+    checkFitsMemory({tree_.nodes.size(), coefficientsInMemory(), leastGrowth()}, options_);
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
       const std::uint32_t next = queue_.top().node;
@@ -498,7 +514,7 @@ class Construction {
       stage_ = Stage::looking;
     }
     while (passed_ < waiting_.size()) {
-      checkFitsMemory(tree_.nodes.size(), coefficientsInMemory());
+      checkFitsMemory({tree_.nodes.size(), coefficientsInMemory()}, options_);
       report("looking for the maximum error", double(passed_) / double(waiting_.size()));
       const std::size_t count = std::min<std::size_t>(kLookRound, waiting_.size() - passed_);
       std::vector<Looked> looked(count);

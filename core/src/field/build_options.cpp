@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string>
 
 #include "field/weak_continuity.h"
 #include "hpsdf/error.h"
@@ -20,8 +21,18 @@ template <typename... Parts>
   throw Error(message.str());
 }
 
-/// Memory of the machine in bytes.
-double physicalMemory() { return double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)); }
+/// In bytes.
+double allowedMemory(const BuildOptions& options) {
+  const double machines = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
+  return options.memoryLimit ? std::min(0.75 * machines, double(*options.memoryLimit)) : 0.75 * machines;
+}
+
+std::string bytesText(double bytes) {
+  std::ostringstream text;
+  text.precision(3);
+  text << (bytes < 1e9 ? bytes / 1e6 : bytes / 1e9) << (bytes < 1e9 ? " MB" : " GB");
+  return text.str();
+}
 
 // of the construction: a leaf's node, its queue entry, the vector of its fit, the final arrays
 constexpr double kBytesPerNode = 250;
@@ -31,10 +42,10 @@ void checkGridFitsMemory(const BuildOptions& options) {
   const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
   const double bytesPerCell = kBytesPerNode + kBytesPerCoefficient * coefficientCount(startDegree(options));
   const double most =
-      std::min(0.75 * physicalMemory() / bytesPerCell, 0xffffffff / double(coefficientCount(startDegree(options))));
+      std::min(allowedMemory(options) / bytesPerCell, 0xffffffff / double(coefficientCount(startDegree(options))));
   if (cells > most)
     refuse("base grid ", options.grid[0], " x ", options.grid[1], " x ", options.grid[2], " has ", cells,
-           " cells and would need ", std::ceil(cells * bytesPerCell / 1e9), " GB; this machine takes at most ",
+           " cells and would need ", bytesText(cells * bytesPerCell), "; memory allows at most ",
            std::floor(std::cbrt(most)), " an axis");
 }
 
@@ -130,11 +141,16 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
            " times is finer than 2^32 cells an axis: take a coarser grid or a lower maximum depth");
 }
 
-void checkFitsMemory(std::size_t nodes, std::size_t coefficients) {
-  const double bytes = kBytesPerNode * double(nodes) + kBytesPerCoefficient * double(coefficients);
-  if (bytes > 0.75 * physicalMemory())
-    refuse("the field has grown to ", nodes, " cells and ", std::ceil(bytes / 1e9),
-           " GB, more than this machine holds: take a larger target error or a lower maximum depth");
+void checkFitsMemory(const Growth& growth, const BuildOptions& options) {
+  constexpr double kDoubt = 1.5;  // about what is yet to come
+  const double bytes = kBytesPerNode * double(growth.nodes) + kBytesPerCoefficient * double(growth.coefficients);
+  const double needed = bytes * growth.times, most = allowedMemory(options);
+  if (bytes <= most && needed <= kDoubt * most) return;
+  std::ostringstream cells;
+  cells.precision(2);
+  cells << std::fixed << double(growth.nodes) * growth.times / 1e6;
+  refuse("at least ", cells.str(), " million cells and ", bytesText(needed), " of memory are needed, more than the ",
+         bytesText(most), " allowed: take a larger target error or a lower maximum depth, or allow more memory");
 }
 
 double referenceLength(const Source& source, const Box& domain) {

@@ -19,7 +19,13 @@ ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
 /// Bytes of a coefficient as it will be kept, where a limit of bytes must know.
 double coefficientBytes(const BuildOptions& options);
 
-/// Throws `Error` where a tree of so many nodes and coefficients would not fit into the machine's memory.
-void checkFitsMemory(std::size_t nodes, std::size_t coefficients);
+/// What has grown so far, and how many times as much there will be.
+struct Growth {
+  std::size_t nodes = 0, coefficients = 0;
+  double times = 1;  ///< 1 where there is no telling
+};
+
+/// Throws `Error` where a tree like this does not fit into the memory that is allowed, or will not in the end.
+void checkFitsMemory(const Growth& growth, const BuildOptions& options);
 
 }  // namespace hpsdf

@@ -63,13 +63,14 @@ std::uint64_t digestOf(const BuildOptions& options, const Box& domain, std::stri
   // all of them, by a form that does not compile when there is one more
   const auto& [targetError, grid, nearness, nearnessKind, nearError, farError, nearDistance, maxError, maxBytes,
                estimator, criterion, maxDegree, maxDepth, strategy, quadrature, cubature, trialSamples, band, maxSteps,
-               enrich, continuityWeight, blend, bounds, coefficients, threads] = options;
+               enrich, continuityWeight, blend, bounds, coefficients, memoryLimit, threads] = options;
   Digest digest;
   const auto addAll = [&](const auto&... each) { (digest.add(each), ...); };
   addAll(targetError, grid[0], grid[1], grid[2], nearness, nearnessKind, nearError, farError, nearDistance, maxError,
          maxBytes, estimator, criterion, maxDegree, maxDepth, strategy, quadrature, cubature, trialSamples, band,
          maxSteps, enrich, continuityWeight, blend, bounds, coefficients);
-  static_cast<void>(threads);  // decides nothing
+  static_cast<void>(threads);      // decides nothing
+  static_cast<void>(memoryLimit);  // nor does this, but whether there is a field
   digest.add(domain);
   digest.add(about);
   return digest.value();
@@ -269,7 +270,7 @@ void treeItems(CheckedReader& reader, BuildTree& tree, std::uint64_t fitted, con
   if (count < base || (count - base) % 8 != 0 || count > 0xffffffffu || count > reader.remaining() / kLeastBytes ||
       fitted > base || (fitted < base && count > base))
     reader.damaged("it has a number of cells that cannot be");
-  checkFitsMemory(count, reader.remaining() / sizeof(double));
+  checkFitsMemory({count, reader.remaining() / sizeof(double)}, options);
   tree.addBaseCells();
   tree.nodes.resize(count);
   for (BuildNode& node : tree.nodes) {
