@@ -439,8 +439,10 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
   const Call call = batch(list, options);
 
   std::vector<std::unique_ptr<Process>> processes;
-  for (int i = 0; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
-  processes[0]->waitForLines(1);
+  processes.push_back(std::make_unique<Process>(call));
+  processes[0]->waitForLines(1);  // alone, it has built that one
+  for (int i = 1; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
+  processes[0]->waitForLines(2);
   processes[0]->send(SIGKILL);
   std::map<std::string, int> timesBuilt;
   int builtByVictim = 0;

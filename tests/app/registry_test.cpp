@@ -167,6 +167,18 @@ TEST(BuildArguments, allAreRead) {
   EXPECT_EQ(options.maxSteps, 0u);
 }
 
+/// Where nothing says how fine the field is to be, some memory must do.
+TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
+  const auto limit = [](const std::string& more) {
+    return buildOptions(parse("build", "m.obj -o f" + more)).memoryLimit;
+  };
+  EXPECT_EQ(limit(""), 100'000'000u);
+  EXPECT_EQ(limit(" --target-error 1e-6"), std::nullopt);
+  EXPECT_EQ(limit(" --max-error 1e-3"), std::nullopt);
+  EXPECT_EQ(limit(" --memory-limit 3e9"), 3'000'000'000u);
+  EXPECT_EQ(limit(" --memory-limit 3e9 --target-error 1e-6"), 3'000'000'000u);
+}
+
 TEST(BuildArguments, continuityIsRead) {
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none")).continuityWeight, std::nullopt);
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak")).continuityWeight, WeakContinuity{}.weight);
