@@ -12,10 +12,13 @@
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/triangle_mesh.h"
+#include "support/made_meshes.h"
 
 namespace hpsdf {
 namespace {
 
+using support::joined;
+using support::turned;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -33,18 +36,6 @@ TriangleMesh cube(double halfSize = 1, const Vector3& center = Vector3::Zero()) 
                     {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
   mesh.name = "cube";
   return mesh;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
-
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-  const auto first = static_cast<std::uint32_t>(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Triangle& t : b.triangles) a.triangles.push_back({first + t[0], first + t[1], first + t[2]});
-  return a;
 }
 
 /// Every triangle with three vertices of its own, as in an STL file.

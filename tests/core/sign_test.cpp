@@ -18,6 +18,7 @@
 #include "hpsdf/shapes.h"
 #include "hpsdf/sign_check.h"
 #include "hpsdf/threads.h"
+#include "support/made_meshes.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
@@ -25,6 +26,10 @@ namespace {
 
 using distance::Hierarchy;
 using distance::Winding;
+using support::joined;
+using support::moved;
+using support::openBox;
+using support::turned;
 
 /// The winding number by all triangles, each an integral of its own: the solid angle from the three angles between the
 /// planes through x (Girard), unlike the library's formula.
@@ -56,33 +61,6 @@ std::vector<Vector3> placesIn(const Box& box, int count, std::uint64_t seed = 1)
     x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
   }
   return places;
-}
-
-TriangleMesh moved(TriangleMesh mesh, const Vector3& by, double scale = 1) {
-  for (Vector3& x : mesh.vertices) x = scale * x + by;
-  return mesh;
-}
-
-TriangleMesh joined(const TriangleMesh& one, const TriangleMesh& other) {
-  TriangleMesh mesh = one;
-  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
-  for (auto [a, b, c] : other.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
-  return mesh;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
-  return mesh;
-}
-
-/// A box of size 2 without its upper side.
-TriangleMesh openBox() {
-  TriangleMesh mesh = shapes::mesh("box,width=2,height=2,depth=2");
-  std::erase_if(mesh.triangles, [&](const auto& triangle) {
-    return std::ranges::all_of(triangle, [&](std::uint32_t v) { return mesh.vertices[v].z() > 0.999; });
-  });
-  return mesh;
 }
 
 const DistanceOptions kAutomatic{.sign = Sign::automatic};

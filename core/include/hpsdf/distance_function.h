@@ -21,6 +21,7 @@ enum class Sign : std::uint8_t {
   pseudonormal,  ///< by the nearest feature's normal: for closed meshes that do not meet themselves
   winding,       ///< by the winding number: for any mesh, holes being closed
   shell,         ///< a wall of some thickness around the surface, which may be open
+  hull,          ///< as winding, and faces with the inside on both sides are no surface
 };
 
 /// Where a signed distance comes from: kept with a field built from it.

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "hpsdf/crossings.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
@@ -39,12 +40,14 @@ struct SignChoice {
 ///
 /// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time.
 ///
-/// Sign, one of three, or `Sign::automatic`: the first where it is certain to be right, else the second.
+/// Sign, one of four, or `Sign::automatic`: the first where it is certain to be right, else the second.
 /// * `Sign::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
 ///   feature (Bærentzen & Aanæs 2005): right for closed meshes that do not meet themselves.
 /// * `Sign::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided as the
 ///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
 ///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.
+/// * `Sign::hull`: the same sign, but triangles that have the inside on both sides, such as walls within bodies that
+///   overlap, are no surface. One that meets others counts up to a five-hundredth of the mesh's size beyond that.
 /// * `Sign::shell`: half of the thickness less than the unsigned distance. For sheets.
 ///
 /// Equal distances are decided by the lower triangle index, so that a result depends on neither the order nor the
@@ -57,8 +60,8 @@ struct SignChoice {
 /// Const and thread-safe after construction. Keeps no reference to the mesh.
 class ExactDistance {
  public:
-  /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, and for a
-  /// thickness that does not go with the sign.
+  /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, for a
+  /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in millions of places.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
@@ -69,11 +72,14 @@ class ExactDistance {
   /// Batched: fastest when neighbours in `points` are neighbours in space. The spans have equal length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
-  /// The nearest point of the triangles. Its signed distance is that of `operator()`: beside a closed hole, and of a
-  /// shell, not the distance to the point.
+  /// The nearest point of the triangles, of a hull those that are left. Its signed distance is that of `operator()`:
+  /// beside a closed hole, and of a shell, not the distance to the point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
   const SignChoice& signChoice() const;
+
+  /// `findCrossings` of the mesh.
+  Crossings crossings(std::size_t limit = kMostCrossings) const;
 
   /// Name, fingerprint, counts, box and sign of the mesh.
   const Source& source() const;

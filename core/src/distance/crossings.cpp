@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -28,7 +29,7 @@ Axes axesOf(const Triangle& t) {
   return {0, 0};
 }
 
-bool hasArea(const Triangle& t) {
+bool spansPlane(const Triangle& t) {
   const Axes axes = axesOf(t);
   return axes[0] != axes[1];
 }
@@ -75,13 +76,6 @@ bool isAside(const Triangle& t, std::span<const Vector3> corners) {
   return static_cast<std::size_t>(std::abs(sum)) == corners.size();
 }
 
-bool strangersMeet(const Triangle& one, const Triangle& other) {
-  if (isAside(one, other) || isAside(other, one)) return false;
-  for (int k = 0; k < 3; ++k)
-    if (meet(one[k], one[(k + 1) % 3], other) || meet(other[k], other[(k + 1) % 3], one)) return true;
-  return false;
-}
-
 /// The first corner is shared. A point that both have besides lies on a ray from there, which leaves one of them by the
 /// side across, within the other.
 bool meetBeyondCorner(const Triangle& one, const Triangle& other) {
@@ -112,10 +106,7 @@ int shareInFront(Corners& one, Corners& other) {
 class Finder {
  public:
   explicit Finder(const Hierarchy& hierarchy) : hierarchy_(hierarchy), vertices_(hierarchy.vertices().size()) {
-    double greatest = 0;
-    for (const Vector3& x : hierarchy.vertices()) greatest = std::max(greatest, x.cwiseAbs().maxCoeff());
-    // a power of two rounds nothing
-    const double scale = greatest > 0 ? std::ldexp(1.0, -std::ilogb(greatest)) : 1;
+    const double scale = scaleToOne(hierarchy.vertices());
     for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v] = scale * hierarchy.vertices()[v];
     unit_ = 1 / scale;
     makeBoxes();
@@ -124,7 +115,7 @@ class Finder {
   /// With triangles of later slots.
   void find(std::uint32_t slot, std::vector<Crossing>& found) const {
     const Triangle triangle = corners(slot);
-    if (hasArea(triangle)) visit(static_cast<int>(levels_.size()) - 1, 0, slot, triangle, found);
+    if (spansPlane(triangle)) visit(static_cast<int>(levels_.size()) - 1, 0, slot, triangle, found);
   }
 
  private:
@@ -166,8 +157,8 @@ class Finder {
     Corners mine = hierarchy_.triangles()[slot], its = hierarchy_.triangles()[other];
     const int shared = shareInFront(mine, its);
     const Triangle second = cornersOf(its);
-    if (!hasArea(second)) return false;
-    if (shared == 0) return strangersMeet(triangle, second);
+    if (!spansPlane(second)) return false;
+    if (shared == 0) return distance::meet(triangle, second);
     const Triangle first = cornersOf(mine);
     if (shared == 1) return meetBeyondCorner(first, second);
     return shared == 3 || meetBeyondSide(first, second);
@@ -185,6 +176,37 @@ class Finder {
 };
 
 }  // namespace
+
+bool meet(const Triangle& one, const Triangle& other) {
+  if (isAside(one, other) || isAside(other, one)) return false;
+  for (int k = 0; k < 3; ++k)
+    if (meet(one[k], one[(k + 1) % 3], other) || meet(other[k], other[(k + 1) % 3], one)) return true;
+  return false;
+}
+
+bool sidesCut(const Triangle& one, const Triangle& other, const std::array<bool, 3>& counts) {
+  Eigen::Index steepest = 0;
+  (other[1] - other[0]).cross(other[2] - other[0]).cwiseAbs().maxCoeff(&steepest);
+  const Axes axes = {int(steepest + 1) % 3, int(steepest + 2) % 3};
+  for (int k = 0; k < 3; ++k) {
+    if (!counts[k]) continue;
+    const Vector3 &from = other[k], &to = other[(k + 1) % 3];
+    if (contains(one, from, axes)) return true;
+    for (int i = 0; i < 3; ++i)
+      if (segmentsMeet(from, to, one[i], one[(i + 1) % 3], axes)) return true;
+  }
+  return false;
+}
+
+bool lieInOnePlane(const Triangle& one, const Triangle& other) {
+  return std::ranges::all_of(other, [&](const Vector3& x) { return orientation(one[0], one[1], one[2], x) == 0; });
+}
+
+double scaleToOne(std::span<const Vector3> vertices) {
+  double greatest = 0;
+  for (const Vector3& x : vertices) greatest = std::max(greatest, x.cwiseAbs().maxCoeff());
+  return greatest > 0 ? std::ldexp(1.0, -std::ilogb(greatest)) : 1;
+}
 
 Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit) {
   const Finder finder(hierarchy);

@@ -10,7 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "distance/crossings.h"
 #include "distance/hierarchy.h"
+#include "distance/hole_rims.h"
+#include "distance/hull.h"
 #include "distance/inside.h"
 #include "distance/pseudonormals.h"
 #include "distance/search.h"
@@ -43,23 +46,31 @@ struct ExactDistance::Data {
                .box = boundingBox(mesh),
                .thickness = options.thickness} {
     tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
-                         [&] {
-                           hierarchy = distance::Hierarchy(mesh, source.box);
-                           normals = distance::Pseudonormals(hierarchy);
-                         });
+                         [&] { hierarchy = distance::Hierarchy(mesh, source.box); });
     choice.sign = options.sign;
     if (options.sign == Sign::automatic)
       std::tie(choice, inside) = distance::chooseSign(hierarchy, mesh);
     else if (options.sign == Sign::winding)
-      inside = distance::Inside(hierarchy, mesh);
+      inside = distance::Inside(hierarchy, mesh, distance::HoleRims(hierarchy));
+    else if (options.sign == Sign::hull)
+      leaveOutBuried(mesh);
+    if (choice.sign == Sign::pseudonormal) normals = distance::Pseudonormals(hierarchy);
     source.sign = choice.sign;
   }
 
+  void leaveOutBuried(const TriangleMesh& mesh) {
+    whole = std::move(hierarchy);
+    inside = distance::Inside(whole, mesh, distance::HoleRims(whole));
+    distance::Hull hull = distance::hullOf(whole, mesh, inside);
+    hierarchy = distance::Hierarchy(hull.mesh, source.box);
+    parts = std::move(hull.triangles);
+  }
+
   /// What x is to its nearest triangle: from the mesh's own corners, so that a point on a vertex is at distance 0. Its
-  /// sign is the pseudonormal's.
-  ClosestPoint resolve(const Vector3& x, const distance::Nearest& nearest) const {
-    const std::uint32_t slot = hierarchy.slotAt(nearest.place);
-    const TriangleFrame& frame = hierarchy.frames()[slot];
+  /// sign is the pseudonormal's, where that counts.
+  ClosestPoint resolve(const distance::Hierarchy& of, const Vector3& x, const distance::Nearest& nearest) const {
+    const std::uint32_t slot = of.slotAt(nearest.place);
+    const TriangleFrame& frame = of.frames()[slot];
     const FramePoint& point = nearest.point;
     std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
     if (point.side[2] < point.side[side]) side = 2;
@@ -70,26 +81,26 @@ struct ExactDistance::Data {
       return {x - frame.normal * point.height, point.height + 0.0, frame.triangle, Feature::face};
 
     const std::uint32_t from = (frame.firstCorner + side) % 3;
-    const std::uint32_t va = hierarchy.triangles()[slot][from], vb = hierarchy.triangles()[slot][(from + 1) % 3];
-    const Vector3& a = hierarchy.vertices()[va];
-    const Vector3& b = hierarchy.vertices()[vb];
+    const std::uint32_t va = of.triangles()[slot][from], vb = of.triangles()[slot][(from + 1) % 3];
+    const Vector3& a = of.vertices()[va];
+    const Vector3& b = of.vertices()[vb];
     const double t = closestParameter(x, a, b);
-    if (t <= 0) return at(a, x - a, normals.ofVertex(va), frame.triangle, Feature::vertex);
-    if (t >= 1) return at(b, x - b, normals.ofVertex(vb), frame.triangle, Feature::vertex);
-    const Vector3 normal = normals.ofEdge(hierarchy, slot, from);
+    if (t <= 0) return at(a, x - a, normalOfVertex(va), frame.triangle, Feature::vertex);
+    if (t >= 1) return at(b, x - b, normalOfVertex(vb), frame.triangle, Feature::vertex);
+    const Vector3 normal = normalOfEdge(slot, from);
     return at(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
-  /// As they are by pseudonormals.
-  void byNormals(std::span<const Vector3> points, std::span<double> out) const {
+  /// To the triangles of a hierarchy; signed by pseudonormals, where these count.
+  void toTriangles(const distance::Hierarchy& of, std::span<const Vector3> points, std::span<double> out) const {
     using distance::kPacket;
     std::array<distance::Nearest, kPacket> nearest{};  // of the packet before: a tight bound from the outset
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
       const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
       std::array<Vector3, kPacket> packet;
       for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
-      hierarchy.nearest(packet, nearest);
-      for (std::size_t i = 0; i < count; ++i) out[first + i] = resolve(packet[i], nearest[i]).signedDistance;
+      of.nearest(packet, nearest);
+      for (std::size_t i = 0; i < count; ++i) out[first + i] = resolve(of, packet[i], nearest[i]).signedDistance;
     }
   }
 
@@ -97,16 +108,35 @@ struct ExactDistance::Data {
   void sign(std::span<const Vector3> points, std::span<double> distances) const {
     if (choice.sign == Sign::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
-    if (choice.sign == Sign::winding) inside.sign(points, distances);
+    if (choice.sign == Sign::hull && inside.hasHoles()) {
+      // the winding number changes smoothly up to the next triangle, a buried one too
+      std::vector<double> free(points.size());
+      toTriangles(whole, points, free);
+      for (double& distance : free) distance = std::abs(distance);
+      inside.sign(points, free, distances);
+    } else if (choice.sign == Sign::winding || choice.sign == Sign::hull) {
+      inside.sign(points, distances);
+    }
   }
 
+  std::uint32_t triangleOf(std::uint32_t triangle) const { return parts.empty() ? triangle : parts[triangle]; }
+
   Source source;
-  distance::Hierarchy hierarchy;
-  distance::Pseudonormals normals;
-  distance::Inside inside;  ///< empty unless it gives the sign
+  distance::Hierarchy hierarchy;     ///< of the triangles that distances go to
+  distance::Hierarchy whole;         ///< of all, where those are only a hull's
+  std::vector<std::uint32_t> parts;  ///< of which triangle each of a hull's is a part
+  distance::Pseudonormals normals;   ///< empty unless they give the sign
+  distance::Inside inside;           ///< likewise
   SignChoice choice;
 
  private:
+  Vector3 normalOfVertex(std::uint32_t vertex) const {
+    return choice.sign == Sign::pseudonormal ? normals.ofVertex(vertex) : Vector3::Zero();
+  }
+  Vector3 normalOfEdge(std::uint32_t slot, std::uint32_t from) const {
+    return choice.sign == Sign::pseudonormal ? normals.ofEdge(hierarchy, slot, from) : Vector3::Zero();
+  }
+
   /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.
   static ClosestPoint at(const Vector3& closest, const Vector3& difference, const Vector3& normal,
                          std::uint32_t triangle, Feature feature) {
@@ -129,24 +159,30 @@ double ExactDistance::operator()(const Vector3& x) const { return closestPoint(x
 
 void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  data_->byNormals(points, out);
+  data_->toTriangles(data_->hierarchy, points, out);
   data_->sign(points, out);
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  ClosestPoint closest = data_->resolve(x, data_->hierarchy.nearest(x));
+  ClosestPoint closest = data_->resolve(data_->hierarchy, x, data_->hierarchy.nearest(x));
   data_->sign({&x, 1}, {&closest.signedDistance, 1});
+  closest.triangle = data_->triangleOf(closest.triangle);
   return closest;
 }
 
 const SignChoice& ExactDistance::signChoice() const { return data_->choice; }
+
+Crossings ExactDistance::crossings(std::size_t limit) const {
+  return distance::findCrossings(data_->parts.empty() ? data_->hierarchy : data_->whole, limit);
+}
 
 std::string_view instructionSet() { return distance::instructionSet(); }
 
 const Source& ExactDistance::source() const { return data_->source; }
 
 std::size_t ExactDistance::bytes() const {
-  return data_->hierarchy.bytes() + data_->normals.bytes() + data_->inside.bytes();
+  return data_->hierarchy.bytes() + data_->whole.bytes() + data_->parts.size() * sizeof(std::uint32_t) +
+         data_->normals.bytes() + data_->inside.bytes();
 }
 
 }  // namespace hpsdf

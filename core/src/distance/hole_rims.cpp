@@ -10,17 +10,16 @@
 #include "mesh/sides.h"
 
 namespace hpsdf::distance {
-namespace {}  // namespace
 
 HoleRims::HoleRims(const Hierarchy& hierarchy) : HoleRims(hierarchy, sidesByEdge(hierarchy.triangles())) {}
 
 HoleRims::HoleRims(const Hierarchy& hierarchy, const std::vector<hpsdf::Side>& sides) {
   const auto place = [&](std::uint32_t vertex) { return hierarchy.local(hierarchy.vertices()[vertex]); };
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+  forEachEdge(sides, [&](std::span<const hpsdf::Side> edge) {
     int times = 0;
-    for (; end < sides.size() && sides[end].edge == sides[begin].edge; ++end) times += sides[end].rising ? 1 : -1;
-    if (times != 0) sides_.push_back({place(sides[begin].low()), place(sides[begin].high()), double(times)});
-  }
+    for (const hpsdf::Side& side : edge) times += side.rising ? 1 : -1;
+    if (times != 0) sides_.push_back({place(edge.front().low()), place(edge.front().high()), double(times)});
+  });
 }
 
 HoleRims::Gradient HoleRims::gradient(const Vector3& local) const {

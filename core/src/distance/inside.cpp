@@ -1,10 +1,13 @@
 #include "distance/inside.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace hpsdf::distance {
@@ -25,39 +28,44 @@ std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
 
 }  // namespace
 
+double besideSurface(const Box& box) {
+  const double largest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  return 1e-9 * box.sizes().norm() + 1e-14 * largest;
+}
+
 /// What is known of a place.
 struct Inside::Known {
   Vector3 place;
   double free;     ///< no triangle is nearer
-  double nearest;  ///< unsigned, patches of holes included
+  double nearest;  ///< so far is the surface, patches of holes included
   bool inside;
   double slack;     ///< so far from the level the winding number is at least
   double gradient;  ///< the winding number's is no longer
   double change;    ///< nor does it change by more a way
   double rim;       ///< none is nearer; no less than `free`
 
-  /// What follows for a place of which the distance to the triangles is known. After a way s every rim is at least
-  /// 1 − s/rim times as far, so that what changes with the cube of that does so by no more.
-  Known at(const Vector3& x, double distance) const {
+  /// What follows for a place of which distances are known. After a way s every rim is at least 1 − s/rim times as far,
+  /// so that what changes with the cube of that does so by no more.
+  Known at(const Vector3& x, double itsFree, double distance) const {
     const double squaredWay = (x - place).squaredNorm();
-    if (!(squaredWay < 0.998 * free * free)) return {x, distance, distance, inside, 0, 0, 0, 0};
+    if (!(squaredWay < 0.998 * free * free)) return {x, itsFree, distance, inside, 0, 0, 0, 0};
     const double way = std::sqrt(squaredWay), nearer = 1 - way / rim;
     const double changes = change / (nearer * nearer * nearer), steepest = gradient + changes * way;
-    return {x, distance, distance, inside, slack - steepest * way, steepest, changes, std::max(rim - way, distance)};
+    return {x, itsFree, distance, inside, slack - steepest * way, steepest, changes, std::max(rim - way, itsFree)};
   }
 
   /// The sign is certain, and the patch of a hole is farther than the triangles.
-  bool isSettled() const { return slack > 2 * kExact + 1.01 * gradient * free; }
+  bool isSettled() const { return slack > 2 * kExact + 1.01 * gradient * nearest; }
 };
 
-Inside::Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh)
-    : hierarchy_(&hierarchy), winding_(hierarchy), rims_(hierarchy) {
+Inside::Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh, HoleRims rims)
+    : hierarchy_(&hierarchy), winding_(hierarchy), rims_(std::move(rims)) {
   if (rims_.empty() && signedVolume(mesh) < 0) level_ = -0.5;
 }
 
-Inside::Known Inside::find(const Vector3& x, double distance) const {
+Inside::Known Inside::find(const Vector3& x, double free, double distance) const {
   if (!std::isfinite(distance)) return {x, 0, distance, false, 0, 0, 0, 0};
-  if (rims_.empty()) return {x, distance, distance, winding_.inside(x, level_), 0.5, 0, 0, HUGE_VAL};
+  if (rims_.empty()) return {x, free, distance, winding_.inside(x, level_), 0.5, 0, 0, HUGE_VAL};
   const double scale = hierarchy_->scale();
   const HoleRims::Gradient rims = rims_.gradient(hierarchy_->local(x));
   const double gradient = rims.value.norm() * scale;
@@ -68,7 +76,7 @@ Inside::Known Inside::find(const Vector3& x, double distance) const {
   const bool inside = away(found) > found.error ? found.value > level_ : winding_.inside(x, level_);
   const double toPatch = away(found) / gradient;
   return {x,
-          distance,
+          free,
           toPatch < distance ? toPatch : distance,
           inside,
           away(found) - found.error,
@@ -77,26 +85,32 @@ Inside::Known Inside::find(const Vector3& x, double distance) const {
           rims.nearest / scale};
 }
 
-void Inside::sign(std::span<const Vector3> points, std::span<double> distances) const {
+void Inside::sign(std::span<const Vector3> points, std::span<const double> free, std::span<double> distances) const {
   std::vector<Known> known;
   for (std::size_t first = 0; first < points.size(); first += kTogether) {
     const std::size_t count = std::min(kTogether, points.size() - first);
-    signTogether(points.subspan(first, count), distances.subspan(first, count), known);
+    signTogether(points.subspan(first, count), free.subspan(first, count), distances.subspan(first, count), known);
   }
 }
 
-void Inside::signTogether(std::span<const Vector3> points, std::span<double> distances,
+void Inside::signTogether(std::span<const Vector3> points, std::span<const double> free, std::span<double> distances,
                           std::vector<Known>& known) const {
   known.clear();
   // Those first that are farthest from the triangles: they tell the most others, and the more certainly the nearer.
-  for (const std::uint32_t i : farthestFirst(distances)) {
-    Known here = {points[i], distances[i], distances[i], false, 0, 0, 0, 0};
+  for (const std::uint32_t i : farthestFirst(free)) {
+    Known here = {points[i], free[i], distances[i], false, 0, 0, 0, 0};
     for (const Known& other : known)
-      if (here = other.at(points[i], distances[i]); here.isSettled()) break;
-    if (!here.isSettled()) here = find(points[i], distances[i]);
+      if (here = other.at(points[i], free[i], distances[i]); here.isSettled()) break;
+    if (!here.isSettled()) here = find(points[i], free[i], distances[i]);
     known.push_back(here);
     distances[i] = here.inside ? -here.nearest : here.nearest;
   }
+}
+
+std::vector<char> Inside::contains(std::span<const Vector3> places) const {
+  std::vector<char> inside(places.size());
+  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { inside[i] = find(places[i], 0, 0).inside; });
+  return inside;
 }
 
 }  // namespace hpsdf::distance

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "distance/crossings.h"
@@ -25,16 +26,6 @@ std::string textOf(const Vector3& x) {
   return text.str();
 }
 
-/// Whether these places are inside, each by a winding number of its own: by distances of 0 they tell each other
-/// nothing.
-std::vector<bool> areInside(const Inside& inside, const std::vector<Vector3>& places) {
-  std::vector<double> distances(places.size());
-  inside.sign(places, distances);
-  std::vector<bool> result;
-  for (const double distance : distances) result.push_back(std::signbit(distance));
-  return result;
-}
-
 /// Whether an open mesh has an inside at any place of a lattice, which reaches beyond it, for it may be flat.
 bool surroundsAny(const Inside& inside, const Box& mesh) {
   const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
@@ -45,19 +36,16 @@ bool surroundsAny(const Inside& inside, const Box& mesh) {
     for (int y = 0; y < kLattice; ++y)
       for (int x = 0; x < kLattice; ++x)
         places.push_back(box.min() + size.cwiseProduct((Vector3(x, y, z) + Vector3::Constant(0.5)) / kLattice));
-  const std::vector<bool> found = areInside(inside, places);
-  return std::ranges::find(found, true) != found.end();
+  return std::ranges::count(inside.contains(places), 1) > 0;
 }
 
 /// The greatest triangle of each piece of the surface, by their slots.
 std::vector<std::uint32_t> greatestOfPieces(const Hierarchy& hierarchy, const std::vector<Side>& sides) {
   const auto frames = hierarchy.frames();
   FaceSets pieces(frames.size());
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
-    while (end < sides.size() && sides[end].edge == sides[begin].edge) ++end;
-    if (end - begin == 2 && sides[begin].rising != sides[begin + 1].rising)
-      pieces.join(sides[begin].face, sides[begin + 1].face);
-  }
+  forEachEdge(sides, [&](std::span<const Side> edge) {
+    if (edge.size() == 2 && edge[0].rising != edge[1].rising) pieces.join(edge[0].face, edge[1].face);
+  });
   const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
   std::vector<std::uint32_t> greatest(frames.size());
   for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
@@ -73,8 +61,7 @@ std::vector<std::uint32_t> greatestOfPieces(const Hierarchy& hierarchy, const st
 /// A place on a piece of the surface that has not the outside before it and the inside behind it.
 std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<std::uint32_t>& pieces,
                                  const Inside& inside, const Box& box) {
-  const double largest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
-  const double aside = 1e-9 * box.sizes().norm() + 1e-14 * largest;  // beyond what rounds
+  const double aside = besideSurface(box);
   std::vector<Vector3> middles, before, behind;
   for (const std::uint32_t slot : pieces) {
     const TriangleFrame& frame = hierarchy.frames()[slot];
@@ -84,7 +71,7 @@ std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<s
     before.push_back(middles.back() + aside * frame.normal);
     behind.push_back(middles.back() - aside * frame.normal);
   }
-  const std::vector<bool> inFront = areInside(inside, before), inBack = areInside(inside, behind);
+  const std::vector<char> inFront = inside.contains(before), inBack = inside.contains(behind);
   for (std::size_t i = 0; i < middles.size(); ++i)
     if (inFront[i] || !inBack[i]) return middles[i];
   return std::nullopt;
@@ -98,8 +85,9 @@ std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const Trian
   };
   const Box box = boundingBox(mesh);
   const std::vector<Side> sides = sidesByEdge(hierarchy.triangles());
-  if (const std::size_t open = HoleRims(hierarchy, sides).size(); open > 0) {
-    Inside inside(hierarchy, mesh);
+  HoleRims rims(hierarchy, sides);
+  if (const std::size_t open = rims.size(); open > 0) {
+    Inside inside(hierarchy, mesh, std::move(rims));
     std::string reason = std::to_string(open) + (open == 1 ? " edge has" : " edges have");
     reason += " a side without a neighbour, and ";
     reason += surroundsAny(inside, box)
@@ -109,10 +97,10 @@ std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const Trian
   }
   if (const Crossings crossings = findCrossings(hierarchy, 1); !crossings.found.empty())
     return byWinding("the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place),
-                     Inside(hierarchy, mesh));
+                     Inside(hierarchy, mesh, std::move(rims)));
   const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
   if (pieces.size() > 1) {
-    Inside inside(hierarchy, mesh);
+    Inside inside(hierarchy, mesh, std::move(rims));
     if (const auto place = misplaced(hierarchy, pieces, inside, box))
       return byWinding("a part lies within another, and looks the same way, as at " + textOf(*place),
                        std::move(inside));

@@ -129,7 +129,7 @@ Field load(const std::filesystem::path& file) {
   if (made.strategy > Strategy::h2 || made.estimator > Estimator::residual || made.criterion > Criterion::optimal ||
       made.nearnessKind > NearnessKind::exponential)
     reader.damaged("it was made by an unknown strategy, estimator, criterion or kind of nearness");
-  if (made.source.sign > Sign::shell) reader.damaged("its sign is of an unknown kind");
+  if (made.source.sign > Sign::hull) reader.damaged("its sign is of an unknown kind");
   if (version < 4 && made.source.faces > 0) data.metadata.source.sign = Sign::pseudonormal;  // there was no other
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)

@@ -14,6 +14,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_import.h"
 #include "mesh/collinear_faces.h"
+#include "mesh/looks_inward.h"
 #include "mesh/message_prefix.h"
 
 namespace hpsdf {
@@ -90,16 +91,6 @@ std::size_t dropUnusedVertices(TriangleMesh& mesh) {
   return dropped;
 }
 
-/// Of a closed mesh the sign of the volume is a fact. Of an open one the volume depends on the apex chosen, so that
-/// a nearly flat sheet would be turned by chance: it is believed only where it is at least a hundredth of its box,
-/// as of a solid with some holes, and more than the rounding of a sum of such areas.
-bool looksInward(const MeshReport& report) {
-  if (report.volume >= 0) return false;
-  if (report.closed()) return true;
-  const Vector3 size = report.box.sizes();
-  return -report.volume > 0.01 * size.prod() && -report.volume > 1e-9 * report.area * size.norm();
-}
-
 }  // namespace
 
 ImportedMesh cleaned(TriangleMesh mesh) {
@@ -130,7 +121,7 @@ ImportedMesh cleaned(TriangleMesh mesh) {
   result.report.flippedFaces = flipped;
   result.report.duplicateFaces = duplicates;
   result.report.unreferencedVertices = unreferenced;
-  if (looksInward(result.report)) {
+  if (looksInward(result.report.volume, result.report.area, result.report.box, result.report.closed())) {
     for (Triangle& triangle : result.mesh.triangles) std::swap(triangle[1], triangle[2]);
     result.report.turned = true;
     result.report.volume = signedVolume(result.mesh);

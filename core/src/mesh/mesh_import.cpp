@@ -17,6 +17,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
+#include "mesh/file_extension.h"
 #include "mesh/triangulate.h"
 
 namespace hpsdf {
@@ -25,15 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 7> kExtensions = {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"};
-
-/// The file's extension in lower case, without the dot.
-std::string extensionOf(const fs::path& file) {
-  std::string extension = file.extension().string();
-  if (!extension.empty()) extension.erase(0, 1);
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 /// What can be said of a file before assimp opens it, whose own messages are of little help here.
 void requireReadable(const fs::path& file) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "mesh/face_sets.h"
@@ -30,22 +31,19 @@ MeshReport inspect(const TriangleMesh& mesh) {
 
   const std::vector<Side> sides = sidesByEdge(mesh.triangles);
   FaceSets parts(mesh.triangles.size());
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
-    while (end < sides.size() && sides[end].edge == sides[begin].edge) {
-      parts.join(sides[begin].face, sides[end].face);
-      ++end;
-    }
-    switch (end - begin) {
+  forEachEdge(sides, [&](std::span<const Side> edge) {
+    for (const Side& side : edge) parts.join(edge.front().face, side.face);
+    switch (edge.size()) {
       case 1:
         ++report.boundaryEdges;
         break;
       case 2:
-        if (sides[begin].rising == sides[begin + 1].rising) ++report.inconsistentEdges;
+        if (edge[0].rising == edge[1].rising) ++report.inconsistentEdges;
         break;
       default:
         ++report.nonManifoldEdges;
     }
-  }
+  });
   report.parts = parts.count();
   return report;
 }

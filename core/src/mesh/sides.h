@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -19,5 +20,14 @@ struct Side {
 
 /// All sides but those between equal vertices, those of one edge side by side, by their faces.
 std::vector<Side> sidesByEdge(std::span<const std::array<std::uint32_t, 3>> triangles);
+
+/// Of sides by edge: calls visit(those of one edge) for each edge.
+template <typename Visit>
+void forEachEdge(std::span<const Side> sides, const Visit& visit) {
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].edge == sides[begin].edge) ++end;
+    visit(sides.subspan(begin, end - begin));
+  }
+}
 
 }  // namespace hpsdf

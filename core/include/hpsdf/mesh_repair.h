@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+
+#include "hpsdf/mesh_import.h"
+
+namespace hpsdf {
+
+struct RepairedMesh {
+  ImportedMesh imported;          ///< what cleaning did is in the report, too
+  std::size_t turnedFaces = 0;    ///< looked another way than most of their patch
+  std::size_t turnedPatches = 0;  ///< turned as a whole: they looked inwards
+  std::size_t leftEdges = 0;      ///< of two faces that still run the same way: the surface has one side only
+};
+
+/// Turns triangles so that inside and outside are told consistently. Positions stay, no triangle is added or left out.
+///
+/// Patches are what hangs together by edges of two triangles. Within each, all look the way of the greater part of its
+/// area. A closed patch that looks inwards is turned unless it is a cavity: one within an odd number of other closed
+/// ones. An open patch is turned when its volume is negative and plain, as of the whole mesh in `cleaned`.
+RepairedMesh repaired(ImportedMesh imported);
+
+}  // namespace hpsdf

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "distance/inside.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf::distance {
+
+/// What of a mesh is between outside and inside: its triangles without those that have the inside on both sides, such
+/// as walls within bodies that overlap.
+///
+/// A triangle that meets others is cut into quarters, and these again, until a piece meets none of them, so that both
+/// of its sides are of one kind, or is a five-hundredth of the mesh's size: such a piece stays.
+struct Hull {
+  TriangleMesh mesh;
+  std::vector<std::uint32_t> triangles;  ///< of each, the index of that in the whole mesh of which it is a part
+};
+
+/// `hierarchy`: of the mesh; `inside`: made of that. Throws `Error`, naming the mesh, where it meets itself in too many
+/// places, and where nothing is left.
+Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside);
+
+}  // namespace hpsdf::distance

@@ -1,0 +1,88 @@
+#include "hpsdf/mesh_export.h"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hpsdf/error.h"
+#include "hpsdf/output_file.h"
+#include "mesh/file_extension.h"
+
+namespace hpsdf {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "a PLY file is written as numbers lie in memory");
+
+constexpr std::size_t kPiece = 1 << 16;  // bytes written at a time
+
+/// The shortest text that reads as the same number.
+void append(std::string& text, double number) {
+  std::array<char, 32> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+  text.append(digits.data(), end);
+}
+
+void writeObj(const TriangleMesh& mesh, OutputFile& out) {
+  std::string text;
+  const auto writeIf = [&](bool full) {
+    if (!full) return;
+    out.write(text);
+    text.clear();
+  };
+  for (const Vector3& v : mesh.vertices) {
+    text += 'v';
+    for (const double x : v) append(text += ' ', x);
+    text += '\n';
+    writeIf(text.size() >= kPiece);
+  }
+  for (const auto& triangle : mesh.triangles) {
+    text += 'f';
+    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(std::uint64_t{v} + 1);
+    text += '\n';
+    writeIf(text.size() >= kPiece);
+  }
+  writeIf(!text.empty());
+}
+
+void writePly(const TriangleMesh& mesh, OutputFile& out) {
+  static_assert(sizeof(Vector3) == 3 * sizeof(double));
+  out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
+            "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+            std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n");
+  out.write(std::as_bytes(std::span(mesh.vertices)));
+  std::vector<std::byte> faces;
+  for (const auto& triangle : mesh.triangles) {
+    const auto corners = std::as_bytes(std::span(triangle));
+    faces.push_back(std::byte{3});
+    faces.insert(faces.end(), corners.begin(), corners.end());
+  }
+  out.write(faces);
+}
+
+bool isPly(const std::filesystem::path& file) {
+  const std::string extension = extensionOf(file);
+  if (extension != "obj" && extension != "ply")
+    throw Error(file.string() + ": meshes are written as .obj or .ply; give a name that ends so");
+  return extension == "ply";
+}
+
+}  // namespace
+
+void checkMeshWritable(const std::filesystem::path& file) {
+  isPly(file);
+  checkWritable(file);
+}
+
+void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
+  const bool ply = isPly(file);
+  OutputFile out(file);
+  ply ? writePly(mesh, out) : writeObj(mesh, out);
+  out.commit();
+}
+
+}  // namespace hpsdf

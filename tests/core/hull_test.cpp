@@ -1,0 +1,151 @@
+// Distances to the hull: walls within bodies that overlap are no surface.
+
+#include "distance/hull.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/sign_check.h"
+#include "support/made_meshes.h"
+
+namespace hpsdf {
+namespace {
+
+using support::boxOfTwo;
+using support::joined;
+using support::moved;
+
+const DistanceOptions kHull{.sign = Sign::hull}, kWinding{.sign = Sign::winding};
+
+TriangleMesh twoBalls() {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=4");
+  return joined(ball, moved(ball, {1, 0, 0}));
+}
+
+std::vector<Vector3> placesIn(const Box& box, int count) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> u(-0.1, 1.1);
+  std::vector<Vector3> places(static_cast<std::size_t>(count));
+  for (Vector3& x : places) {
+    const double a = u(random), b = u(random), c = u(random);
+    x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
+  }
+  return places;
+}
+
+/// Within the union of two unit balls, a unit apart along x: to the nearer of the caps that are outside, or to the
+/// circle in which the balls meet.
+double depthInTwoBalls(const Vector3& x) {
+  const double across = std::hypot(x.y(), x.z());
+  double depth = std::hypot(x.x() - 0.5, across - std::sqrt(0.75));
+  for (const double center : {0.0, 1.0}) {
+    const Vector3 from = x - Vector3(center, 0, 0);
+    const double onCap = center + from.x() / from.norm();
+    if (center == 0 ? onCap <= 0.5 : onCap >= 0.5) depth = std::min(depth, 1 - from.norm());
+  }
+  return depth;
+}
+
+TEST(Hull, OfTwoBallsIsTheirUnions) {
+  const TriangleMesh mesh = twoBalls();
+  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  EXPECT_EQ(hull.source().sign, Sign::hull);
+  EXPECT_EQ(hull.source().fingerprint, plain.source().fingerprint);
+  EXPECT_EQ(hull.source().faces, mesh.triangles.size());
+  std::size_t inside = 0, deeper = 0;
+  for (const Vector3& x : placesIn(boundingBox(mesh), 4000)) {
+    const double found = hull(x), before = plain(x);
+    ASSERT_EQ(found < 0, before < 0);
+    if (found >= 0) {
+      EXPECT_NEAR(found, before, 1e-12);
+      continue;
+    }
+    ++inside;
+    EXPECT_NEAR(-found, depthInTwoBalls(x), 0.01);  // chords of the mesh, and what is left of walls
+    if (found < before - 0.05) ++deeper;
+  }
+  EXPECT_GT(inside, 1000u);
+  EXPECT_GT(deeper, 300u);
+  EXPECT_NEAR(hull(Vector3(0.5, 0, 0)), -std::sqrt(0.75), 0.01);
+  EXPECT_NEAR(plain(Vector3(0.5, 0, 0)), -0.5, 0.01) << "else this tells nothing";
+}
+
+TEST(Hull, OfAMeshWithoutWallsIsTheMesh) {
+  const TriangleMesh mesh = shapes::mesh("builtin:gear");
+  const ExactDistance hull(mesh, kHull), plain(mesh);
+  for (const Vector3& x : placesIn(boundingBox(mesh), 500)) EXPECT_EQ(hull(x), plain(x));
+}
+
+/// A wall in one plane with another is cut along the other's sides.
+TEST(Hull, LeavesOutTheWallBetweenBodiesThatTouch) {
+  const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
+  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  EXPECT_EQ(plain(Vector3(1, 0, 0)), 0);
+  EXPECT_NEAR(hull(Vector3(1, 0, 0)), -0.5, 0.02) << "to the smaller one's sides";
+  EXPECT_NEAR(hull(Vector3(1, 0.7, 0)), 0, 1e-12) << "beside it the wall is outside";
+  EXPECT_NEAR(hull(Vector3(1, 0.52, 0)), 0, 1e-12);
+  EXPECT_NEAR(hull(Vector3(1.1, 0, 0)), -0.5, 0.02);
+  EXPECT_EQ(checkSign(mesh, hull, 4000).wrong, 0u);
+}
+
+TEST(Hull, KeepsOneTriangleThatIsPartlyOutside) {
+  // the long faces of the bar pass through the box
+  const TriangleMesh bar = shapes::mesh("box,width=6,height=0.5,depth=0.5");
+  const ExactDistance hull(joined(boxOfTwo(), bar), kHull);
+  EXPECT_NEAR(hull(Vector3(0, 0, 0)), -1, 0.02) << "0.25 to the bar's own sides, which are within";
+  EXPECT_NEAR(hull(Vector3(2.5, 0, 0)), -0.25, 1e-12);
+  EXPECT_NEAR(hull(Vector3(2, 0.25, 0)), 0, 1e-12);
+  EXPECT_NEAR(hull(Vector3(-1, 0, 0)), -0.25, 0.02) << "where the bar leaves the box";
+}
+
+TEST(Hull, OfOpenBodiesHasTheSameSign) {
+  const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
+  const TriangleMesh mesh = joined(support::openAbove(ball, 0.8), moved(ball, {0.7, 0, 0}));
+  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000);
+  std::vector<double> together(places.size());
+  hull(places, together);
+  std::size_t deeper = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double before = plain(places[i]);
+    EXPECT_EQ(together[i], hull(places[i]));
+    EXPECT_EQ(together[i] < 0, before < 0);
+    EXPECT_GT(std::abs(together[i]), std::abs(before) - 1e-12);
+    if (std::abs(together[i]) > std::abs(before) + 0.05) ++deeper;
+  }
+  EXPECT_GT(deeper, 50u);
+}
+
+TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
+  const TriangleMesh mesh = twoBalls();
+  const ExactDistance hull(mesh, kHull);
+  for (const Vector3& x : placesIn(boundingBox(mesh), 300)) {
+    const ClosestPoint closest = hull.closestPoint(x);
+    ASSERT_LT(closest.triangle, mesh.triangles.size());
+    const TriangleMesh one{.vertices = mesh.vertices, .triangles = {mesh.triangles[closest.triangle]}, .name = {}};
+    EXPECT_NEAR(ExactDistance(one, {.sign = Sign::winding})(closest.point), 0, 1e-12);
+    EXPECT_NEAR((x - closest.point).norm(), std::abs(closest.signedDistance), 1e-12);
+  }
+}
+
+TEST(Hull, PiecesAreThatSmallAlongTheSeamOnly) {
+  const TriangleMesh mesh = twoBalls();
+  const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const distance::Inside inside(hierarchy, mesh, distance::HoleRims(hierarchy));
+  const distance::Hull hull = distance::hullOf(hierarchy, mesh, inside);
+  EXPECT_LT(hull.triangles.size(), 4 * mesh.triangles.size());
+  const double area = 2 * (2 * std::numbers::pi * 1.5);  // of the two caps, each 1.5 high
+  EXPECT_NEAR(surfaceArea(hull.mesh), area, 0.02 * area);
+  EXPECT_GT(surfaceArea(mesh), 1.3 * area);
+}
+
+}  // namespace
+}  // namespace hpsdf

@@ -1,0 +1,200 @@
+// What a solid's surface would not have, where it is, and what turning faces mends.
+
+#include "hpsdf/mesh_defects.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "hpsdf/error.h"
+#include "hpsdf/mesh_export.h"
+#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_repair.h"
+#include "support/made_meshes.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+namespace {
+
+using support::boxOfTwo;
+using support::joined;
+using support::moved;
+using support::openBox;
+using support::turned;
+using testing::ElementsAre;
+
+MeshDefects defectsOf(const TriangleMesh& mesh) { return findDefects(mesh, findCrossings(mesh)); }
+
+TriangleMesh ball(const Vector3& center = Vector3::Zero(), double radius = 1) {
+  return moved(shapes::mesh("builtin:sphere,subdivisions=3"), center, radius);
+}
+
+/// A strip with half a twist, of so many pieces, around z.
+TriangleMesh moebiusStrip(int pieces) {
+  TriangleMesh mesh;
+  for (int i = 0; i < pieces; ++i) {
+    const double around = 2 * std::numbers::pi * i / pieces, twist = around / 2;
+    for (const double side : {-0.3, 0.3}) {
+      const double radius = 1 + side * std::cos(twist);
+      mesh.vertices.emplace_back(radius * std::cos(around), radius * std::sin(around), side * std::sin(twist));
+    }
+  }
+  const auto corner = [&](int i, int side) {
+    return std::uint32_t(i < pieces ? 2 * i + side : 1 - side);  // the end meets the beginning upside down
+  };
+  for (int i = 0; i < pieces; ++i) {
+    mesh.triangles.push_back({corner(i, 0), corner(i + 1, 0), corner(i + 1, 1)});
+    mesh.triangles.push_back({corner(i, 0), corner(i + 1, 1), corner(i, 1)});
+  }
+  return mesh;
+}
+
+TEST(MeshDefects, AClosedSurfaceHasNone) {
+  for (const TriangleMesh& mesh : {boxOfTwo(), joined(ball(), ball({3, 0, 0}))}) {
+    const MeshDefects defects = defectsOf(mesh);
+    EXPECT_TRUE(defects.found.empty());
+    EXPECT_TRUE(defects.orientable);
+  }
+}
+
+TEST(MeshDefects, RimsAreTold) {
+  const MeshDefects defects = defectsOf(openBox());
+  EXPECT_THAT(defects.counts, ElementsAre(4, 0, 0, 0, 0));
+  for (const Defect& defect : defects.found) {
+    EXPECT_EQ(defect.kind, DefectKind::boundaryEdge);
+    EXPECT_EQ(defect.faces[0], defect.faces[1]);
+    for (const Vector3& end : defect.ends) EXPECT_EQ(end.cwiseAbs(), Vector3(1, 1, 1));
+    for (const Vector3& end : defect.ends) EXPECT_EQ(end.z(), 1);
+    EXPECT_EQ((defect.ends[1] - defect.ends[0]).norm(), 2);
+  }
+}
+
+TEST(MeshDefects, AFaceThatLooksTheWrongWayHasThreeEdges) {
+  TriangleMesh mesh = boxOfTwo();
+  std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);
+  const MeshDefects defects = defectsOf(mesh);
+  EXPECT_THAT(defects.counts, ElementsAre(0, 0, 3, 0, 0));
+  EXPECT_TRUE(defects.orientable);
+  for (const Defect& defect : defects.found) EXPECT_TRUE(defect.faces[0] == 5 || defect.faces[1] == 5);
+}
+
+TEST(MeshDefects, BodiesThatTouchInAnEdgeOrACorner) {
+  const MeshDefects edge = defectsOf(cleaned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))).mesh);
+  EXPECT_THAT(edge.counts, ElementsAre(0, 1, 0, 0, 0));
+  EXPECT_EQ((edge.found[0].ends[0] + edge.found[0].ends[1]) / 2, Vector3(1, 1, 0));
+  const MeshDefects corner = defectsOf(cleaned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 2}))).mesh);
+  EXPECT_THAT(corner.counts, ElementsAre(0, 0, 0, 1, 0));
+  EXPECT_EQ(corner.found[0].ends[0], Vector3(1, 1, 1));
+}
+
+TEST(MeshDefects, CrossingsAreOfOnePartOrOfTwo) {
+  const MeshDefects two = defectsOf(joined(ball(), ball({1, 0, 0})));
+  EXPECT_GT(two.count(DefectKind::crossing), 10u);
+  EXPECT_EQ(two.count(DefectKind::crossing), two.found.size());
+  EXPECT_EQ(two.crossingsWithinParts, 0u);
+  TriangleMesh spike = ball();
+  spike.vertices[0] *= -1.5;  // through the other side
+  const MeshDefects one = defectsOf(spike);
+  EXPECT_GT(one.count(DefectKind::crossing), 0u);
+  EXPECT_EQ(one.crossingsWithinParts, one.count(DefectKind::crossing));
+}
+
+TEST(MeshDefects, AMoebiusStripIsOneSided) {
+  const MeshDefects defects = defectsOf(moebiusStrip(24));
+  EXPECT_FALSE(defects.orientable);
+  EXPECT_EQ(defects.count(DefectKind::boundaryEdge), 48u);
+  const RepairedMesh mended = repaired(cleaned(moebiusStrip(24)));
+  EXPECT_EQ(mended.leftEdges, 1u);
+  EXPECT_EQ(mended.imported.report.inconsistentEdges, 1u);
+}
+
+TEST(MeshRepair, FacesTurnTheWayOfMost) {
+  TriangleMesh mesh = ball();
+  for (std::size_t f = 0; f < mesh.triangles.size(); f += 3) std::swap(mesh.triangles[f][0], mesh.triangles[f][1]);
+  const std::size_t wrong = (mesh.triangles.size() + 2) / 3;
+  const RepairedMesh mended = repaired(cleaned(mesh));
+  EXPECT_EQ(mended.turnedFaces, wrong);
+  EXPECT_EQ(mended.turnedPatches, 0u);
+  EXPECT_EQ(mended.leftEdges, 0u);
+  EXPECT_TRUE(mended.imported.report.closed());
+  EXPECT_DOUBLE_EQ(mended.imported.report.volume, signedVolume(ball()));
+}
+
+TEST(MeshRepair, PartsThatLookInwardsTurn) {
+  const RepairedMesh mended = repaired(cleaned(joined(ball({0, 0, 0}, 2), turned(ball({5, 0, 0})))));
+  EXPECT_EQ(mended.turnedPatches, 1u);
+  EXPECT_EQ(mended.turnedFaces, 0u);
+  EXPECT_NEAR(mended.imported.report.volume, 9 * signedVolume(ball()), 1e-9);
+}
+
+TEST(MeshRepair, CavitiesStay) {
+  const TriangleMesh hollow = joined(ball({0, 0, 0}, 3), turned(ball({0, 0, 0}, 2)));
+  const RepairedMesh same = repaired(cleaned(hollow));
+  EXPECT_EQ(same.turnedPatches, 0u);
+  EXPECT_EQ(same.imported.mesh.triangles, hollow.triangles);
+  const RepairedMesh nested = repaired(cleaned(joined(hollow, turned(ball()))));
+  EXPECT_EQ(nested.turnedPatches, 1u) << "what lies in a cavity is a body again";
+  EXPECT_NEAR(nested.imported.report.volume, (27 - 8 + 1) * signedVolume(ball()), 1e-9);
+}
+
+TEST(MeshRepair, OpenBodiesTurnAndKeepTheirHole) {
+  const TriangleMesh open = support::openAbove(ball(), 0.7);
+  const RepairedMesh mended = repaired(cleaned(joined(ball({5, 0, 0}, 2), turned(open))));
+  EXPECT_EQ(mended.turnedPatches, 1u);
+  EXPECT_GT(mended.imported.report.boundaryEdges, 10u);
+  EXPECT_EQ(repaired(mended.imported).turnedPatches, 0u);
+}
+
+TEST(MeshRepair, KeepsWhatCleaningDid) {
+  TriangleMesh mesh = boxOfTwo();
+  mesh.triangles.push_back(mesh.triangles[3]);
+  mesh.triangles.push_back({0, 0, 1});
+  const RepairedMesh mended = repaired(cleaned(turned(mesh)));
+  EXPECT_EQ(mended.imported.report.duplicateFaces, 1u);
+  EXPECT_EQ(mended.imported.report.degenerateFaces, 1u);
+  EXPECT_TRUE(mended.imported.report.turned);
+}
+
+TEST(MeshExport, ComesBackAsItWas) {
+  const support::TemporaryDirectory folder;
+  const TriangleMesh mesh = moved(boxOfTwo(), {0.125, -3, 1e-3});
+  for (const char* name : {"box.obj", "box.PLY"}) {
+    const std::filesystem::path file = folder.path() / name;
+    saveMesh(mesh, file);
+    const ImportedMesh again = importMesh(file);
+    EXPECT_EQ(again.report.faces, 12u);
+    EXPECT_TRUE(again.report.closed());
+    EXPECT_EQ(again.report.box.min().y(), -4) << name;
+    EXPECT_NEAR(again.report.box.max().z(), 1 + 1e-3, 1e-7) << name;
+    EXPECT_NEAR(again.report.volume, 8, 1e-6);  // the reader's floats
+  }
+}
+
+TEST(MeshExport, WritesDoublesToTheLastDigit) {
+  const support::TemporaryDirectory folder;
+  TriangleMesh mesh = boxOfTwo();
+  mesh.vertices[0].x() = -1.0000000000000002;
+  saveMesh(mesh, folder.path() / "a.obj");
+  std::ifstream text(folder.path() / "a.obj");
+  std::string word;
+  double x = 0;
+  text >> word >> x;
+  EXPECT_EQ(word, "v");
+  EXPECT_EQ(x, -1.0000000000000002);
+}
+
+TEST(MeshExport, RefusesOtherFormats) {
+  const support::TemporaryDirectory folder;
+  const std::filesystem::path file = folder.path() / "a.fbx";
+  EXPECT_THROW(saveMesh(boxOfTwo(), file), Error);
+  EXPECT_THROW(checkMeshWritable(file), Error);
+  EXPECT_THROW(checkMeshWritable(folder.path() / "none" / "a.obj"), Error);
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+}  // namespace
+}  // namespace hpsdf

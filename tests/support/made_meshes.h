@@ -1,0 +1,44 @@
+#pragma once
+// Meshes made of others.
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "hpsdf/shapes.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf::support {
+
+inline TriangleMesh moved(TriangleMesh mesh, const Vector3& by, double scale = 1) {
+  for (Vector3& x : mesh.vertices) x = scale * x + by;
+  return mesh;
+}
+
+inline TriangleMesh joined(TriangleMesh one, const TriangleMesh& other) {
+  const auto first = static_cast<std::uint32_t>(one.vertices.size());
+  one.vertices.insert(one.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const auto& [a, b, c] : other.triangles) one.triangles.push_back({first + a, first + b, first + c});
+  return one;
+}
+
+inline TriangleMesh turned(TriangleMesh mesh) {
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+/// Without the triangles all of whose corners are above this z.
+inline TriangleMesh openAbove(TriangleMesh mesh, double z) {
+  std::erase_if(mesh.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(triangle, [&](std::uint32_t v) { return mesh.vertices[v].z() > z; });
+  });
+  return mesh;
+}
+
+/// A box of size 2, at the origin.
+inline TriangleMesh boxOfTwo() { return shapes::mesh("box,width=2,height=2,depth=2"); }
+
+/// The same without its upper side.
+inline TriangleMesh openBox() { return openAbove(boxOfTwo(), 0.999); }
+
+}  // namespace hpsdf::support
