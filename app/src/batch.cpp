@@ -25,6 +25,7 @@
 #include "interrupt.h"
 #include "long_work.h"
 #include "output_folder.h"
+#include "printable.h"
 #include "script.h"
 #include "summaries.h"
 #include "version.h"
@@ -83,7 +84,7 @@ std::string checksumOf(const fs::path& field) {
 Json givenNames(const Arguments& arguments) {
   Json names = Json::array();
   for (const Parameter& parameter : buildParameters())
-    if (parameter.name != "threads" && arguments.given(parameter.name)) names.push_back(parameter.name);
+    if (decides(parameter) && arguments.given(parameter.name)) names.push_back(parameter.name);
   return names;
 }
 
@@ -92,11 +93,6 @@ Json optionsJson(const Arguments& arguments) {
   std::istringstream lines(decidingArguments(arguments));
   for (std::string line; std::getline(lines, line);) options.push_back(line);
   return options;
-}
-
-std::string inOneLine(std::string message) {
-  std::ranges::replace(message, '\n', ' ');
-  return message;
 }
 
 class Batch {
@@ -233,7 +229,7 @@ class Batch {
       // some errors speak of what is wrong alone
       const bool named = made.error.find(mesh.surface) != std::string::npos;
       console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : mesh.surface + ": ",
-                                  inOneLine(made.error));
+                                  printable(made.error));
     } else {
       console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, mesh.surface, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
@@ -257,7 +253,7 @@ class Batch {
             {"file_bytes", of("file_bytes")},
             {"rms_estimate", of("rms_estimate")},
             {"sign", made.field ? field.at("mesh").at("sign") : Json()},
-            {"error", made.status == Status::failed ? Json(inOneLine(made.error)) : Json()}};
+            {"error", made.status == Status::failed ? Json(printable(made.error)) : Json()}};
   }
 
   Console console_;

@@ -128,6 +128,11 @@ Sign signOf(const std::string& name) {
 
 DistanceOptions distanceOptions(const Arguments& arguments) {
   DistanceOptions options{.sign = signOf(arguments.text("sign")), .threads = int(arguments.whole("threads"))};
+  if (arguments.flag("hull")) {
+    if (options.sign != Sign::automatic && options.sign != Sign::winding)
+      throw Error(fmt::format("hull: goes by winding number: leave out sign {}", arguments.text("sign")));
+    options.sign = Sign::hull;
+  }
   if (options.sign == Sign::shell && !arguments.given("thickness"))
     throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
   requireOwner(arguments, "thickness", "sign unsigned-shell", options.sign == Sign::shell);
@@ -391,6 +396,12 @@ std::vector<Parameter> buildParameters() {
                "pseudonormal where that is certain to be right, else winding, and says why.",
        .defaultText = "auto",
        .choices = {"auto", "pseudonormal", "winding", "unsigned-shell"}},
+      {.name = "hull",
+       .type = ParameterType::flag,
+       .help =
+           "Leave out faces, or parts of them, that have the inside on both sides, such as walls within bodies that "
+           "overlap: they are no surface then. The sign is by winding number.",
+       .defaultText = "false"},
       {.name = "thickness",
        .type = ParameterType::number,
        .help = "Of the wall that --sign unsigned-shell makes.",
@@ -533,10 +544,12 @@ void requireConsistent(const Arguments& arguments) {
   checkBuild(domainOf(arguments, any), buildOptions(arguments));
 }
 
+bool decides(const Parameter& parameter) { return parameter.name != "threads" && parameter.name != "memory-limit"; }
+
 std::string decidingArguments(const Arguments& arguments) {
   std::string text;
   for (const Parameter& parameter : buildParameters()) {
-    if (parameter.name == "threads" || parameter.name == "memory-limit" || !arguments.has(parameter.name)) continue;
+    if (!decides(parameter) || !arguments.has(parameter.name)) continue;
     const std::vector<double> numbers = arguments.numbers(parameter.name);
     text += fmt::format("{}={}\n", parameter.name,
                         numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));

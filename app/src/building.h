@@ -37,6 +37,9 @@ BuildOptions buildOptions(const Arguments& arguments);
 /// Throws `Error` for arguments of `buildParameters` that no surface could be built with.
 void requireConsistent(const Arguments& arguments);
 
+/// Whether what a construction comes to depends on a parameter of `buildParameters`.
+bool decides(const Parameter& parameter);
+
 /// Everything that decides what a construction comes to, whatever an argument is for.
 std::string decidingArguments(const Arguments& arguments);
 

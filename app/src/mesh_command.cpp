@@ -3,16 +3,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "building.h"
 #include "failed.h"
-#include "hpsdf/crossings.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_defects.h"
+#include "hpsdf/mesh_export.h"
 #include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_repair.h"
+#include "hpsdf/output_file.h"
+#include "hpsdf/render/mesh_picture.h"
 #include "hpsdf/sign_check.h"
 #include "long_work.h"
+#include "pictures.h"
 #include "summaries.h"
 
 namespace hpsdf::app {
@@ -20,9 +29,18 @@ namespace {
 
 constexpr std::size_t kPlacesInText = 3;
 
+struct KindNames {
+  const char *text, *json;
+};
+constexpr std::array<KindNames, kDefectKinds> kKinds = {{{"boundary edges", "boundary_edges"},
+                                                         {"non-manifold edges", "non_manifold_edges"},
+                                                         {"inconsistent edges", "inconsistent_edges"},
+                                                         {"pinched vertices", "pinched_vertices"},
+                                                         {"meets itself", "crossings"}}};
+
 struct Inspected {
   ImportedMesh imported;
-  Crossings crossings = {};
+  MeshDefects defects = {};
   SignChoice choice = {};
   std::optional<SignCheck> check = {};
 };
@@ -31,7 +49,7 @@ Inspected inspected(Session& session, const Arguments& arguments) {
   Inspected found{.imported = importSurface(session.console(), arguments.text("mesh"))};
   const TriangleMesh& mesh = found.imported.mesh;
   const ExactDistance distance(mesh);
-  found.crossings = findCrossings(mesh);
+  found.defects = findDefects(mesh, distance.crossings());
   found.choice = distance.signChoice();
   if (arguments.given("check-sign"))
     found.check = withProgress(session.console(), [&](const Progress& progress) {
@@ -41,13 +59,40 @@ Inspected inspected(Session& session, const Arguments& arguments) {
   return found;
 }
 
-Json crossingsJson(const Crossings& crossings, std::size_t limit) {
-  Json places = Json::array();
-  for (std::size_t i = 0; i < std::min(limit, crossings.found.size()); ++i) {
-    const Crossing& crossing = crossings.found[i];
-    places.push_back({{"faces", crossing.triangles}, {"at", vectorJson(crossing.place)}});
+bool isPlace(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
+
+/// Those of a kind, the first ones.
+std::vector<Defect> firstOf(const MeshDefects& defects, DefectKind kind, std::size_t limit) {
+  std::vector<Defect> first;
+  for (const Defect& defect : defects.found)
+    if (defect.kind == kind && first.size() < limit) first.push_back(defect);
+  return first;
+}
+
+Json defectsJson(const MeshDefects& defects, std::size_t limit) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < kDefectKinds; ++i) {
+    Json places = Json::array();
+    for (const Defect& defect : firstOf(defects, DefectKind(i), limit)) {
+      Json place = {{"faces", defect.faces}};
+      if (isPlace(defect))
+        place["at"] = vectorJson(defect.ends[0]);
+      else
+        place["edge"] = {vectorJson(defect.ends[0]), vectorJson(defect.ends[1])};
+      places.push_back(std::move(place));
+    }
+    json[kKinds[i].json] = {{"count", defects.counts[i]}, {"places", std::move(places)}};
   }
-  return {{"count", crossings.found.size()}, {"all", crossings.all}, {"places", std::move(places)}};
+  json["crossings"]["all"] = defects.allCrossings;
+  json["crossings"]["within_parts"] = defects.crossingsWithinParts;
+  return json;
+}
+
+Json verdictJson(const MeshReport& report, const MeshDefects& defects) {
+  return {{"closed", report.closed()},
+          {"orientable", defects.orientable},
+          {"self_folding", defects.crossingsWithinParts > 0},
+          {"parts_overlap", defects.count(DefectKind::crossing) > defects.crossingsWithinParts}};
 }
 
 Json checkJson(const SignCheck& check) {
@@ -56,14 +101,45 @@ Json checkJson(const SignCheck& check) {
   return json;
 }
 
-std::string crossingsText(const Crossings& crossings) {
-  if (crossings.found.empty()) return summaryRow("meets itself", "nowhere");
-  std::string text = grouped(crossings.found.size()) + (crossings.found.size() == 1 ? " pair" : " pairs") + " of faces";
-  if (!crossings.all) text = "at least " + text;
-  text += ", as at ";
-  for (std::size_t i = 0; i < std::min(kPlacesInText, crossings.found.size()); ++i)
-    text += (i == 0 ? "" : ", ") + vectorText(crossings.found[i].place);
-  return summaryRow("meets itself", text);
+Json repairJson(const RepairedMesh& mended, const std::string& file) {
+  return {{"output", file},
+          {"turned_faces", mended.turnedFaces},
+          {"turned_patches", mended.turnedPatches},
+          {"left_edges", mended.leftEdges},
+          {"mesh", meshJson(file, mended.imported.report)}};
+}
+
+std::string verdictText(const MeshReport& report, const MeshDefects& defects) {
+  std::string text = report.closed() ? "closed, " : "not closed, ";
+  text += defects.orientable ? "orientable, " : "one-sided: no turning of faces makes them agree, ";
+  if (defects.count(DefectKind::crossing) == 0) return text + "does not meet itself";
+  if (defects.crossingsWithinParts == 0) return text + "parts pass through each other";
+  text += "folds into itself";
+  return defects.count(DefectKind::crossing) > defects.crossingsWithinParts
+             ? text + ", and parts pass through each other"
+             : text;
+}
+
+std::string placeText(const Defect& defect) {
+  return isPlace(defect) ? vectorText(defect.ends[0])
+                         : vectorText(defect.ends[0]) + " to " + vectorText(defect.ends[1]);
+}
+
+/// A row for each kind that there is, with its first places.
+std::string defectsText(const MeshDefects& defects) {
+  std::string text;
+  for (std::size_t i = 0; i < kDefectKinds; ++i) {
+    if (defects.counts[i] == 0) continue;
+    std::string row = grouped(defects.counts[i]);
+    if (DefectKind(i) == DefectKind::crossing)
+      row =
+          (defects.allCrossings ? "" : "at least ") + row + (defects.counts[i] == 1 ? " pair" : " pairs") + " of faces";
+    std::string places;
+    for (const Defect& defect : firstOf(defects, DefectKind(i), kPlacesInText))
+      places += (places.empty() ? ", as at " : "; ") + placeText(defect);
+    text += summaryRow(kKinds[i].text, row + places);
+  }
+  return text;
 }
 
 std::string checkText(const SignCheck& check) {
@@ -77,52 +153,146 @@ std::string checkText(const SignCheck& check) {
                                              vectorText(check.worst), shortNumber(check.depth)));
 }
 
+std::string countOf(std::size_t count, std::string_view one, std::string_view many) {
+  return fmt::format("{} {}", grouped(count), count == 1 ? one : many);
+}
+
+std::string repairText(const RepairedMesh& mended, const std::string& file) {
+  const MeshReport& report = mended.imported.report;
+  std::string done;
+  const auto add = [&](std::size_t count, const std::string& what) {
+    if (count > 0) done += (done.empty() ? "" : "; ") + what;
+  };
+  const std::size_t dropped = report.degenerateFaces + report.duplicateFaces;
+  add(dropped, fmt::format("dropped {}", countOf(dropped, "face", "faces")));
+  add(report.flippedFaces, fmt::format("flipped {}", countOf(report.flippedFaces, "edge", "edges")));
+  add(mended.turnedFaces, fmt::format("turned {} as most of what hangs together with them looks",
+                                      countOf(mended.turnedFaces, "face", "faces")));
+  add(mended.turnedPatches,
+      fmt::format("turned {} that looked inwards", countOf(mended.turnedPatches, "patch", "patches")));
+  add(report.turned, "turned the whole mesh");
+  std::string text = summaryRow("repaired", done.empty() ? "nothing to do" : done);
+  if (mended.leftEdges > 0)
+    text += summaryRow("left", countOf(mended.leftEdges, "edge", "edges") + " of surfaces that have one side only");
+  return text + summaryRow("written", file + ": " + closednessText(report));
+}
+
+/// Draws the mesh with its defects.
+void drawPicture(Session& session, const Arguments& arguments, const Inspected& found) {
+  const render::SurfacePicture look = cameraPicture(arguments);
+  render::MeshPicture picture{look.camera, look.width, look.height, look.samples};
+  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  const auto renderer = makeBodyRenderer({found.imported.mesh}, backend(arguments));
+  savePng(drawMesh(*renderer, found.imported.mesh, found.defects, picture), arguments.text("picture"));
+  session.setLastRenderer(renderer->description());
+}
+
+/// An option that says nothing without another is a mistake.
+void requireOwner(const Arguments& arguments, const char* name, const char* owner) {
+  if (arguments.given(name) && !arguments.given(owner))
+    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
+}
+
+void checkMesh(const Arguments& arguments) {
+  requireOwner(arguments, "seed", "check-sign");
+  requireOwner(arguments, "up", "picture");
+  for (const char* name : kLooks) requireOwner(arguments, name, "picture");
+  if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
+  if (!arguments.given("picture")) return;
+  const std::string file = arguments.text("picture");
+  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  cameraPicture(arguments);
+  backend(arguments);
+  checkWritable(file);
+}
+
 void runMesh(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
-  if (arguments.given("seed") && !arguments.given("check-sign"))
-    throw Error("seed belongs to check-sign: give that too, or leave it out");
   const Inspected found = inspected(session, arguments);
+  const MeshReport& report = found.imported.report;
+  std::optional<RepairedMesh> mended;
+  if (arguments.given("repair")) {
+    mended = repaired(found.imported);
+    saveMesh(mended->imported.mesh, arguments.text("repair"));
+  }
+  if (arguments.given("picture")) drawPicture(session, arguments, found);
   if (session.wantsJson(arguments)) {
-    Json json = meshJson(surface, found.imported.report);
-    json["crossings"] = crossingsJson(found.crossings, static_cast<std::size_t>(arguments.number("places")));
+    Json json = meshJson(surface, report);
+    json["verdict"] = verdictJson(report, found.defects);
+    json["defects"] = defectsJson(found.defects, static_cast<std::size_t>(arguments.number("places")));
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
     if (found.check) json["sign_check"] = checkJson(*found.check);
+    if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
+    if (arguments.given("picture")) json["picture"] = arguments.text("picture");
     printJson(session.console().out, json);
   } else {
-    session.console().out << meshText(surface, found.imported.report) << crossingsText(found.crossings)
+    session.console().out << meshText(surface, report) << defectsText(found.defects)
+                          << summaryRow("verdict", verdictText(report, found.defects))
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
-                          << (found.check ? checkText(*found.check) : "");
+                          << (found.check ? checkText(*found.check) : "")
+                          << (mended ? repairText(*mended, arguments.text("repair")) : "")
+                          << (arguments.given("picture") ? summaryRow("picture", arguments.text("picture")) : "");
   }
   if (found.check && found.check->wrong > 0)
     throw Failed(fmt::format("{}: {} of {} signs are wrong", surface, found.check->wrong, found.check->places));
 }
 
+/// As of `render`, but for what camera and target mean.
+std::vector<Parameter> meshLookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters = lookParameters(registry);
+  parameters.push_back(*findParameter(registry.command("render"), "up"));
+  std::ranges::find(parameters, "camera", &Parameter::name)->help =
+      "Azimuth and elevation in degrees, and the eye's distance from the mesh's middle in diagonals of a cube around "
+      "it.";
+  std::ranges::find(parameters, "target", &Parameter::name)->help =
+      "The point in the picture's middle, which the camera circles; the mesh's middle when left out. With a small "
+      "distance in camera, a close look at a defect.";
+  return parameters;
+}
+
 }  // namespace
 
-Command meshCommand() {
-  return {
+Command meshCommand(const Registry& registry) {
+  Command command{
       .name = "mesh",
-      .summary = "Tell what was found in a mesh, and how its inside is told.",
+      .summary = "Tell what is wrong with a mesh, where, and how its inside is told; mend and draw it.",
       .help =
-          "Counts after welding equal positions, parts, edges that are open, shared by more than two faces or run "
-          "against each other, volume, area, box, and what was dropped or turned on import. Where faces meet others "
-          "that are no neighbours, or neighbours beyond what they share: decided without rounding. And the sign "
-          "that 'hpsdf build' would take by itself (--sign auto), with the reason.\n"
+          "Counts after welding equal positions, parts, volume, area, box, and what was dropped or turned on import. "
+          "Then what a solid's surface would not have, with places: edges that are open, shared by more than two faces "
+          "or run the same way by both of theirs, so that one looks the wrong way; vertices in which surfaces touch; "
+          "and where faces meet others that are no neighbours, or neighbours beyond what they share, decided without "
+          "rounding. And the sign that 'hpsdf build' would take by itself (--sign auto), with the reason.\n"
           "\n"
-          "--check-sign compares that sign with the winding number summed over all faces, at random places: half "
+          "--repair writes the mesh as it was cleaned, its faces turned so that inside and outside are told "
+          "consistently: the way of most of what hangs together with them, and closed parts outwards, but for "
+          "cavities. It closes no holes and cuts no folds, which --sign winding can do with.\n"
+          "\n"
+          "--picture draws it: clay from outside, blue from behind, red where faces meet others, defects in colours "
+          "of their own, small ones in rings.\n"
+          "\n"
+          "--check-sign compares the sign with the winding number summed over all faces, at random places: half "
           "of them in and around the mesh's box, half close to its faces. Exit status 1 where one is wrong that is "
           "farther from the surface than a millionth of the mesh's longest side.",
       .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json",
-                   "hpsdf mesh bunny.obj --check-sign 100000"},
+                   "hpsdf mesh chair.obj --picture defects.png --view corner",
+                   "hpsdf mesh chair.obj --repair mended.obj", "hpsdf mesh bunny.obj --check-sign 100000"},
       .parameters = {{.name = "mesh",
                       .type = ParameterType::text,
                       .help = "Mesh file or builtin:SHAPE.",
                       .valueName = "MESH",
                       .positional = true,
                       .need = Need::always},
+                     {.name = "repair",
+                      .type = ParameterType::outputPath,
+                      .help = "Write the mended mesh there, with all digits of its coordinates.",
+                      .valueName = "FILE.obj|FILE.ply"},
+                     {.name = "picture",
+                      .type = ParameterType::outputPath,
+                      .help = "Draw the mesh with its defects.",
+                      .valueName = "FILE.png"},
                      {.name = "places",
                       .type = ParameterType::wholeNumber,
-                      .help = "Of json: so many places at most where the mesh meets itself.",
+                      .help = "Of json: so many places at most of each kind of defect.",
                       .defaultText = "100",
                       .minimum = 0,
                       .maximum = 1e6},
@@ -138,7 +308,10 @@ Command meshCommand() {
                       .defaultText = "1",
                       .minimum = 0,
                       .maximum = 9007199254740992}},
-      .action = runMesh};
+      .action = runMesh,
+      .check = checkMesh};
+  std::ranges::move(meshLookParameters(registry), std::back_inserter(command.parameters));
+  return command;
 }
 
 }  // namespace hpsdf::app

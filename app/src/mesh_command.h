@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// What was found in a mesh, where it meets itself, and how its inside is told.
-Command meshCommand();
+/// What is wrong with a mesh, where, and how its inside is told. Takes parameters of `render`, which is there already.
+Command meshCommand(const Registry& registry);
 
 }  // namespace hpsdf::app

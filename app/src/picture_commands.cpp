@@ -446,6 +446,17 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain)
   return picture;
 }
 
+std::vector<Parameter> lookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters;
+  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
+  return parameters;
+}
+
+std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend) {
+  return backend.cpu ? render::makeCpuBodyRenderer(std::move(meshes))
+                     : render::makeGlBodyRenderer(std::move(meshes), backend.gl);
+}
+
 render::SurfacePicture cameraPicture(const Arguments& arguments) {
   render::SurfacePicture picture;
   if (arguments.has("camera")) {

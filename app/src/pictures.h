@@ -1,6 +1,8 @@
 #pragma once
 // From validated arguments to the settings of render.
 
+#include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -44,6 +46,13 @@ Vector3 pointOf(const Arguments& arguments, const char* name);
 /// nobody said otherwise: at 0, or where the domain does not hold that, in its middle.
 render::SlicePicture slicePicture(const Arguments& arguments);
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
+
+/// The parameters of `render` that any picture before a camera takes.
+inline constexpr std::array kLooks = {"camera", "view", "target", "projection", "size", "samples", "cpu", "gl"};
+std::vector<Parameter> lookParameters(const Registry& registry);
+
+/// Draws these meshes, by OpenGL or on the CPU.
+std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend);
 
 /// What any picture before a camera takes: camera, view, target, projection, size and samples. Throws `Error` for a
 /// camera out of range.

@@ -107,9 +107,6 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
 
 // Pictures
 
-/// What they share with those of `render`.
-constexpr const char* kLooks[] = {"camera", "view", "target", "projection", "size", "samples", "cpu", "gl"};
-
 bool isStill(const Arguments& arguments) { return lowerExtension(arguments.text("output")) == ".png"; }
 
 double framesPerSecond(const Arguments& arguments) { return isStill(arguments) ? 0 : arguments.number("fps"); }
@@ -230,9 +227,9 @@ void runSimulate(Session& session, const Arguments& arguments) {
 }
 
 /// Those of `render` that simulations take too.
-std::vector<Parameter> lookParameters(const Registry& registry) {
-  std::vector<Parameter> parameters;
-  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
+/// As of `render`, but for what camera and target mean.
+std::vector<Parameter> sceneLookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters = lookParameters(registry);
   Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
   camera.help =
       "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
@@ -364,7 +361,7 @@ Command simulateCommand(const Registry& registry) {
                       .maximum = 10000}},
       .action = runSimulate,
       .check = checkSimulate};
-  std::ranges::move(lookParameters(registry), std::back_inserter(command.parameters));
+  std::ranges::move(sceneLookParameters(registry), std::back_inserter(command.parameters));
   return command;
 }
 

@@ -126,6 +126,8 @@ std::string signName(Sign sign) {
       return "winding";
     case Sign::shell:
       return "unsigned-shell";
+    case Sign::hull:
+      return "hull";
     case Sign::automatic:
       break;
   }

@@ -205,7 +205,7 @@ Command doctorCommand() {
 
 void addToolCommands(Registry& registry) {
   registry.add(runCommand());
-  registry.add(meshCommand());
+  registry.add(meshCommand(registry));
   registry.add({.name = "shapes",
                 .summary = "List the built-in shapes and their parameters.",
                 .help = "builtin:NAME is a shape's triangle mesh, analytic:NAME its distance in closed form.",

@@ -327,6 +327,27 @@ void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::str
   }
 }
 
+void addSwatches(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                 std::span<const Swatch> swatches) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em), side = 0.9 * small;
+  Column column = columnOf(frame);
+  addTitle(furniture, column, titles, em);
+  for (const Swatch& swatch : swatches) {
+    const double height = 1.6 * small + (swatch.count.empty() ? 0 : 1.6 * em);
+    if (column.top + height > column.bottom) return;
+    const double left = std::round(column.left), top = std::round(column.top), text = left + side + 0.5 * em;
+    furniture.boxes.push_back({left, top, left + side, top + side, kTick});
+    furniture.boxes.push_back({left + 1, top + 1, left + side - 1, top + side - 1, swatch.color});
+    addText(furniture, fitText(swatch.name, small, column.right - text), small, text,
+            top + (side + capHeight(small)) / 2, kSoftInk);
+    if (!swatch.count.empty())
+      addText(furniture, fitText(swatch.count, em, column.right - text), em, text, top + 1.35 * small + capHeight(em),
+              kInk);
+    column.top += height;
+  }
+}
+
 void addCaption(Furniture& furniture, const Frame& frame, const std::string& name,
                 std::span<const std::string> details) {
   if (frame.caption.empty()) return;

@@ -76,6 +76,16 @@ void addAxes(Furniture& furniture, const Frame& frame, const PixelRect& section,
 void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
               std::span<const std::pair<std::string, std::string>> facts);
 
+/// A colour, what it stands for and how often it is there, which may be left out.
+struct Swatch {
+  std::string name, count;
+  Color color;
+};
+
+/// A row each, as many as fit.
+void addSwatches(Furniture& furniture, const Frame& frame, std::span<const std::string> titles,
+                 std::span<const Swatch> swatches);
+
 /// The name, then those details that fit, the most important ones first.
 void addCaption(Furniture& furniture, const Frame& frame, const std::string& name,
                 std::span<const std::string> details);

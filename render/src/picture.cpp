@@ -16,6 +16,7 @@
 #include "describe.h"
 #include "hpsdf/error.h"
 #include "legend.h"
+#include "picture_parts.h"
 #include "quantity.h"
 #include "section.h"
 #include "view_buffers.h"
@@ -23,27 +24,9 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kSmallestSize = 16;
-constexpr int kLargestSize = 16384;
-constexpr int kMostSamples = 8;
-// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them; bodies take 28
-// more, and 12 meanwhile.
-constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
-
-void checkSize(int width, int height, int samples) {
-  const auto size = [&] { return std::to_string(width) + "x" + std::to_string(height); };
-  if (std::min(width, height) < kSmallestSize || std::max(width, height) > kLargestSize)
-    throw Error("picture size " + size() + " is out of range: give 16 to 16384 pixels a side");
-  if (samples < 1 || samples > kMostSamples)
-    throw Error("samples = " + std::to_string(samples) + " is out of range: give 1 to 8 samples an axis and pixel");
-  if (std::size_t(width) * height * samples * samples > kMostSamplesInAll)
-    throw Error("a picture of " + size() + " with " + std::to_string(samples) + "x" + std::to_string(samples) +
-                " samples a pixel takes more than 64 million samples: give a smaller size or fewer samples");
-}
-
 template <typename Picture>
 Frame frameOf(const Picture& picture) {
-  checkSize(picture.width, picture.height, picture.samples);
+  checkPictureSize(picture.width, picture.height, picture.samples);
   Frame result = frame(picture.width, picture.height);
   if (picture.bare) {
     result.view = {0, 0, picture.width, picture.height};
@@ -59,8 +42,6 @@ Frame frameOfSurface(const SurfacePicture& picture) {
   result.panel = {};
   return result;
 }
-
-double lineWidthOf(const Frame& frame) { return std::max(0.7, frame.textSize / 15); }
 
 // Where a slice shows the domain, in pixels.
 PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
@@ -80,11 +61,6 @@ void moveBeside(Frame& frame, const PixelRect& section) {
   if (frame.panel.empty() || section.empty() || space <= 0) return;
   frame.panel.x0 -= space;
   frame.panel.x1 -= space;
-}
-
-void place(Image& picture, const Image& view) {
-  for (int y = 0; y < view.height; ++y)
-    std::copy_n(&view.pixels[std::size_t(y) * view.width], view.width, &picture.at(0, y));
 }
 
 // The axis that a direction runs along, if it is one.
@@ -307,7 +283,7 @@ void addFieldFacts(Furniture& furniture, const Frame& frame, const Field& field,
 }  // namespace
 
 ViewSize viewSize(int pictureWidth, int pictureHeight) {
-  checkSize(pictureWidth, pictureHeight, 1);
+  checkPictureSize(pictureWidth, pictureHeight, 1);
   const PixelRect view = frame(pictureWidth, pictureHeight).view;
   return {view.width(), view.height()};
 }
@@ -472,9 +448,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   const FieldStatistics figures = statistics(field);
 
   Furniture furniture;
-  Image image(picture.width, picture.height, paperColor());
-  for (int y = 0; y < height; ++y)
-    std::fill_n(&image.at(0, y), picture.width, encodeSrgb(backdropColor((y + 0.5) / height)));
+  Image image = backdropPicture(picture.width, picture.height, height);
   const std::vector<LinearColor> materials = materialsOf(picture.bodies);
   const auto colorScene = [&](const SampleColor& color) {
     place(image, colorSurface(buffers, view.camera, color, sampling, picture.offset, scene.lines, materials));

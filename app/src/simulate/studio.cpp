@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "hpsdf/shapes.h"
+#include "pictures.h"
 #include "simulate/coarse_mesh.h"
 #include "summaries.h"
 
@@ -173,8 +174,7 @@ Studio::Studio(const Scene& scene, std::string name, render::SurfacePicture look
   std::vector<TriangleMesh> meshes = makeModels();
   renderer_ =
       backend.cpu ? render::makeCpuRenderer(*ground_.field) : render::makeGlRenderer(*ground_.field, backend.gl);
-  bodyRenderer_ = backend.cpu ? render::makeCpuBodyRenderer(std::move(meshes))
-                              : render::makeGlBodyRenderer(std::move(meshes), backend.gl);
+  bodyRenderer_ = makeBodyRenderer(std::move(meshes), backend);
   description_ = renderer_->description();
 }
 

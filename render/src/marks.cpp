@@ -1,0 +1,199 @@
+#include "marks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "color.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kCasing = {24, 22, 34};
+constexpr float kCasingStrength = 0.7F;
+constexpr float kHidden = 0.3F;      // strength of what lies behind something
+constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface may rise beside an edge of its own
+constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
+constexpr double kDotRadius = 2.6;
+constexpr double kCasingBorder = 0.9;
+constexpr double kSmallGroup = 16;  // pixels: what is no larger gets a ring
+constexpr double kLeastRing = 9;    // pixels, its radius
+constexpr int kGroupCell = 8;       // pixels: what lies in neighbouring cells of this size is one group
+
+struct Style {
+  const char* name;
+  Color color;
+};
+constexpr std::array<Style, kDefectKinds> kStyles = {{{"boundary edges", {255, 208, 0}},
+                                                      {"non-manifold edges", {226, 0, 206}},
+                                                      {"inconsistent edges", {0, 176, 80}},
+                                                      {"pinched vertices", {255, 255, 255}},
+                                                      {"pairs of faces that meet", {232, 24, 24}}}};
+
+bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
+
+/// A line, a dot or a ring: all points at some distance from a segment.
+struct Stroke {
+  PicturePoint from, to;
+  double radius = 0;  ///< pixels: of a ring from the middle, else 0
+  double half = 0;    ///< of the width, pixels
+  Color color;
+  double tolerance = 0;  ///< world units: hidden by what is nearer by more
+};
+
+class Painter {
+ public:
+  Painter(Image& picture, const ViewBuffers& buffers, int samples)
+      : picture_(picture), buffers_(buffers), samples_(samples) {}
+
+  /// Mixes a colour in where strokes, grown by `border`, cover pixels.
+  void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
+    for (const Stroke& stroke : strokes) paint(stroke, border, decodeSrgb(color ? *color : stroke.color), opacity);
+  }
+
+ private:
+  void paint(const Stroke& stroke, double border, const LinearColor& color, float opacity) {
+    const Eigen::Vector2d from(stroke.from.x, stroke.from.y), to(stroke.to.x, stroke.to.y);
+    const double reach = stroke.radius + stroke.half + border + 1;
+    const auto first = [&](double x) { return int(std::clamp(std::floor(x - reach), 0.0, 1e6)); };
+    const auto end = [&](double x, int size) { return int(std::clamp(std::ceil(x + reach), 0.0, double(size))); };
+    const int x1 = end(std::max(from.x(), to.x()), buffers_.width / samples_);
+    const int y1 = end(std::max(from.y(), to.y()), buffers_.height / samples_);
+    const Eigen::Vector2d along = to - from;
+    const double squared = along.squaredNorm();
+    for (int y = first(std::min(from.y(), to.y())); y < y1; ++y)
+      for (int x = first(std::min(from.x(), to.x())); x < x1; ++x) {
+        const Eigen::Vector2d middle(x + 0.5, y + 0.5);
+        const double t = squared > 0 ? std::clamp((middle - from).dot(along) / squared, 0.0, 1.0) : 0.0;
+        const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
+        const double covered = std::clamp(stroke.half + border + 0.5 - away, 0.0, 1.0);
+        if (covered <= 0) continue;
+        const float strength = isHidden(stroke, t, x, y) ? kHidden : 1.0F;
+        Color& pixel = picture_.at(x, y);
+        pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
+      }
+  }
+
+  /// A ring is where its middle is.
+  bool isHidden(const Stroke& stroke, double t, int x, int y) const {
+    if (stroke.radius > 0) x = int(stroke.from.x), y = int(stroke.from.y);
+    if (x < 0 || y < 0 || x >= buffers_.width / samples_ || y >= buffers_.height / samples_) return false;
+    const std::size_t i =
+        std::size_t(y * samples_ + samples_ / 2) * buffers_.width + std::size_t(x * samples_ + samples_ / 2);
+    // along a line in space the reciprocal of the distance is what changes evenly
+    const double distance = 1 / ((1 - t) / stroke.from.distance + t / stroke.to.distance);
+    return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
+  }
+
+  Image& picture_;
+  const ViewBuffers& buffers_;
+  int samples_;
+};
+
+/// What hangs together in the picture, of one kind: cells of some pixels that touch.
+class Groups {
+ public:
+  Groups(int width, int height)
+      : columns_(width / kGroupCell + 1), rows_(height / kGroupCell + 1), here_(std::size_t(columns_) * rows_) {}
+
+  void add(const PicturePoint& p) {
+    const int column = int(std::floor(p.x / kGroupCell)), row = int(std::floor(p.y / kGroupCell));
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
+    Cell& cell = here_[std::size_t(row) * columns_ + column];
+    if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
+    cell.used = true;
+    cell.extent.extend(Eigen::Vector2d(p.x, p.y));
+  }
+
+  struct Group {
+    Eigen::AlignedBox2d extent;
+    PicturePoint nearest;
+  };
+
+  std::vector<Group> take() {
+    std::vector<Group> groups;
+    for (int row = 0; row < rows_; ++row)
+      for (int column = 0; column < columns_; ++column)
+        if (here_[std::size_t(row) * columns_ + column].used) groups.push_back(spread(column, row));
+    return groups;
+  }
+
+ private:
+  struct Cell {
+    bool used = false;
+    PicturePoint nearest = {};
+    Eigen::AlignedBox2d extent;
+  };
+
+  Group spread(int column, int row) {
+    Group group{.extent = {}, .nearest = here_[std::size_t(row) * columns_ + column].nearest};
+    std::vector<std::array<int, 2>> pending = {{column, row}};
+    while (!pending.empty()) {
+      const auto [x, y] = pending.back();
+      pending.pop_back();
+      Cell& cell = here_[std::size_t(y) * columns_ + x];
+      if (!cell.used) continue;
+      cell.used = false;
+      group.extent.extend(cell.extent);
+      if (cell.nearest.distance < group.nearest.distance) group.nearest = cell.nearest;
+      for (int v = std::max(0, y - 1); v <= std::min(rows_ - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(columns_ - 1, x + 1); ++u) pending.push_back({u, v});
+    }
+    return group;
+  }
+
+  int columns_, rows_;
+  std::vector<Cell> here_;
+};
+
+}  // namespace
+
+Color defectColor(DefectKind kind) { return kStyles[static_cast<std::size_t>(kind)].color; }
+
+std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
+  std::vector<Swatch> swatches;
+  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
+    if (defects.counts[kind] > 0)
+      swatches.push_back({kStyles[kind].name, formatCount(defects.counts[kind]), kStyles[kind].color});
+  return swatches;
+}
+
+void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
+                  std::span<const Defect> defects, double lineWidth) {
+  const int width = buffers.width / samples, height = buffers.height / samples;
+  std::vector<Stroke> strokes;
+  for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
+    Groups groups(width, height);
+    const Color color = kStyles[kind].color;
+    for (const Defect& defect : defects) {
+      if (defect.kind != DefectKind(kind)) continue;
+      const PicturePoint from = project(camera, defect.ends[0], width, height);
+      const PicturePoint to = project(camera, defect.ends[1], width, height);
+      if (!(from.depth > 0) || !(to.depth > 0)) continue;
+      const double tolerance = kHiddenBeyond * pixelSize(camera, std::max(from.depth, to.depth), height);
+      groups.add(from);
+      groups.add(to);
+      if (isEdge(defect.kind))
+        strokes.push_back({from, to, 0, 0.5 * kLineWidth * lineWidth, color, tolerance});
+      else if (defect.kind == DefectKind::pinchedVertex)
+        strokes.push_back({from, to, 0, kDotRadius * lineWidth, color, tolerance});
+    }
+    for (const Groups::Group& group : groups.take()) {
+      if (group.extent.sizes().maxCoeff() > kSmallGroup * lineWidth) continue;
+      PicturePoint middle = group.nearest;
+      middle.x = group.extent.center().x();
+      middle.y = group.extent.center().y();
+      const double radius = kLeastRing * lineWidth + 0.5 * group.extent.sizes().maxCoeff();
+      strokes.push_back({middle, middle, radius, 0.5 * kLineWidth * lineWidth, color,
+                         kHiddenBeyond * pixelSize(camera, middle.depth, height)});
+    }
+  }
+  // all casings first, so that none covers a neighbour
+  Painter painter(picture, buffers, samples);
+  painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
+  painter.paint(strokes, 0, nullptr, 1);
+}
+
+}  // namespace hpsdf::render

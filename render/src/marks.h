@@ -1,0 +1,24 @@
+#pragma once
+// Where a mesh has defects, over a finished view.
+
+#include <span>
+
+#include "hpsdf/mesh_defects.h"
+#include "hpsdf/render/image.h"
+#include "hpsdf/render/view.h"
+#include "legend.h"
+
+namespace hpsdf::render {
+
+/// Six kinds that an eye tells apart on clay.
+Color defectColor(DefectKind kind);
+
+/// "boundary edges", with their counts, of those that there are.
+std::vector<Swatch> defectSwatches(const MeshDefects& defects);
+
+/// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Faint where
+/// something in the buffers hides it. The view lies in the picture's upper left corner.
+void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
+                  std::span<const Defect> defects, double lineWidth);
+
+}  // namespace hpsdf::render

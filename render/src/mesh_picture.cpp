@@ -1,0 +1,88 @@
+#include "hpsdf/render/mesh_picture.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "body_meshes.h"
+#include "color_view.h"
+#include "hpsdf/build.h"
+#include "legend.h"
+#include "marks.h"
+#include "picture_parts.h"
+#include "view_buffers.h"
+
+namespace hpsdf::render {
+namespace {
+
+enum Look : std::uint32_t { front, back, crossing };
+constexpr Color kBack = {78, 124, 190};
+constexpr Color kCrossing = {214, 70, 58};
+
+/// For each triangle, whether it meets another.
+std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
+  std::vector<char> result(mesh.triangles.size(), 0);
+  for (const Defect& defect : defects.found)
+    if (defect.kind == DefectKind::crossing)
+      for (const std::uint32_t face : defect.faces) result[face] = 1;
+  return result;
+}
+
+/// Of the triangle that each pixel sees.
+void setLooks(const TriangleMesh& mesh, const MeshDefects& defects, const Camera& camera, BodyBuffers& seen) {
+  const std::vector<char> crossing = areCrossing(mesh, defects);
+  for (int y = 0; y < seen.height; ++y)
+    for (int x = 0; x < seen.width; ++x) {
+      const std::size_t i = std::size_t(y) * seen.width + x;
+      if (!seen.hit(i)) continue;
+      const auto& [a, b, c] = mesh.triangles[seen.triangle[i]];
+      const Vector3 normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+      const bool fromBehind = normal.dot(pixelRay(camera, x, y, seen.width, seen.height)) > 0;
+      seen.body[i] = crossing[seen.triangle[i]] ? Look::crossing : fromBehind ? Look::back : Look::front;
+    }
+}
+
+std::vector<Swatch> swatchesOf(const MeshDefects& defects) {
+  std::vector<Swatch> swatches = defectSwatches(defects);
+  swatches.push_back({"faces, seen from outside", "", surfaceColor()});
+  swatches.push_back({"faces, seen from behind", "", kBack});
+  if (defects.count(DefectKind::crossing) > 0) swatches.push_back({"faces that meet others", "", kCrossing});
+  return swatches;
+}
+
+}  // namespace
+
+Image drawMesh(BodyRenderer& renderer, const TriangleMesh& mesh, const MeshDefects& defects,
+               const MeshPicture& picture) {
+  checkPictureSize(picture.width, picture.height, picture.samples);
+  const Frame frame = render::frame(picture.width, picture.height);
+  const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
+  const Body body{.mesh = 0, .worldFromBody = Eigen::Isometry3d::Identity(), .color = surfaceColor()};
+  const Camera camera =
+      startingBefore(renderer.bounds({&body, 1}), cameraOf(picture.camera, domainAround(mesh), width, height));
+  BodyBuffers seen = renderer.view(camera, {&body, 1}, width * samples, height * samples);
+  setLooks(mesh, defects, camera, seen);
+  ViewBuffers buffers = emptyBuffers(seen.width, seen.height, true);
+  addBodies(seen, buffers);
+
+  Image image = backdropPicture(picture.width, picture.height, height);
+  const Sampling sampling{samples, lineWidthOf(frame), 1};
+  const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
+  place(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
+  paintDefects(image, camera, buffers, samples, defects.found, sampling.lineWidth);
+
+  Furniture furniture;
+  const std::array<std::string, 2> titles = {"Defects of the mesh", "Defects"};
+  addSwatches(furniture, frame, titles, swatchesOf(defects));
+  const std::array<std::string, 3> details = {formatCount(mesh.triangles.size()) + " faces",
+                                              formatCount(mesh.vertices.size()) + " vertices",
+                                              "camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +
+                                                  formatNumber(picture.camera.elevationDegrees) + "°"};
+  addCaption(furniture, frame, mesh.name, details);
+  paint(image, furniture);
+  return image;
+}
+
+}  // namespace hpsdf::render
