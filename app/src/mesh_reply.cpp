@@ -36,6 +36,7 @@ struct Header {
   std::uint64_t boundaryEdges = 0;
   std::uint64_t nonManifoldEdges = 0;
   std::uint64_t inconsistentEdges = 0;
+  std::uint64_t unbalancedEdges = 0;
   std::uint64_t weldedVertices = 0;
   std::uint64_t unreferencedVertices = 0;
   std::uint64_t degenerateFaces = 0;
@@ -45,8 +46,8 @@ struct Header {
   double volume = 0;
   double area = 0;
 };
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 18 * 8, "no padding: every byte is told");
-static_assert(sizeof(MeshReport) == 20 * 8, "what is new in the report has to be sent, too");
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 19 * 8, "no padding: every byte is told");
+static_assert(sizeof(MeshReport) == 21 * 8, "what is new in the report has to be sent, too");
 
 constexpr std::size_t kUnsummedBytes = offsetof(Header, kind);
 
@@ -94,6 +95,7 @@ MeshReport reportOf(const Header& header) {
           .boundaryEdges = header.boundaryEdges,
           .nonManifoldEdges = header.nonManifoldEdges,
           .inconsistentEdges = header.inconsistentEdges,
+          .unbalancedEdges = header.unbalancedEdges,
           .weldedVertices = header.weldedVertices,
           .unreferencedVertices = header.unreferencedVertices,
           .degenerateFaces = header.degenerateFaces,
@@ -162,6 +164,7 @@ void writeMesh(const ImportedMesh& imported, const ReplySink& sink) {
   header.boundaryEdges = report.boundaryEdges;
   header.nonManifoldEdges = report.nonManifoldEdges;
   header.inconsistentEdges = report.inconsistentEdges;
+  header.unbalancedEdges = report.unbalancedEdges;
   header.weldedVertices = report.weldedVertices;
   header.unreferencedVertices = report.unreferencedVertices;
   header.degenerateFaces = report.degenerateFaces;

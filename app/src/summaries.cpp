@@ -159,6 +159,7 @@ Json meshJson(const std::string& name, const MeshReport& report) {
           {"boundary_edges", report.boundaryEdges},
           {"non_manifold_edges", report.nonManifoldEdges},
           {"inconsistent_edges", report.inconsistentEdges},
+          {"unbalanced_edges", report.unbalancedEdges},
           {"welded_vertices", report.weldedVertices},
           {"unreferenced_vertices", report.unreferencedVertices},
           {"degenerate_faces", report.degenerateFaces},

@@ -98,15 +98,6 @@ class Groups {
   Groups(int width, int height)
       : columns_(width / kGroupCell + 1), rows_(height / kGroupCell + 1), here_(std::size_t(columns_) * rows_) {}
 
-  void add(const PicturePoint& p) {
-    const int column = int(std::floor(p.x / kGroupCell)), row = int(std::floor(p.y / kGroupCell));
-    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
-    Cell& cell = here_[std::size_t(row) * columns_ + column];
-    if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
-    cell.used = true;
-    cell.extent.extend(Eigen::Vector2d(p.x, p.y));
-  }
-
   struct Group {
     Eigen::AlignedBox2d extent;
     PicturePoint nearest;
@@ -120,7 +111,29 @@ class Groups {
     return groups;
   }
 
+  /// A line, by places no farther apart than a cell.
+  void add(const PicturePoint& from, const PicturePoint& to) {
+    const double length = std::hypot(to.x - from.x, to.y - from.y);
+    const int steps = int(std::min(std::ceil(length / kGroupCell), 1e4));
+    add(from);
+    for (int i = 1; i <= steps; ++i) {
+      const double t = double(i) / steps;
+      const auto between = [t](double a, double b) { return a + t * (b - a); };
+      add({between(from.x, to.x), between(from.y, to.y), between(from.depth, to.depth),
+           between(from.distance, to.distance)});
+    }
+  }
+
  private:
+  void add(const PicturePoint& p) {
+    const int column = int(std::floor(p.x / kGroupCell)), row = int(std::floor(p.y / kGroupCell));
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
+    Cell& cell = here_[std::size_t(row) * columns_ + column];
+    if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
+    cell.used = true;
+    cell.extent.extend(Eigen::Vector2d(p.x, p.y));
+  }
+
   struct Cell {
     bool used = false;
     PicturePoint nearest = {};
@@ -173,8 +186,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
       const PicturePoint to = project(camera, defect.ends[1], width, height);
       if (!(from.depth > 0) || !(to.depth > 0)) continue;
       const double tolerance = kHiddenBeyond * pixelSize(camera, std::max(from.depth, to.depth), height);
-      groups.add(from);
-      groups.add(to);
+      groups.add(from, to);
       if (isEdge(defect.kind))
         strokes.push_back({from, to, 0, 0.5 * kLineWidth * lineWidth, color, tolerance});
       else if (defect.kind == DefectKind::pinchedVertex)

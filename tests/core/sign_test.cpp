@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "distance/solid_angle.h"
 #include "distance/winding.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
@@ -26,6 +27,7 @@ namespace {
 
 using distance::Hierarchy;
 using distance::Winding;
+using support::boxOfTwo;
 using support::joined;
 using support::moved;
 using support::openBox;
@@ -273,6 +275,71 @@ TEST(Sign, IsCheckedAgainstTheWholeSum) {
   const SignCheck alone = withThreads(1, [&] { return checkSign(mesh, byNormals, 4000); });
   EXPECT_EQ(alone.wrong, wrong.wrong);
   EXPECT_EQ(alone.worst, wrong.worst);
+}
+
+TEST(Sign, IsCheckedOfAMeshThatLooksInwards) {
+  const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
+  EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 2000).wrong, 0u);
+}
+
+/// A part within a box, both of which look outwards, its greatest face this far from the box's wall at x = 0.
+TriangleMesh partBeforeWall(double gap) {
+  TriangleMesh part = boxOfTwo();
+  for (Vector3& v : part.vertices)
+    v = v.x() < 0 ? Vector3(gap, 0.3 * v.y(), 0.3 * v.z()) : Vector3(0.6, 0.27 * v.y(), 0.27 * v.z());
+  return joined(moved(boxOfTwo(), {1, 0, 0}), part);
+}
+
+TEST(Sign, IsRightHoweverNearWallsCome) {
+  int misled = 0;
+  for (const double gap : {1e-6, 1e-10, 1e-12, 1e-14, 1e-15, 1e-16, 1e-17, 1e-20}) {
+    const TriangleMesh nested = partBeforeWall(gap);
+    const TriangleMesh beside = joined(moved(boxOfTwo(), {1 + gap, 0, 0}), moved(boxOfTwo(), {-1, 0, 0}));
+    TriangleMesh far = beside;
+    for (Vector3& v : far.vertices)
+      if (v.x() == 1 + gap - 1) v.x() = gap;  // representable near 0 alone
+    for (const TriangleMesh& mesh : {nested, far}) {
+      EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 3000).wrong, 0u) << gap;
+      misled += checkSign(mesh, ExactDistance(mesh, {.sign = Sign::pseudonormal}), 3000).wrong > 0;
+    }
+  }
+  EXPECT_GT(misled, 8) << "else this tells nothing";
+}
+
+TEST(Sign, IsRightBesideFacesThinnerThanRounding) {
+  TriangleMesh needle;
+  needle.vertices = {{0.5, 0, 0}, {0.5 + 6e-8, 0, 0}, {0.5, 1e-16, 0}, {0.5, 0, 1e-16}};
+  needle.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const TriangleMesh mesh = cleaned(joined(boxOfTwo(), needle)).mesh;
+  ASSERT_EQ(mesh.triangles.size(), 16u) << "else this tells nothing";
+  const ExactDistance distance(mesh);
+  EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("thinner"));
+  EXPECT_EQ(checkSign(mesh, distance, 3000).wrong, 0u);
+  EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.sign = Sign::pseudonormal}), 3000).wrong, 0u);
+}
+
+TEST(Sign, OfBodiesThatShareAnEdgeIsTurnedToo) {
+  const ImportedMesh inward = cleaned(turned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))));
+  EXPECT_TRUE(inward.report.turned);
+  EXPECT_EQ(inward.report.unbalancedEdges, 0u);
+  EXPECT_EQ(inward.report.nonManifoldEdges, 1u);
+  EXPECT_LT(value(ExactDistance(inward.mesh), {0, 0, 0}), 0);
+  EXPECT_GT(value(ExactDistance(inward.mesh), {3, 0, 0}), 0);
+}
+
+TEST(AngleSum, CountsTurns) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> u(-1, 1);
+  distance::AngleSum sum;
+  double plain = 0;
+  for (int i = 0; i < 2000; ++i) {
+    double x = u(random), y = u(random);
+    if (i % 3 == 0) y = 0;  // half a turn, or none
+    if (i % 7 == 0) x = 0;
+    sum.add(x, y);
+    if (x != 0 || y != 0) plain += std::atan2(y, x);
+    ASSERT_NEAR(sum.value(), plain, 1e-9) << i;
+  }
 }
 
 /// Real meshes, closed and broken, at fewer places than `hpsdf mesh --check-sign` takes.

@@ -16,6 +16,10 @@ struct MeshReport {
   std::size_t nonManifoldEdges = 0;   ///< used by more than two triangles
   std::size_t inconsistentEdges = 0;  ///< used by two triangles that run the same way along it
 
+  /// Run along by more triangles one way than the other: the rims of holes, and where faces look the wrong way. Without
+  /// any, winding numbers are whole, and inside and outside are told apart though edges may be non-manifold.
+  std::size_t unbalancedEdges = 0;
+
   std::size_t weldedVertices = 0;        ///< removed because another has the same position
   std::size_t unreferencedVertices = 0;  ///< removed because no triangle uses them
   std::size_t degenerateFaces = 0;       ///< dropped: two equal corners or no area

@@ -8,6 +8,8 @@
 #include <span>
 #include <utility>
 
+#include "distance/segment.h"
+#include "distance/triangle_frame.h"
 #include "mesh/orientation.h"
 
 namespace hpsdf {
@@ -102,10 +104,64 @@ int shareInFront(Corners& one, Corners& other) {
   return shared;
 }
 
-/// All pairs of triangles whose boxes overlap: by boxes of four, sixteen, … neighbours in the hierarchy's order.
+// Nearness, to rounding: what follows decides only whether triangles are too near to tell apart.
+
+double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
+  const auto toSegment = [](const Vector3& x, const Vector3& from, const Vector3& to) {
+    return (from + closestParameter(x, from, to) * (to - from) - x).squaredNorm();
+  };
+  double least = std::min({toSegment(a, c, d), toSegment(b, c, d), toSegment(c, a, b), toSegment(d, a, b)});
+  const Vector3 u = b - a, v = d - c, across = u.cross(v), between = c - a;
+  const double squared = across.squaredNorm();
+  if (!(squared > 0)) return least;
+  const double s = between.cross(v).dot(across) / squared, t = between.cross(u).dot(across) / squared;
+  if (s >= 0 && s <= 1 && t >= 0 && t <= 1) {
+    const double height = between.dot(across);
+    least = std::min(least, height * height / squared);
+  }
+  return least;
+}
+
+/// All corners are on one side of the triangle's plane, and farther from it than the margin.
+bool isFarAside(const Triangle& t, std::span<const Vector3> corners, double margin) {
+  const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double least = margin * normal.norm();
+  int above = 0, below = 0;
+  for (const Vector3& corner : corners) {
+    const double height = normal.dot(corner - t[0]);
+    above += height > least;
+    below += height < -least;
+  }
+  return std::max(above, below) == static_cast<int>(corners.size());
+}
+
+/// A point or a segment, or all of a triangle, is within the margin of the other.
+bool isNear(const Triangle& t, std::span<const Vector3> corners, double margin) {
+  if (isFarAside(t, corners, margin)) return false;
+  const TriangleFrame frame = makeFrame(t, 0);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (distance::squaredDistance(frame, corners[i]) < margin * margin) return true;
+    if (i + 1 == corners.size() && corners.size() < 3) break;
+    for (int k = 0; k < 3; ++k)
+      if (squaredDistance(corners[i], corners[(i + 1) % corners.size()], t[k], t[(k + 1) % 3]) < margin * margin)
+        return true;
+  }
+  return false;
+}
+
+/// Two triangles come that near each other elsewhere than around the corners they share, which come first.
+bool areNear(const Triangle& one, const Triangle& other, int shared, double margin) {
+  const auto beyond = [&](const Triangle& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
+  return isNear(one, beyond(other), margin) || isNear(other, beyond(one), margin);
+}
+
+/// All pairs of triangles whose boxes overlap, or nearly: by boxes of four, sixteen, … neighbours in the hierarchy's
+/// order.
 class Finder {
  public:
-  explicit Finder(const Hierarchy& hierarchy) : hierarchy_(hierarchy), vertices_(hierarchy.vertices().size()) {
+  /// `margin`, of coordinates of order 1: triangles meet that come as near; 0 for those that do, without rounding.
+  Finder(const Hierarchy& hierarchy, double margin)
+      : hierarchy_(hierarchy), margin_(margin), vertices_(hierarchy.vertices().size()) {
     const double scale = scaleToOne(hierarchy.vertices());
     for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v] = scale * hierarchy.vertices()[v];
     unit_ = 1 / scale;
@@ -114,8 +170,7 @@ class Finder {
 
   /// With triangles of later slots.
   void find(std::uint32_t slot, std::vector<Crossing>& found) const {
-    const Triangle triangle = corners(slot);
-    if (spansPlane(triangle)) visit(static_cast<int>(levels_.size()) - 1, 0, slot, triangle, found);
+    if (spansPlane(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, found);
   }
 
  private:
@@ -128,7 +183,9 @@ class Finder {
     const auto count = static_cast<std::uint32_t>(hierarchy_.triangles().size());
     levels_.emplace_back(count);
     tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t slot) {
-      for (const Vector3& corner : corners(slot)) levels_[0][slot].extend(corner);
+      Box& box = levels_[0][slot];
+      for (const Vector3& corner : corners(slot)) box.extend(corner);
+      box = Box(box.min().array() - margin_, box.max().array() + margin_);
     });
     while (levels_.back().size() > 1) {
       const std::vector<Box>& below = levels_.back();
@@ -138,28 +195,30 @@ class Finder {
     }
   }
 
-  void visit(int level, std::uint32_t box, std::uint32_t slot, const Triangle& triangle,
-             std::vector<Crossing>& found) const {
+  void visit(int level, std::uint32_t box, std::uint32_t slot, std::vector<Crossing>& found) const {
     const Box& mine = levels_[0][slot];
     if (!levels_[level][box].intersects(mine)) return;
     if (level == 0) {
-      if (meets(slot, box, triangle)) found.push_back(crossing(slot, box));
+      if (meets(slot, box)) found.push_back(crossing(slot, box));
       return;
     }
     const auto end =
         static_cast<std::uint32_t>(std::min<std::size_t>((std::size_t{box} + 1) * kWide, levels_[level - 1].size()));
     for (std::uint32_t child = box * kWide; child < end; ++child)
       if ((std::uint64_t{child} + 1) << (2 * (level - 1)) > slot + std::uint64_t{1})  // its last slot comes after
-        visit(level - 1, child, slot, triangle, found);
+        visit(level - 1, child, slot, found);
   }
 
-  bool meets(std::uint32_t slot, std::uint32_t other, const Triangle& triangle) const {
+  bool meets(std::uint32_t slot, std::uint32_t other) const {
     Corners mine = hierarchy_.triangles()[slot], its = hierarchy_.triangles()[other];
     const int shared = shareInFront(mine, its);
-    const Triangle second = cornersOf(its);
+    const Triangle first = cornersOf(mine), second = cornersOf(its);
     if (!spansPlane(second)) return false;
-    if (shared == 0) return distance::meet(triangle, second);
-    const Triangle first = cornersOf(mine);
+    return meet(first, second, shared) || (margin_ > 0 && areNear(first, second, shared, margin_));
+  }
+
+  static bool meet(const Triangle& first, const Triangle& second, int shared) {
+    if (shared == 0) return distance::meet(first, second);
     if (shared == 1) return meetBeyondCorner(first, second);
     return shared == 3 || meetBeyondSide(first, second);
   }
@@ -170,6 +229,7 @@ class Finder {
   }
 
   const Hierarchy& hierarchy_;
+  double margin_;
   std::vector<Vector3> vertices_;         ///< of order 1
   double unit_;                           ///< of these
   std::vector<std::vector<Box>> levels_;  ///< the triangles' own first
@@ -208,8 +268,8 @@ double scaleToOne(std::span<const Vector3> vertices) {
   return greatest > 0 ? std::ldexp(1.0, -std::ilogb(greatest)) : 1;
 }
 
-Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit) {
-  const Finder finder(hierarchy);
+Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin) {
+  const Finder finder(hierarchy, margin);
   const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
   Crossings crossings;
   std::vector<std::vector<Crossing>> ofSlot;
@@ -230,7 +290,7 @@ Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit) {
 Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit) {
   distance::requireSurface(mesh);
   const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
-  return distance::findCrossings(hierarchy, limit);
+  return distance::findCrossings(hierarchy, limit, 0);
 }
 
 }  // namespace hpsdf

@@ -23,7 +23,8 @@ bool lieInOnePlane(const std::array<Vector3, 3>& one, const std::array<Vector3, 
 /// A power of two, so that it rounds nothing, times which coordinates are of order 1.
 double scaleToOne(std::span<const Vector3> vertices);
 
-/// `hpsdf::findCrossings` of a hierarchy's triangles, by their indices in the mesh.
-Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit);
+/// `hpsdf::findCrossings` of a hierarchy's triangles, by their indices in the mesh. With a margin, of coordinates of
+/// order 1, also those that come as near each other, to rounding.
+Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin);
 
 }  // namespace hpsdf::distance

@@ -173,7 +173,7 @@ ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
 const SignChoice& ExactDistance::signChoice() const { return data_->choice; }
 
 Crossings ExactDistance::crossings(std::size_t limit) const {
-  return distance::findCrossings(data_->parts.empty() ? data_->hierarchy : data_->whole, limit);
+  return distance::findCrossings(data_->parts.empty() ? data_->hierarchy : data_->whole, limit, 0);
 }
 
 std::string_view instructionSet() { return distance::instructionSet(); }

@@ -87,7 +87,7 @@ using Pair = std::array<std::uint32_t, 2>;
 
 /// Each pair of triangles that meet, both ways, sorted.
 std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
-  const Crossings crossings = findCrossings(hierarchy, kMostPairs);
+  const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0);
   if (!crossings.all) refuse(mesh);
   std::vector<Pair> pairs;
   for (const Crossing& crossing : crossings.found) {

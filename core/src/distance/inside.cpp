@@ -107,6 +107,12 @@ void Inside::signTogether(std::span<const Vector3> points, std::span<const doubl
   }
 }
 
+bool Inside::boundsInside(std::uint32_t slot) const {
+  const auto& [a, b, c] = hierarchy_->triangles()[slot];
+  const auto vertices = hierarchy_->vertices();
+  return std::abs(winding_.withoutOne((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_) < 0.25;
+}
+
 std::vector<char> Inside::contains(std::span<const Vector3> places) const {
   std::vector<char> inside(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { inside[i] = find(places[i], 0, 0).inside; });

@@ -32,6 +32,10 @@ class Inside {
   /// the nearest of those that do.
   void sign(std::span<const Vector3> points, std::span<const double> free, std::span<double> distances) const;
 
+  /// Whether the triangle in a slot, at its middle, has the outside before it and the inside behind it: then the
+  /// winding number of all others is there the middle of both. No step aside could leap over another wall.
+  bool boundsInside(std::uint32_t slot) const;
+
   /// Whether these places are inside, 1 or 0, each by a winding number of its own.
   std::vector<char> contains(std::span<const Vector3> places) const;
 

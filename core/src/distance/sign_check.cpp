@@ -9,6 +9,7 @@
 #include "distance/solid_angle.h"
 #include "field/random_points.h"
 #include "hpsdf/error.h"
+#include "hpsdf/mesh_report.h"
 
 namespace hpsdf {
 namespace {
@@ -37,6 +38,8 @@ double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
 
 SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std::size_t places, std::uint64_t seed,
                     const Progress& progress) {
+  const MeshReport report = inspect(mesh);
+  const double level = report.unbalancedEdges == 0 && report.volume < 0 ? -0.5 : 0.5;  // of one that looks inwards
   const Box& surface = distance.source().box;
   const double size = surface.sizes().maxCoeff();
   const Vector3 beyond = Vector3::Constant(0.1 * size);
@@ -49,7 +52,7 @@ SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std
                  for (std::size_t i = first; i < first + count; ++i) {
                    place[i] = placeOf(mesh, box, Random(seed, i), i);
                    found[i] = distance(place[i]);
-                   inside[i] = windingNumber(mesh, place[i]) > 0.5;
+                   inside[i] = windingNumber(mesh, place[i]) > level;
                  }
                });
   SignCheck check{.places = places, .nearest = 1e-6 * size};

@@ -1,5 +1,7 @@
 #include "distance/sign_choice.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -18,6 +20,8 @@ namespace hpsdf::distance {
 namespace {
 
 constexpr int kLattice = 16;  // places along each axis
+/// Of coordinates of order 1: of two triangles nearer than that, distances may round to be the same.
+constexpr double kTooNear = 0x1p-44;
 
 std::string textOf(const Vector3& x) {
   std::ostringstream text;
@@ -60,21 +64,12 @@ std::vector<std::uint32_t> greatestOfPieces(const Hierarchy& hierarchy, const st
 
 /// A place on a piece of the surface that has not the outside before it and the inside behind it.
 std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<std::uint32_t>& pieces,
-                                 const Inside& inside, const Box& box) {
-  const double aside = besideSurface(box);
-  std::vector<Vector3> middles, before, behind;
-  for (const std::uint32_t slot : pieces) {
-    const TriangleFrame& frame = hierarchy.frames()[slot];
-    if (!hasArea(frame)) continue;
-    const auto& [a, b, c] = hierarchy.triangles()[slot];
-    middles.push_back((hierarchy.vertices()[a] + hierarchy.vertices()[b] + hierarchy.vertices()[c]) / 3);
-    before.push_back(middles.back() + aside * frame.normal);
-    behind.push_back(middles.back() - aside * frame.normal);
-  }
-  const std::vector<char> inFront = inside.contains(before), inBack = inside.contains(behind);
-  for (std::size_t i = 0; i < middles.size(); ++i)
-    if (inFront[i] || !inBack[i]) return middles[i];
-  return std::nullopt;
+                                 const Inside& inside) {
+  std::vector<char> wrong(pieces.size());
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) { wrong[i] = !inside.boundsInside(pieces[i]); });
+  const auto first = std::ranges::find(wrong, 1);
+  if (first == wrong.end()) return std::nullopt;
+  return hierarchy.frames()[pieces[std::size_t(first - wrong.begin())]].origin;
 }
 
 }  // namespace
@@ -95,14 +90,19 @@ std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const Trian
                   : "the faces surround nothing that was found: a shell would give them a thickness";
     return byWinding(std::move(reason), std::move(inside));
   }
-  if (const Crossings crossings = findCrossings(hierarchy, 1); !crossings.found.empty())
+  // All that follows is about what rounds: normals would then speak of another surface.
+  const auto thin = std::ranges::find_if_not(hierarchy.frames(), hasArea);
+  if (thin != hierarchy.frames().end())
+    return byWinding("a face is thinner than what coordinates round, as at " + textOf(thin->origin),
+                     Inside(hierarchy, mesh, std::move(rims)));
+  if (const Crossings crossings = findCrossings(hierarchy, 1, kTooNear); !crossings.found.empty())
     return byWinding("the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place),
                      Inside(hierarchy, mesh, std::move(rims)));
   const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
   if (pieces.size() > 1) {
     Inside inside(hierarchy, mesh, std::move(rims));
-    if (const auto place = misplaced(hierarchy, pieces, inside, box))
-      return byWinding("a part lies within another, and looks the same way, as at " + textOf(*place),
+    if (const auto place = misplaced(hierarchy, pieces, inside))
+      return byWinding("a part looks the wrong way, or lies within another, as at " + textOf(*place),
                        std::move(inside));
   }
   return {SignChoice{Sign::pseudonormal, "the mesh is closed and does not meet itself"}, Inside()};

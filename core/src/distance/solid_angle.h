@@ -18,6 +18,7 @@ class AngleSum {
     const double real = real_ * x - imaginary_ * y, imaginary = real_ * y + imaginary_ * x + 0.0;  // no −0
     if (y > 0 && imaginary_ >= 0 && imaginary < 0) ++turns_;
     if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
+    if (y == 0 && x < 0 && (imaginary_ > 0 || (imaginary_ == 0 && real_ < 0))) ++turns_;  // by half a turn
     const double size = std::abs(real) + std::abs(imaginary);
     const double scale = size < 1e-100 ? 1e100 : size > 1e100 ? 1e-100 : 1;
     real_ = scale * real;

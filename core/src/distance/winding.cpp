@@ -173,6 +173,10 @@ Winding::Estimate Winding::estimate(const Vector3& x, int level) const {
   return all;
 }
 
+double Winding::withoutOne(const Vector3& x, std::uint32_t slot) const {
+  return within(x, 0.05, [](const Estimate&) { return false; }).value - sum(hierarchy_->local(x), slot, slot + 1);
+}
+
 double Winding::exact(const Vector3& x) const {
   return sum(hierarchy_->local(x), 0, static_cast<std::uint32_t>(hierarchy_->triangles().size()));
 }

@@ -40,6 +40,9 @@ class Winding {
   static constexpr int kLevels = 4;
   Estimate estimate(const Vector3& x, int level) const;
 
+  /// To a twentieth, that of all triangles but the one in a slot.
+  double withoutOne(const Vector3& x, std::uint32_t slot) const;
+
   /// The sum over all triangles, in the hierarchy's order.
   double exact(const Vector3& x) const;
 

@@ -121,7 +121,7 @@ ImportedMesh cleaned(TriangleMesh mesh) {
   result.report.flippedFaces = flipped;
   result.report.duplicateFaces = duplicates;
   result.report.unreferencedVertices = unreferenced;
-  if (looksInward(result.report.volume, result.report.area, result.report.box, result.report.closed())) {
+  if (looksInward(result.report.volume, result.report.area, result.report.box, result.report.unbalancedEdges == 0)) {
     for (Triangle& triangle : result.mesh.triangles) std::swap(triangle[1], triangle[2]);
     result.report.turned = true;
     result.report.volume = signedVolume(result.mesh);

@@ -33,6 +33,7 @@ MeshReport inspect(const TriangleMesh& mesh) {
   FaceSets parts(mesh.triangles.size());
   forEachEdge(sides, [&](std::span<const Side> edge) {
     for (const Side& side : edge) parts.join(edge.front().face, side.face);
+    if (2 * std::ranges::count(edge, true, &Side::rising) != std::ssize(edge)) ++report.unbalancedEdges;
     switch (edge.size()) {
       case 1:
         ++report.boundaryEdges;
