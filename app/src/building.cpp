@@ -12,6 +12,7 @@
 #include "hpsdf/checkpoint.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/hull.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
 #include "long_work.h"
@@ -633,7 +634,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
     } else {
       const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, distanceOptions(source));
       reference.distance = distanceOf(exact, prepared.normalization);
-      reference.mesh = std::move(prepared.mesh);
+      reference.mesh = source.sign == Sign::hull ? hull(prepared.mesh) : std::move(prepared.mesh);
       // nearer than this, rounding decides the direction
       const double least = 1e-9 * exact->source().box.sizes().maxCoeff();
       reference.normal = [exact, least](const Vector3& x, double signedDistance) {

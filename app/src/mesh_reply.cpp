@@ -42,12 +42,14 @@ struct Header {
   std::uint64_t degenerateFaces = 0;
   std::uint64_t flippedFaces = 0;
   std::uint64_t duplicateFaces = 0;
+  std::array<double, 3> degeneratePlace = {};
+  std::array<double, 3> duplicatePlace = {};
   std::uint64_t turned = 0;
   double volume = 0;
   double area = 0;
 };
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 19 * 8, "no padding: every byte is told");
-static_assert(sizeof(MeshReport) == 21 * 8, "what is new in the report has to be sent, too");
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 25 * 8, "no padding: every byte is told");
+static_assert(sizeof(MeshReport) == 27 * 8, "what is new in the report has to be sent, too");
 
 constexpr std::size_t kUnsummedBytes = offsetof(Header, kind);
 
@@ -86,9 +88,14 @@ Header headerOf(std::span<const std::byte> bytes) {
   return header;
 }
 
+Vector3 vectorOf(const std::array<double, 3>& numbers) { return {numbers[0], numbers[1], numbers[2]}; }
+std::array<double, 3> numbersOf(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
 MeshReport reportOf(const Header& header) {
   if (header.turned > 1) throw DamagedReply("a flag is neither 0 nor 1");
-  if (!std::isfinite(header.volume) || !std::isfinite(header.area)) throw DamagedReply("a figure is not finite");
+  if (!std::isfinite(header.volume) || !std::isfinite(header.area) || !vectorOf(header.degeneratePlace).allFinite() ||
+      !vectorOf(header.duplicatePlace).allFinite())
+    throw DamagedReply("a figure is not finite");
   return {.vertices = header.vertices,
           .faces = header.triangles,
           .parts = header.parts,
@@ -101,6 +108,8 @@ MeshReport reportOf(const Header& header) {
           .degenerateFaces = header.degenerateFaces,
           .flippedFaces = header.flippedFaces,
           .duplicateFaces = header.duplicateFaces,
+          .degeneratePlace = vectorOf(header.degeneratePlace),
+          .duplicatePlace = vectorOf(header.duplicatePlace),
           .turned = header.turned == 1,
           .volume = header.volume,
           .area = header.area,
@@ -170,6 +179,8 @@ void writeMesh(const ImportedMesh& imported, const ReplySink& sink) {
   header.degenerateFaces = report.degenerateFaces;
   header.flippedFaces = report.flippedFaces;
   header.duplicateFaces = report.duplicateFaces;
+  header.degeneratePlace = numbersOf(report.degeneratePlace);
+  header.duplicatePlace = numbersOf(report.duplicatePlace);
   header.turned = report.turned;
   header.volume = report.volume;
   header.area = report.area;

@@ -165,6 +165,8 @@ Json meshJson(const std::string& name, const MeshReport& report) {
           {"degenerate_faces", report.degenerateFaces},
           {"flipped_faces", report.flippedFaces},
           {"duplicate_faces", report.duplicateFaces},
+          {"degenerate_at", report.degenerateFaces > 0 ? vectorJson(report.degeneratePlace) : Json()},
+          {"duplicate_at", report.duplicateFaces > 0 ? vectorJson(report.duplicatePlace) : Json()},
           {"turned", report.turned},
           {"volume", report.volume},
           {"area", report.area},
@@ -183,11 +185,14 @@ std::string meshText(const std::string& name, const MeshReport& report) {
                        grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
     text += summaryRow("unused", grouped(report.unreferencedVertices) + " vertices dropped");
-  if (report.degenerateFaces > 0) text += summaryRow("degenerate", grouped(report.degenerateFaces) + " faces dropped");
+  const auto dropped = [&](const char* kind, std::size_t faces, const Vector3& place) {
+    if (faces > 0) text += summaryRow(kind, grouped(faces) + " faces dropped, as at " + vectorText(place));
+  };
+  dropped("degenerate", report.degenerateFaces, report.degeneratePlace);
   if (report.flippedFaces > 0)
     text +=
         summaryRow("flipped", grouped(report.flippedFaces) + " edges of faces without area that hold their neighbours");
-  if (report.duplicateFaces > 0) text += summaryRow("duplicate", grouped(report.duplicateFaces) + " faces dropped");
+  dropped("duplicate", report.duplicateFaces, report.duplicatePlace);
   if (report.turned) text += summaryRow("turned", "the whole mesh: its faces looked inward");
   return text;
 }

@@ -339,7 +339,7 @@ void addSwatches(Furniture& furniture, const Frame& frame, std::span<const std::
     const double left = std::round(column.left), top = std::round(column.top), text = left + side + 0.5 * em;
     furniture.boxes.push_back({left, top, left + side, top + side, kTick});
     furniture.boxes.push_back({left + 1, top + 1, left + side - 1, top + side - 1, swatch.color});
-    addText(furniture, fitText(swatch.name, small, column.right - text), small, text,
+    addText(furniture, fittingTitle(swatch.names, small, column.right - text), small, text,
             top + (side + capHeight(small)) / 2, kSoftInk);
     if (!swatch.count.empty())
       addText(furniture, fitText(swatch.count, em, column.right - text), em, text, top + 1.35 * small + capHeight(em),

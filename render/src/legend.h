@@ -2,6 +2,7 @@
 // What stands around a view: legend or colour bar to its right, caption below. Laid out first, as rectangles and texts,
 // so that tests can see that nothing is clipped and nothing overlaps; then painted.
 
+#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -78,7 +79,8 @@ void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::str
 
 /// A colour, what it stands for and how often it is there, which may be left out.
 struct Swatch {
-  std::string name, count;
+  std::array<std::string, 2> names;  ///< the first that fits is taken
+  std::string count;
   Color color;
 };
 

@@ -23,14 +23,14 @@ constexpr double kLeastRing = 9;    // pixels, its radius
 constexpr int kGroupCell = 8;       // pixels: what lies in neighbouring cells of this size is one group
 
 struct Style {
-  const char* name;
+  std::array<const char*, 2> names;
   Color color;
 };
-constexpr std::array<Style, kDefectKinds> kStyles = {{{"boundary edges", {255, 208, 0}},
-                                                      {"non-manifold edges", {226, 0, 206}},
-                                                      {"inconsistent edges", {0, 176, 80}},
-                                                      {"pinched vertices", {255, 255, 255}},
-                                                      {"pairs of faces that meet", {232, 24, 24}}}};
+constexpr std::array<Style, kDefectKinds> kStyles = {{{{"boundary edges", "boundary"}, {255, 208, 0}},
+                                                      {{"non-manifold edges", "non-manifold"}, {226, 0, 206}},
+                                                      {{"inconsistent edges", "inconsistent"}, {0, 176, 80}},
+                                                      {{"pinched vertices", "pinched"}, {255, 255, 255}},
+                                                      {{"pairs of faces that meet", "pairs meet"}, {232, 24, 24}}}};
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
 
@@ -169,7 +169,8 @@ std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
   std::vector<Swatch> swatches;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
     if (defects.counts[kind] > 0)
-      swatches.push_back({kStyles[kind].name, formatCount(defects.counts[kind]), kStyles[kind].color});
+      swatches.push_back(
+          {{kStyles[kind].names[0], kStyles[kind].names[1]}, formatCount(defects.counts[kind]), kStyles[kind].color});
   return swatches;
 }
 

@@ -10,7 +10,7 @@
 
 namespace hpsdf::render {
 
-/// Six kinds that an eye tells apart on clay.
+/// Kinds are told apart on clay.
 Color defectColor(DefectKind kind);
 
 /// "boundary edges", with their counts, of those that there are.

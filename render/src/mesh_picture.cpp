@@ -46,9 +46,10 @@ void setLooks(const TriangleMesh& mesh, const MeshDefects& defects, const Camera
 
 std::vector<Swatch> swatchesOf(const MeshDefects& defects) {
   std::vector<Swatch> swatches = defectSwatches(defects);
-  swatches.push_back({"faces, seen from outside", "", surfaceColor()});
-  swatches.push_back({"faces, seen from behind", "", kBack});
-  if (defects.count(DefectKind::crossing) > 0) swatches.push_back({"faces that meet others", "", kCrossing});
+  swatches.push_back({{"faces, seen from outside", "outside"}, "", surfaceColor()});
+  swatches.push_back({{"faces, seen from behind", "behind"}, "", kBack});
+  if (defects.count(DefectKind::crossing) > 0)
+    swatches.push_back({{"faces that meet others", "meeting"}, "", kCrossing});
   return swatches;
 }
 

@@ -259,13 +259,75 @@ TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
   EXPECT_THAT(told.out, HasSubstr("winding: the mesh meets itself"));
   EXPECT_THAT(told.out, HasSubstr("wrong signs            0\n"));
   const Json json = Json::parse(run({{"mesh", at("two.obj"), "--json", "--places", "1", "--check-sign", "500"}}).out);
-  EXPECT_GT(json.at("crossings").at("count"), 1);
-  EXPECT_EQ(json.at("crossings").at("places").size(), 1u);
+  const Json& crossings = json.at("defects").at("crossings");
+  EXPECT_GT(crossings.at("count"), 1);
+  EXPECT_EQ(crossings.at("places").size(), 1u);
+  EXPECT_EQ(crossings.at("places")[0].at("at").size(), 3u);
+  EXPECT_EQ(crossings.at("within_parts"), 0);
+  EXPECT_TRUE(json.at("verdict").at("parts_overlap"));
+  EXPECT_FALSE(json.at("verdict").at("self_folding"));
   EXPECT_EQ(json.at("sign").at("by"), "winding");
   EXPECT_EQ(json.at("sign_check").at("wrong"), 0);
   EXPECT_THAT(run({{"mesh", "builtin:gear"}}).out,
-              AllOf(HasSubstr("meets itself           nowhere"), HasSubstr("pseudonormal: the mesh is closed")));
+              AllOf(HasSubstr("closed, orientable, does not meet itself"),
+                    HasSubstr("pseudonormal: the mesh is closed"), Not(HasSubstr("as at"))));
   EXPECT_THAT(run({{"mesh", "builtin:gear", "--seed", "2"}}).err, HasSubstr("seed belongs to check-sign"));
+}
+
+/// A tetrahedron with a face turned and one twice.
+const char* const kBadTetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 2\nf 2 3 4\nf 1 4 3\nf 4 3 2\n";
+
+TEST_F(Cli, meshIsMended) {
+  writeFile(at("bad.obj"), kBadTetrahedron);
+  const Json before = Json::parse(run({{"mesh", at("bad.obj"), "--json"}}).out);
+  EXPECT_EQ(before.at("defects").at("inconsistent_edges").at("count"), 3);
+  EXPECT_EQ(before.at("defects").at("inconsistent_edges").at("places")[0].at("edge").size(), 2u);
+  EXPECT_EQ(before.at("duplicate_faces"), 1);
+  const Outcome mended = run({{"mesh", at("bad.obj"), "--repair", at("mended.ply")}});
+  EXPECT_EQ(mended.status, 0) << mended.err;
+  EXPECT_THAT(mended.out, AllOf(HasSubstr("dropped 1 face; turned 1 face"), HasSubstr("mended.ply: closed")));
+  const Json after = Json::parse(run({{"mesh", at("mended.ply"), "--json"}}).out);
+  EXPECT_TRUE(after.at("verdict").at("closed"));
+  EXPECT_EQ(after.at("faces"), 4);
+  EXPECT_EQ(after.at("sign").at("by"), "pseudonormal");
+  EXPECT_THAT(run({{"mesh", at("mended.ply"), "--repair", at("again.obj")}}).out, HasSubstr("nothing to do"));
+  expectRefused({{"mesh", at("bad.obj"), "--repair", at("mended.stl")}}, ".obj or .ply");
+  expectRefused({{"mesh", at("bad.obj"), "--repair", at("none/mended.obj")}}, "none");
+}
+
+TEST_F(Cli, meshIsDrawn) {
+  writeFile(at("bad.obj"), kBadTetrahedron);
+  const Outcome drawn = run({{"mesh", at("bad.obj"), "--picture", at("bad.png"), "--cpu", "--size", "320x200"}});
+  EXPECT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_GT(fs::file_size(at("bad.png")), 1000u);
+  expectRefused({{"mesh", at("bad.obj"), "--picture", at("bad.jpg")}}, "written as .png");
+  expectRefused({{"mesh", at("bad.obj"), "--view", "front"}}, "view belongs to picture");
+}
+
+TEST_F(Cli, buildLeavesOutBuriedWalls) {
+  const std::string box = "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 2 2 0\nv 0 0 2\nv 2 0 2\nv 0 2 2\nv 2 2 2\n";
+  std::string text = box;
+  for (const char* v :
+       {"1 0.5 0.5", "3 0.5 0.5", "1 1.5 0.5", "3 1.5 0.5", "1 0.5 1.5", "3 0.5 1.5", "1 1.5 1.5", "3 1.5 1.5"})
+    text += fmt::format("v {}\n", v);
+  for (const int first : {1, 9})
+    for (const auto& f : {std::array{0, 2, 3, 1}, std::array{4, 5, 7, 6}, std::array{0, 1, 5, 4},
+                          std::array{2, 6, 7, 3}, std::array{0, 4, 6, 2}, std::array{1, 3, 7, 5}})
+      text += fmt::format("f {} {} {} {}\n", first + f[0], first + f[1], first + f[2], first + f[3]);
+  writeFile(at("boxes.obj"), text);
+  const auto valueIn = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", at("boxes.obj"), "-o", at(name), "--target-error", "1e-4"});
+    EXPECT_EQ(run({more}).status, 0);
+    writeFile(at("point.csv"), "1 1 1\n");
+    return Json::parse(run({{"query", at(name), at("point.csv"), "--json"}}).out)[0].at("distance").get<double>();
+  };
+  EXPECT_NEAR(valueIn("plain.hpsdf", {}), 0, 0.05) << "on the smaller one's wall";
+  EXPECT_NEAR(valueIn("hull.hpsdf", {"--hull"}), -1, 0.05);
+  EXPECT_EQ(Json::parse(run({{"info", at("hull.hpsdf"), "--json"}}).out).at("mesh").at("sign"), "hull");
+  const Outcome verified = run({{"verify", at("hull.hpsdf"), at("boxes.obj"), "--json", "--points", "2000"}});
+  EXPECT_EQ(verified.status, 0) << verified.err;
+  EXPECT_LT(Json::parse(verified.out).at("uniform").at("error").at("rms"), 0.02);
+  expectRefused({{"build", at("boxes.obj"), "-o", at("x.hpsdf"), "--hull", "--sign", "pseudonormal"}}, "hull");
 }
 
 TEST_F(Cli, infoTellsWhatTheFieldHolds) {

@@ -70,11 +70,14 @@ ImportedMesh tetrahedron() {
            .boundaryEdges = 2,
            .nonManifoldEdges = 3,
            .inconsistentEdges = 5,
+           .unbalancedEdges = 11,
            .weldedVertices = 6,
            .unreferencedVertices = 7,
            .degenerateFaces = 8,
            .flippedFaces = 9,
            .duplicateFaces = 10,
+           .degeneratePlace = {12, 13, 14},
+           .duplicatePlace = {15, 16, 17},
            .turned = true,
            .volume = 2.5,
            .area = 12.5,
@@ -109,6 +112,9 @@ TEST(MeshReplies, bringAMeshAndAllOfItsReport) {
   EXPECT_EQ(report.boundaryEdges, 2u);
   EXPECT_EQ(report.nonManifoldEdges, 3u);
   EXPECT_EQ(report.inconsistentEdges, 5u);
+  EXPECT_EQ(report.unbalancedEdges, 11u);
+  EXPECT_EQ(report.degeneratePlace, Vector3(12, 13, 14));
+  EXPECT_EQ(report.duplicatePlace, Vector3(15, 16, 17));
   EXPECT_EQ(report.weldedVertices, 6u);
   EXPECT_EQ(report.unreferencedVertices, 7u);
   EXPECT_EQ(report.degenerateFaces, 8u);

@@ -149,6 +149,11 @@ TEST(MeshRepair, OpenBodiesTurnAndKeepTheirHole) {
   EXPECT_EQ(repaired(mended.imported).turnedPatches, 0u);
 }
 
+Vector3 middleOf(const TriangleMesh& mesh, std::size_t face) {
+  const auto& [a, b, c] = mesh.triangles[face];
+  return (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
+}
+
 TEST(MeshRepair, KeepsWhatCleaningDid) {
   TriangleMesh mesh = boxOfTwo();
   mesh.triangles.push_back(mesh.triangles[3]);
@@ -156,6 +161,8 @@ TEST(MeshRepair, KeepsWhatCleaningDid) {
   const RepairedMesh mended = repaired(cleaned(turned(mesh)));
   EXPECT_EQ(mended.imported.report.duplicateFaces, 1u);
   EXPECT_EQ(mended.imported.report.degenerateFaces, 1u);
+  EXPECT_EQ(mended.imported.report.duplicatePlace, middleOf(mesh, 3));
+  EXPECT_EQ(mended.imported.report.degeneratePlace, middleOf(mesh, 13));
   EXPECT_TRUE(mended.imported.report.turned);
 }
 

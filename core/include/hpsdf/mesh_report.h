@@ -20,12 +20,14 @@ struct MeshReport {
   /// any, winding numbers are whole, and inside and outside are told apart though edges may be non-manifold.
   std::size_t unbalancedEdges = 0;
 
-  std::size_t weldedVertices = 0;        ///< removed because another has the same position
-  std::size_t unreferencedVertices = 0;  ///< removed because no triangle uses them
-  std::size_t degenerateFaces = 0;       ///< dropped: two equal corners or no area
-  std::size_t flippedFaces = 0;          ///< had no area but hold a neighbour's edge: mended by flipping that edge
-  std::size_t duplicateFaces = 0;        ///< dropped: the same three corners as another
-  bool turned = false;                   ///< the whole mesh was turned because its signed volume was negative
+  std::size_t weldedVertices = 0;             ///< removed because another has the same position
+  std::size_t unreferencedVertices = 0;       ///< removed because no triangle uses them
+  std::size_t degenerateFaces = 0;            ///< dropped: two equal corners or no area
+  std::size_t flippedFaces = 0;               ///< had no area but hold a neighbour's edge: mended by flipping that edge
+  std::size_t duplicateFaces = 0;             ///< dropped: the same three corners as another
+  Vector3 degeneratePlace = Vector3::Zero();  ///< the middle of the first that was dropped, if there is one
+  Vector3 duplicatePlace = Vector3::Zero();   ///< likewise
+  bool turned = false;                        ///< the whole mesh was turned because its signed volume was negative
 
   double volume = 0;  ///< signed volume after turning; meaningful for a closed mesh
   double area = 0;

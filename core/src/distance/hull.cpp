@@ -9,6 +9,7 @@
 
 #include "distance/crossings.h"
 #include "hpsdf/error.h"
+#include "hpsdf/hull.h"
 #include "mesh/message_prefix.h"
 
 namespace hpsdf::distance {
@@ -181,3 +182,14 @@ Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& 
 }
 
 }  // namespace hpsdf::distance
+
+namespace hpsdf {
+
+TriangleMesh hull(const TriangleMesh& mesh) {
+  distance::requireSurface(mesh);
+  const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const distance::Inside inside(hierarchy, mesh, distance::HoleRims(hierarchy));
+  return distance::hullOf(hierarchy, mesh, inside).mesh;
+}
+
+}  // namespace hpsdf

@@ -123,14 +123,10 @@ RepairedMesh repaired(ImportedMesh imported) {
   turnPatches(mesh, patches, found);
   result.turnedPatches = static_cast<std::size_t>(std::ranges::count_if(found, &Patch::turned));
 
-  MeshReport report = inspect(mesh);
-  report.weldedVertices = imported.report.weldedVertices;
-  report.unreferencedVertices = imported.report.unreferencedVertices;
-  report.degenerateFaces = imported.report.degenerateFaces;
-  report.flippedFaces = imported.report.flippedFaces;
-  report.duplicateFaces = imported.report.duplicateFaces;
-  report.turned = imported.report.turned;
-  imported.report = report;
+  const MeshReport now = inspect(mesh);
+  imported.report.inconsistentEdges = now.inconsistentEdges;  // nothing else depends on which way faces look
+  imported.report.unbalancedEdges = now.unbalancedEdges;
+  imported.report.volume = now.volume;
   result.imported = std::move(imported);
   return result;
 }

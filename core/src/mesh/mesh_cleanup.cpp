@@ -54,20 +54,37 @@ std::size_t weld(TriangleMesh& mesh) {
   return welded;
 }
 
-std::size_t dropCollapsed(TriangleMesh& mesh) {
-  return std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+/// Faces that are left out, and the middle of the first.
+struct Dropped {
+  std::size_t faces = 0;
+  Vector3 place = Vector3::Zero();
+};
+
+template <typename IsBad>
+Dropped drop(TriangleMesh& mesh, const IsBad& isBad) {
+  Dropped dropped;
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    if (!isBad(t)) return false;
+    if (dropped.faces++ == 0) dropped.place = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
+    return true;
+  });
+  return dropped;
 }
 
-std::size_t dropWithoutArea(TriangleMesh& mesh) {
-  return std::erase_if(mesh.triangles, [&](const Triangle& t) { return hasNoArea(mesh, t); });
+Dropped dropCollapsed(TriangleMesh& mesh) {
+  return drop(mesh, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+}
+
+Dropped dropWithoutArea(TriangleMesh& mesh) {
+  return drop(mesh, [&](const Triangle& t) { return hasNoArea(mesh, t); });
 }
 
 /// Of faces over the same corners the first stays, whichever way they look: of a sheet with two sides one remains. (The
 /// wall between two bodies that share a face remains too, and makes the mesh one that is not closed.)
-std::size_t dropDuplicates(TriangleMesh& mesh) {
+Dropped dropDuplicates(TriangleMesh& mesh) {
   std::unordered_set<Triangle, HashBytes<std::uint32_t>> seen;
   seen.reserve(mesh.triangles.size());
-  return std::erase_if(mesh.triangles, [&](Triangle corners) {
+  return drop(mesh, [&](Triangle corners) {
     std::sort(corners.begin(), corners.end());
     return !seen.insert(corners).second;
   });
@@ -102,10 +119,10 @@ ImportedMesh cleaned(TriangleMesh mesh) {
 
   const std::size_t given = mesh.triangles.size();
   const std::size_t welded = weld(mesh);
-  const std::size_t collapsed = dropCollapsed(mesh);
+  const Dropped collapsed = dropCollapsed(mesh);
   const std::size_t flipped = flipCollinearFaces(mesh);
-  const std::size_t withoutArea = dropWithoutArea(mesh);
-  const std::size_t duplicates = dropDuplicates(mesh);
+  const Dropped withoutArea = dropWithoutArea(mesh);
+  const Dropped duplicates = dropDuplicates(mesh);
   if (mesh.triangles.empty())
     throw Error(messagePrefix(mesh) +
                 (given == 0 ? "no faces"
@@ -117,9 +134,11 @@ ImportedMesh cleaned(TriangleMesh mesh) {
   ImportedMesh result{std::move(mesh), {}};
   result.report = inspect(result.mesh);
   result.report.weldedVertices = welded;
-  result.report.degenerateFaces = collapsed + withoutArea;
+  result.report.degenerateFaces = collapsed.faces + withoutArea.faces;
+  result.report.degeneratePlace = (collapsed.faces > 0 ? collapsed : withoutArea).place;
   result.report.flippedFaces = flipped;
-  result.report.duplicateFaces = duplicates;
+  result.report.duplicateFaces = duplicates.faces;
+  result.report.duplicatePlace = duplicates.place;
   result.report.unreferencedVertices = unreferenced;
   if (looksInward(result.report.volume, result.report.area, result.report.box, result.report.unbalancedEdges == 0)) {
     for (Triangle& triangle : result.mesh.triangles) std::swap(triangle[1], triangle[2]);

@@ -1,0 +1,154 @@
+// Pictures of meshes: which way faces look, and where defects are.
+
+#include "hpsdf/render/mesh_picture.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "expect_tidy.h"
+#include "hpsdf/build.h"
+#include "hpsdf/crossings.h"
+#include "hpsdf/error.h"
+#include "marks.h"
+#include "support/made_meshes.h"
+#include "support/require_gl.h"
+
+namespace hpsdf::render {
+namespace {
+
+using support::boxOfTwo;
+using support::joined;
+using support::moved;
+using support::openBox;
+
+constexpr int kWidth = 480, kHeight = 300;
+
+MeshDefects defectsOf(const TriangleMesh& mesh) { return findDefects(mesh, findCrossings(mesh)); }
+
+MeshPicture pictureFrom(double azimuth, double elevation) {
+  MeshPicture picture{.camera = {.azimuthDegrees = azimuth, .elevationDegrees = elevation, .up = UpAxis::z},
+                      .width = kWidth,
+                      .height = kHeight};
+  return picture;
+}
+
+Image drawn(const TriangleMesh& mesh, const MeshPicture& picture) {
+  return drawMesh(*makeCpuBodyRenderer({mesh}), mesh, defectsOf(mesh), picture);
+}
+
+/// The pixel that shows a place.
+Color colorAt(const Image& image, const TriangleMesh& mesh, const MeshPicture& picture, const Vector3& place) {
+  const PixelRect view = frame(picture.width, picture.height).view;
+  const Camera camera = cameraOf(picture.camera, domainAround(mesh), view.width(), view.height());
+  const PicturePoint p = project(camera, place, view.width(), view.height());
+  return image.at(int(p.x), int(p.y));
+}
+
+int differenceOf(const Color& a, const Color& b) {
+  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
+}
+
+bool isBlue(const Color& color) { return color[2] > color[0] + 20; }
+bool isClay(const Color& color) { return color[0] > color[2] + 20 && color[1] > color[2]; }
+
+TEST(MeshPicture, ShowsWhichWayFacesLook) {
+  const MeshPicture above = pictureFrom(20, 75);
+  const TriangleMesh open = openBox();
+  EXPECT_TRUE(isBlue(colorAt(drawn(open, above), open, above, {0, 0, -1}))) << "the floor, seen through the hole";
+  TriangleMesh wrong = boxOfTwo();
+  for (auto& triangle : wrong.triangles)
+    if (std::ranges::all_of(triangle, [&](std::uint32_t v) { return wrong.vertices[v].z() > 0; }))
+      std::swap(triangle[0], triangle[1]);
+  EXPECT_TRUE(isBlue(colorAt(drawn(wrong, above), wrong, above, {0.3, 0, 1})));
+  EXPECT_TRUE(isClay(colorAt(drawn(boxOfTwo(), above), boxOfTwo(), above, {0.3, 0, 1})));
+}
+
+TEST(MeshPicture, DrawsEdgesInTheirColourAndFaintlyWhereHidden) {
+  const TriangleMesh open = openBox();
+  const Color yellow = defectColor(DefectKind::boundaryEdge);
+  const Vector3 onRim(0, -1, 1);  // in front
+  const MeshPicture above = pictureFrom(0, 30), below = pictureFrom(0, -30);
+  EXPECT_LT(differenceOf(colorAt(drawn(open, above), open, above, onRim), yellow), 60);
+  EXPECT_GT(differenceOf(colorAt(drawn(boxOfTwo(), above), boxOfTwo(), above, onRim), yellow), 90);
+  const Vector3 behind(0, 1, 1);  // from below, behind floor and front
+  const Color hidden = colorAt(drawn(open, below), open, below, behind);
+  const Color plain = colorAt(drawn(boxOfTwo(), below), boxOfTwo(), below, behind);
+  EXPECT_GT(differenceOf(hidden, yellow), 60);
+  EXPECT_GT(differenceOf(hidden, plain), 20) << "not seen at all";
+}
+
+TEST(MeshPicture, RingsWhatIsSmall) {
+  TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=5");
+  const MeshPicture front = pictureFrom(0, 0);
+  const auto facing = std::ranges::min_element(mesh.triangles, {}, [&](const auto& t) {
+    return mesh.vertices[t[0]].y() + std::abs(mesh.vertices[t[0]].x() - 0.2);
+  });
+  const Vector3 place = mesh.vertices[(*facing)[0]];
+  const Image whole = drawn(mesh, front);
+  mesh.triangles.erase(facing);
+  const Image holed = drawn(mesh, front);
+  const PixelRect view = frame(kWidth, kHeight).view;
+  const Camera camera = cameraOf(front.camera, domainAround(mesh), view.width(), view.height());
+  const PicturePoint p = project(camera, place, view.width(), view.height());
+  int changed = 0, farthest = 0;
+  for (int y = 0; y < view.y1; ++y)
+    for (int x = 0; x < view.x1; ++x)
+      if (differenceOf(whole.at(x, y), holed.at(x, y)) > 60) {
+        ++changed;
+        farthest = std::max(farthest, int(std::hypot(x + 0.5 - p.x, y + 0.5 - p.y)));
+      }
+  EXPECT_GT(changed, 60) << "a hole of a few pixels is lost";
+  EXPECT_LT(farthest, 20);
+}
+
+TEST(MeshPicture, ReddensFacesThatMeet) {
+  const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1, 1, 1}));
+  const MeshPicture above = pictureFrom(20, 40);
+  const Color meeting = colorAt(drawn(mesh, above), mesh, above, {-0.5, -0.7, 1});
+  EXPECT_GT(meeting[0], meeting[1] + 60);
+  EXPECT_LT(std::abs(meeting[1] - meeting[2]), 40);
+}
+
+TEST(MeshPicture, OpenGlAgrees) {
+  HPSDF_REQUIRE_GL();
+  const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
+  const MeshPicture above = pictureFrom(20, 40);
+  const Image cpu = drawn(mesh, above);
+  const Image gl = drawMesh(*makeGlBodyRenderer({mesh}, GlChoice::software), mesh, defectsOf(mesh), above);
+  std::size_t different = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) different += differenceOf(cpu.at(x, y), gl.at(x, y)) > 40;
+  EXPECT_LT(different, std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
+}
+
+TEST(MeshPicture, LegendIsTidyAtAnySize) {
+  MeshDefects defects;
+  defects.counts = {1234567, 89, 1, 12, 1000000};
+  const std::array<std::string, 2> titles = {"Defects of the mesh", "Defects"};
+  for (const auto& [width, height] :
+       {std::pair(320, 240), std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
+    const Frame frame = render::frame(width, height);
+    Furniture furniture;
+    addSwatches(furniture, frame, titles, defectSwatches(defects));
+    expectTidy(furniture, frame, std::to_string(width));
+    if (width >= 640) {
+      EXPECT_EQ(furniture.texts.size(), 11u) << width;
+    }
+  }
+}
+
+TEST(MeshPicture, RefusesSizesOutOfRange) {
+  const TriangleMesh mesh = boxOfTwo();
+  MeshPicture picture = pictureFrom(0, 0);
+  picture.width = 8;
+  EXPECT_THROW(drawn(mesh, picture), Error);
+}
+
+}  // namespace
+}  // namespace hpsdf::render
