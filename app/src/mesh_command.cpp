@@ -66,6 +66,12 @@ std::string crossingsText(const Crossings& crossings) {
   return summaryRow("meets itself", text);
 }
 
+std::string spacingText(const std::string& surface, const TriangleMesh& mesh) {
+  const double spacing = coordinateSpacing(surface, mesh);
+  if (spacing == 0) return "";
+  return summaryRow("coordinates", fmt::format("kept {} apart by the reader", shortNumber(spacing)));
+}
+
 std::string checkText(const SignCheck& check) {
   std::string text = summaryRow(
       "sign checked", fmt::format("at {} places, {} of them nearer than {} to the surface", grouped(check.places),
@@ -84,12 +90,14 @@ void runMesh(Session& session, const Arguments& arguments) {
   const Inspected found = inspected(session, arguments);
   if (session.wantsJson(arguments)) {
     Json json = meshJson(surface, found.imported.report);
+    json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
     json["crossings"] = crossingsJson(found.crossings, static_cast<std::size_t>(arguments.number("places")));
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
     if (found.check) json["sign_check"] = checkJson(*found.check);
     printJson(session.console().out, json);
   } else {
-    session.console().out << meshText(surface, found.imported.report) << crossingsText(found.crossings)
+    session.console().out << meshText(surface, found.imported.report) << spacingText(surface, found.imported.mesh)
+                          << crossingsText(found.crossings)
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "");
   }
