@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint64_t kMemoryUnlessTold = 100'000'000;  // of the construction, where nothing says how fine to be
 
-constexpr double kBytesAFace = 500;  // of a mesh, while its exact distance is made
+constexpr double kBytesAFace = 520;  // of a mesh, while its exact distance is made
 
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
