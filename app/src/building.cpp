@@ -13,6 +13,7 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/hull.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
 #include "long_work.h"
@@ -24,6 +25,8 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::uint64_t kMemoryUnlessTold = 100'000'000;  // of the construction, where nothing says how fine to be
+
+constexpr double kBytesAFace = 520;  // of a mesh, while its exact distance is made
 
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
@@ -78,6 +81,28 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
                 << std::endl;
 }
 
+/// Not worth a word: a millionth of the mesh is below what scans and fields are good for.
+constexpr double kSpacingUnsaid = 1e-6;
+
+void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
+  const Box box = boundingBox(mesh);
+  const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
+  if (!(spacing > kSpacingUnsaid * size)) return;
+  console.err << fmt::format(
+                     "hpsdf: warning: {}: coordinates reach {}, where the reader keeps them {} apart ({} of the mesh's "
+                     "longest side): move the mesh nearer to the origin before it is exported",
+                     surface, shortNumber(std::max(-box.min().minCoeff(), box.max().maxCoeff())), shortNumber(spacing),
+                     shortNumber(spacing / size))
+              << std::endl;
+}
+
+ImportedMesh readFile(const Console& console, const std::string& file) {
+  if (console.meshReader.empty()) return importMesh(file);
+  return withProgress(console, [&](const Progress& progress) {
+    return importApart(console.meshReader, file, readingLimits(file), progress);
+  });
+}
+
 /// Errors of the construction speak of options; the user thinks of the mesh.
 [[noreturn]] void rethrowNaming(const std::string& surface, const Error& error) {
   const std::string message = error.what();
@@ -113,12 +138,18 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
   return prepared;
 }
 
+struct SharedDistance {
+  std::shared_ptr<const ExactDistance> exact;
+
+  void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
+  std::size_t bytes() const { return exact->bytes(); }
+};
+
 std::shared_ptr<const DistanceFunction> distanceOf(const std::shared_ptr<const ExactDistance>& exact,
                                                    const Normalization& normalization) {
   Source source = exact->source();
   source.normalization = normalization;
-  auto evaluate = [exact](std::span<const Vector3> points, std::span<double> out) { (*exact)(points, out); };
-  return std::make_shared<const DistanceFunction>(std::move(evaluate), std::move(source));
+  return std::make_shared<const DistanceFunction>(SharedDistance{exact}, std::move(source));
 }
 
 Sign signOf(const std::string& name) {
@@ -155,6 +186,8 @@ void tellSign(const Console& console, const std::string& surface, const MeshRepo
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
+  requireMemory("the exact distance of " + grouped(prepared.mesh.triangles.size()) + " faces",
+                kBytesAFace * double(prepared.mesh.triangles.size()), "simplify the mesh first");
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
   tellSign(console, surface, *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
@@ -307,9 +340,11 @@ std::vector<Parameter> buildParameters() {
       {.name = "memory-limit",
        .type = ParameterType::wholeNumber,
        .help =
-           "Memory that the construction may take. Where more will be needed it stops as soon as that is plain, and "
-           "says how much. Left out: 1e8, some 240,000 cells, where the target error is left out too, for which most "
-           "meshes take less than 100,000; else three quarters of the machine's memory.",
+           "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it "
+           "stops as soon as that is plain, and says how much. Left out: 1e8 besides that distance, some 240,000 "
+           "cells, "
+           "where the target error is left out too, for which most meshes take less than 100,000; else three quarters "
+           "of the machine's memory.",
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},
@@ -571,6 +606,9 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     const Box& box = input.exact->source().box;
     input.domain = domainOf(arguments, box);
     warnOfCutSurface(console, box, input.domain);
+    // where nobody named a limit, it is for what grows
+    if (input.options.memoryLimit && !arguments.given("memory-limit"))
+      *input.options.memoryLimit += input.exact->bytes();
     return input;
   } catch (const Error& error) {
     rethrowNaming(surface, error);
@@ -681,10 +719,9 @@ ImportedMesh importSurface(const Console& console, const std::string& surface) {
     const MeshReport report = inspect(mesh);
     return {std::move(mesh), report};
   }
-  if (console.meshReader.empty()) return importMesh(surface);
-  return withProgress(console, [&](const Progress& progress) {
-    return importApart(console.meshReader, surface, readingLimits(surface), progress);
-  });
+  ImportedMesh imported = readFile(console, surface);
+  warnOfSpacing(console, surface, imported.mesh);
+  return imported;
 }
 
 }  // namespace hpsdf::app

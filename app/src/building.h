@@ -107,7 +107,8 @@ void refuseForeign(const CurrentField& current, const ReferenceSurface& referenc
                    std::string_view otherwise = "");
 
 /// A mesh file or a built-in shape: the one road by which commands come to meshes. Files are read by the console's
-/// `meshReader`. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
+/// `meshReader`; a warning goes to the console's `err` where the reader's floats lose something of them. Throws
+/// `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 }  // namespace hpsdf::app

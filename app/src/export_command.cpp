@@ -7,6 +7,7 @@
 #include "building.h"
 #include "commands.h"
 #include "hpsdf/cubic_grid.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/output_file.h"
 #include "interrupt.h"
 #include "long_work.h"

@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/safe_distance.h"
 #include "interrupt.h"

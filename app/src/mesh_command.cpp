@@ -142,6 +142,12 @@ std::string defectsText(const MeshDefects& defects) {
   return text;
 }
 
+std::string spacingText(const std::string& surface, const TriangleMesh& mesh) {
+  const double spacing = coordinateSpacing(surface, mesh);
+  if (spacing == 0) return "";
+  return summaryRow("coordinates", fmt::format("kept {} apart by the reader", shortNumber(spacing)));
+}
+
 std::string checkText(const SignCheck& check) {
   std::string text = summaryRow(
       "sign checked", fmt::format("at {} places, {} of them nearer than {} to the surface", grouped(check.places),
@@ -218,6 +224,7 @@ void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("picture")) drawPicture(session, arguments, found);
   if (session.wantsJson(arguments)) {
     Json json = meshJson(surface, report);
+    json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
     json["verdict"] = verdictJson(report, found.defects);
     json["defects"] = defectsJson(found.defects, static_cast<std::size_t>(arguments.number("places")));
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
@@ -226,8 +233,8 @@ void runMesh(Session& session, const Arguments& arguments) {
     if (arguments.given("picture")) json["picture"] = arguments.text("picture");
     printJson(session.console().out, json);
   } else {
-    session.console().out << meshText(surface, report) << defectsText(found.defects)
-                          << summaryRow("verdict", verdictText(report, found.defects))
+    session.console().out << meshText(surface, report) << spacingText(surface, found.imported.mesh)
+                          << defectsText(found.defects) << summaryRow("verdict", verdictText(report, found.defects))
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "")
                           << (mended ? repairText(*mended, arguments.text("repair")) : "")

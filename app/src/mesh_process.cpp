@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "hpsdf/error.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/threads.h"
 #include "mesh_reply.h"
 #include "registry.h"
@@ -299,7 +300,8 @@ ReadingLimits readingLimits(const fs::path& file) {
   const auto seconds = numberOf(kSecondsVariable);
   const auto bytes = numberOf(kBytesVariable);
   return {.seconds = seconds ? *seconds : kSeconds + std::floor(double(size) / kBytesASecond),
-          .bytes = bytes ? std::uint64_t(*bytes) : kMemory + kMemoryAByte * size};
+          .bytes = bytes ? std::uint64_t(*bytes)
+                         : std::uint64_t(std::min(double(kMemory + kMemoryAByte * size), allowedMemory()))};
 }
 
 fs::path ownProgram() {

@@ -32,9 +32,8 @@ Line lineOf(const Field& field, const Arguments& arguments) {
   if (from == to) throw Error(fmt::format("from and to are both {}: give two points", vectorText(from)));
   Line line = sampleLine(field, from, to, arguments.whole("samples"));
   if (std::ranges::none_of(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }))
-    throw Error(fmt::format("the line from {} to {} does not meet the field's domain, {} to {}: give other points",
-                            vectorText(from), vectorText(to), vectorText(field.domain().min()),
-                            vectorText(field.domain().max())));
+    throw Error(fmt::format("the line from {} to {} does not meet the field's domain, {}: give other points",
+                            vectorText(from), vectorText(to), boxText(field.domain())));
   return line;
 }
 

@@ -7,6 +7,7 @@
 #include "building.h"
 #include "commands.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "output_folder.h"

@@ -5,6 +5,7 @@
 #include "building.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/verify.h"
 #include "long_work.h"

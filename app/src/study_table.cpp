@@ -8,6 +8,7 @@
 
 #include "building.h"
 #include "commands.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"

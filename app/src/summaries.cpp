@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "hpsdf/memory.h"
 #include "printable.h"
 
 namespace hpsdf::app {
@@ -49,6 +50,16 @@ Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
 
+std::string boxText(const Box& box) {
+  const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  const double size = box.sizes().maxCoeff();
+  const int more = size > 0 && largest > size ? int(std::log10(largest / size)) : 0;
+  const auto corner = [&](const Vector3& v) {
+    return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + more, 17), v.x(), v.y(), v.z());
+  };
+  return corner(box.min()) + " to " + corner(box.max());
+}
+
 std::string summaryRow(std::string_view label, const std::string& value) {
   return fmt::format("  {:<22} {}\n", label, value);
 }
@@ -61,13 +72,6 @@ std::string grouped(std::uint64_t number) {
   std::string text = std::to_string(number);
   for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
   return text;
-}
-
-std::string bytesText(double bytes) {
-  if (bytes < 1e3) return fmt::format("{:.0f} bytes", bytes);
-  if (bytes < 1e6) return fmt::format("{:.2f} kB", bytes / 1e3);
-  if (bytes < 1e9) return fmt::format("{:.2f} MB", bytes / 1e6);
-  return fmt::format("{:.2f} GB", bytes / 1e9);
 }
 
 std::string shortNumber(double number) {
@@ -179,7 +183,7 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   text += summaryRow("parts", grouped(report.parts));
   text += summaryRow("surface", closednessText(report));
   text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
-  text += summaryRow("box", vectorText(report.box.min()) + " to " + vectorText(report.box.max()));
+  text += summaryRow("box", boxText(report.box));
   if (report.weldedVertices > 0)
     text += summaryRow("welded",
                        grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
@@ -303,7 +307,7 @@ std::string fieldText(const CurrentField& current) {
   }
   if (const Normalization& n = metadata.source.normalization; !n.isIdentity())
     text += summaryRow("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
-  text += summaryRow("domain", vectorText(field.domain().min()) + " to " + vectorText(field.domain().max()));
+  text += summaryRow("domain", boxText(field.domain()));
   text += summaryRow("leaves", grouped(figures.leaves));
   text += summaryRow("coefficients", fmt::format("{} ({})", grouped(figures.coefficients),
                                                  field.singlePrecision() ? "float" : "double"));

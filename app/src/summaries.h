@@ -38,8 +38,6 @@ std::string fieldLine(const Field& field);
 
 /// 1234567 → "1,234,567"
 std::string grouped(std::uint64_t number);
-/// 8400000 → "8.40 MB"
-std::string bytesText(double bytes);
 
 /// Three digits, and a short exponent where it saves zeros: 1e-6, 3.06e-4, 0.125
 std::string shortNumber(double number);
@@ -47,6 +45,8 @@ std::string shortNumber(double number);
 Json vectorJson(const Vector3& v);
 /// "(0.1, 0.2, 0.3)"
 std::string vectorText(const Vector3& v);
+/// "(0, 0, 0) to (1, 2, 3)", with as many digits more as it lies farther from the origin than it is long.
+std::string boxText(const Box& box);
 
 /// ".png" of a.PNG
 std::string lowerExtension(const std::filesystem::path& file);

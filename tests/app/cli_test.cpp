@@ -21,7 +21,6 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <set>
@@ -73,14 +72,11 @@ constexpr std::string_view kTetrahedron =
 /// assimp's reader of JSON calls itself at each bracket, until its stack is used up.
 const std::string kBringsAssimpDown(200'000, '[');
 
-/// Cutting this face into triangles takes the square of its corners: tens of seconds.
+/// Cutting this face, all on one line to and fro, takes the square of its corners: tens of seconds.
 std::string slowPolygon() {
   constexpr int kCorners = 100'000;
   std::ostringstream file;
-  for (int i = 0; i < kCorners; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kCorners;
-    file << "v " << std::cos(angle) << " " << std::sin(angle) << " 0\n";
-  }
+  for (int i = 0; i < kCorners; ++i) file << "v " << (i % 2 == 0 ? kCorners - i : i) << " 0 0\n";
   file << "f";
   for (int i = 1; i <= kCorners; ++i) file << " " << i;
   return file.str() + "\n";
@@ -242,9 +238,45 @@ TEST_F(Cli, memoryIsLimitedWhereNothingSaysHowFineToBe) {
   };
   const Outcome limited = built({"--memory-limit", "1e6"});
   EXPECT_EQ(limited.status, 2);
-  EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1 MB allowed"));
+  EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1.00 MB allowed"));
   EXPECT_FALSE(std::filesystem::exists(at("soup.hpsdf")));
   EXPECT_EQ(built({"--memory-limit", "1e8", "--target-error", "1"}).status, 0);
+}
+
+TEST_F(Cli, memoryOfTheDistanceCountsWhereALimitIsGiven) {
+  const auto built = [&](const std::string& surface, std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", surface, "-o", at("f.hpsdf"), "--max-steps", "0"});
+    return run({more});
+  };
+  const Outcome limited = built("builtin:torus", {"--memory-limit", "1e7"});
+  EXPECT_EQ(limited.status, 2);
+  EXPECT_THAT(limited.err, HasSubstr("the distance that the field is made from holds"));
+  EXPECT_THAT(limited.err, HasSubstr("of memory, more than the 10.00 MB allowed"));
+  EXPECT_EQ(built("builtin:torus", {"--memory-limit", "1e8"}).status, 0);
+  EXPECT_EQ(built("builtin:torus,segments=700,sides=700", {}).status, 0) << "untold, the limit is for what grows";
+}
+
+/// What the reader's floats keep of a mesh is told where that is little.
+TEST_F(Cli, coordinatesFarFromTheOriginAreWarnedOf) {
+  const auto tetrahedron = [&](double x) {
+    return fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 2 0\nv {0} 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", x, x + 2);
+  };
+  writeFile(at("near.obj"), tetrahedron(1));
+  writeFile(at("far.obj"), tetrahedron(1e6));
+  const std::string warning = at("far.obj") +
+                              ": coordinates reach 1e6, where the reader keeps them 0.0625 apart (0.0312 of the mesh's "
+                              "longest side): move the mesh nearer to the origin before it is exported\n";
+  const Outcome mesh = run({{"mesh", at("far.obj")}});
+  EXPECT_EQ(mesh.err, "hpsdf: warning: " + warning);
+  EXPECT_THAT(mesh.out, HasSubstr("kept 0.0625 apart by the reader"));
+  EXPECT_THAT(mesh.out, HasSubstr("(1000000, 0, 0) to (1000002, 2, 2)"));
+  const Outcome built = run({{"build", at("far.obj"), "-o", at("far.hpsdf"), "--target-error", "1e-3"}});
+  EXPECT_EQ(built.status, 0);
+  EXPECT_THAT(built.err, HasSubstr(warning));
+  EXPECT_THAT(run({{"info", at("far.hpsdf")}}).out, HasSubstr("(999999.9, -0.1, -0.1) to (1000002.1, 2.1, 2.1)"));
+  EXPECT_EQ(Json::parse(run({{"mesh", at("far.obj"), "--json"}}).out).at("coordinate_spacing"), 0.0625);
+  EXPECT_THAT(run({{"mesh", at("near.obj")}}).err, IsEmpty());
+  EXPECT_EQ(Json::parse(run({{"mesh", "builtin:box", "--json"}}).out).at("coordinate_spacing"), 0);
 }
 
 /// Two tetrahedra, one of which reaches into the other.
@@ -1346,7 +1378,6 @@ TEST(Summaries, numbersAreReadable) {
   EXPECT_EQ(shortNumber(NAN), "nan");
   EXPECT_EQ(grouped(1234567), "1,234,567");
   EXPECT_EQ(grouped(999), "999");
-  EXPECT_EQ(bytesText(8.4e6), "8.40 MB");
 }
 
 // Bad input: one line that names the file, exit status 2, no output file

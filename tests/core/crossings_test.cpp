@@ -218,6 +218,10 @@ TEST(Crossings, OfTheSameTriangleTwiceIsOne) {
   EXPECT_FALSE(meet(meshOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 2, 1}))) << "without area";
 }
 
+TEST(Crossings, OfATriangleAloneAreNone) {
+  EXPECT_TRUE(findCrossings({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, "one"}).found.empty());
+}
+
 TEST(Crossings, NeedASurface) { EXPECT_THROW(findCrossings({}), Error); }
 
 TEST(Crossings, OfRealMeshesAreWhereTheyAreKnown) {

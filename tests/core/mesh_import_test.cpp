@@ -15,6 +15,7 @@
 #include <numbers>
 #include <ostream>
 #include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -107,26 +108,30 @@ TEST_F(MeshImport, ExtensionsInAnyCase) {
                     "T.OBJ");
 }
 
-TEST_F(MeshImport, PlyAscii) {
-  expectTetrahedron(
-      import("t.ply",
-             "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
-             "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
-             "5 6 7\n6 6 7\n5 8 7\n5 6 10\n0 0 0\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
-      "t.ply");
+std::string plyAscii() {
+  return "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+         "5 6 7\n6 6 7\n5 8 7\n5 6 10\n0 0 0\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 }
 
-TEST_F(MeshImport, PlyBinary) {
-  Bytes file{
-      "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
-      "property double z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"};
+TEST_F(MeshImport, PlyAscii) { expectTetrahedron(import("t.ply", plyAscii()), "t.ply"); }
+
+template <typename Coordinate>
+Bytes plyBinary(const std::string& type) {
+  Bytes file{"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty " + type + " x\nproperty " + type +
+             " y\nproperty " + type + " z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"};
   for (const auto& corner : kCorners)
-    for (const float x : corner) file.add(double{x});
+    for (const float x : corner) file.add(Coordinate{x});
   for (const auto& face : kFaces) {
     file.add(std::uint8_t{3});
     for (const std::uint16_t v : face) file.add(std::int32_t{v});
   }
-  expectTetrahedron(import("t.ply", file.data), "t.ply");
+  return file;
+}
+
+TEST_F(MeshImport, PlyBinary) {
+  expectTetrahedron(import("t.ply", plyBinary<double>("double").data), "t.ply");
+  expectTetrahedron(import("t.ply", plyBinary<float>("float").data), "t.ply");
 }
 
 TEST_F(MeshImport, Off) {
@@ -134,7 +139,7 @@ TEST_F(MeshImport, Off) {
                     "t.off");
 }
 
-TEST_F(MeshImport, StlAscii) {
+std::string stlAscii() {
   std::string file = "solid t\n";
   for (const auto& face : kFaces) {
     file += "facet normal 0 0 0\nouter loop\n";
@@ -143,12 +148,16 @@ TEST_F(MeshImport, StlAscii) {
               std::to_string(kCorners[v][2]) + "\n";
     file += "endloop\nendfacet\n";
   }
-  const ImportedMesh imported = import("t.stl", file + "endsolid t\n");
+  return file + "endsolid t\n";
+}
+
+TEST_F(MeshImport, StlAscii) {
+  const ImportedMesh imported = import("t.stl", stlAscii());
   expectTetrahedron(imported, "t.stl");
   EXPECT_EQ(imported.report.weldedVertices, 8u);
 }
 
-TEST_F(MeshImport, StlBinary) {
+Bytes stlBinary() {
   Bytes file{std::string(80, ' ')};
   file.add(std::uint32_t{4});
   for (const auto& face : kFaces) {
@@ -157,8 +166,10 @@ TEST_F(MeshImport, StlBinary) {
       for (const float x : kCorners[v]) file.add(x);
     file.add(std::uint16_t{0});
   }
-  expectTetrahedron(import("t.stl", file.data), "t.stl");
+  return file;
 }
+
+TEST_F(MeshImport, StlBinary) { expectTetrahedron(import("t.stl", stlBinary().data), "t.stl"); }
 
 Bytes chunk3ds(std::uint16_t id, const Bytes& content) {
   return Bytes().add(id).add(static_cast<std::uint32_t>(content.data.size() + 6)).add(content);
@@ -306,6 +317,77 @@ TEST_F(MeshImport, PositionsPassThroughFloat) {
           "v 1000000.03 0 0\nv 1000002 0 0\nv 1000000.03 1 0\nv 1000000.03 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
           .mesh;
   EXPECT_EQ(mesh.vertices[0].x(), double{1000000.03f});
+}
+
+std::string tetrahedronObj(double size, double offset) {
+  std::ostringstream text;
+  text.precision(17);
+  for (const auto& corner : kCorners) {
+    text << "v";
+    for (const float x : corner) text << " " << size * x + offset;
+    text << "\n";
+  }
+  text << "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  return text.str();
+}
+
+TEST_F(MeshImport, CoordinatesAreKeptAsFarApartAsIsSaid) {
+  std::mt19937 random(7);
+  for (const double at : {1.0, 1000.0, 1e6, 3e20, 1e38, 2e-38, 1e-41}) {
+    std::uniform_real_distribution<double> near(at, 1.5 * at);
+    std::vector<double> given;
+    std::ostringstream text;
+    text.precision(17);
+    for (int v = 0; v < 300; ++v)
+      text << (v % 3 == 0 ? "v " : " ") << given.emplace_back(near(random)) << (v % 3 == 2 ? "\n" : "");
+    for (int v = 1; v <= 98; ++v) text << "f " << v << " " << v + 1 << " " << v + 2 << "\n";
+    const fs::path file = write("t.obj", text.str());
+    const TriangleMesh mesh = importMesh(file).mesh;
+    const double spacing = coordinateSpacing(file, mesh);
+    EXPECT_LT(spacing, std::max(1.2e-7 * 1.5 * at, 2e-45)) << at;
+    double lost = 0;
+    for (const double x : given) {
+      double nearest = HUGE_VAL;
+      for (const Vector3& v : mesh.vertices) nearest = std::min(nearest, (v.array() - x).abs().minCoeff());
+      lost = std::max(lost, nearest);
+    }
+    EXPECT_LE(lost, 2 * spacing) << at;  // assimp multiplies by powers of ten in float, too
+    EXPECT_GT(lost, spacing / 8) << at;
+  }
+}
+
+TEST_F(MeshImport, NothingIsLostOfFilesThatHoldFloats) {
+  const auto spacing = [&](const std::string& name, const std::string& content) {
+    const fs::path file = write(name, content);
+    return coordinateSpacing(file, importMesh(file).mesh);
+  };
+  constexpr double kOf10 = 0x1p-20;
+  EXPECT_EQ(spacing("t.obj", tetrahedronObj(1, 0)), kOf10);
+  EXPECT_EQ(spacing("t.off", "OFF\n4 4 0\n5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), kOf10);
+  EXPECT_EQ(spacing("t.stl", stlAscii()), kOf10);
+  EXPECT_EQ(spacing("t.stl", stlBinary().data), 0);
+  EXPECT_EQ(spacing("t.ply", plyAscii()), kOf10);
+  EXPECT_EQ(spacing("t.ply", plyBinary<double>("double").data), kOf10);
+  EXPECT_EQ(spacing("t.ply", plyBinary<float>("float").data), 0);
+  write("t.bin", gltfBuffer().data);
+  EXPECT_EQ(spacing("t.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")), 0);
+  EXPECT_EQ(coordinateSpacing("builtin:box", loadMesh("builtin:box")), 0);
+}
+
+TEST_F(MeshImport, OfAnySizeThatFloatsHold) {
+  for (const double size : {1e-40, 1e-20, 1e-6, 1e6, 1e20, 3e37}) {
+    const auto [mesh, report] = import("t.obj", tetrahedronObj(size, 0));
+    EXPECT_TRUE(report.closed()) << size;
+    EXPECT_NEAR(report.volume / size / size / size, 1, 1e-4) << size;
+  }
+  EXPECT_THAT(errorOf("t.obj", tetrahedronObj(1e38, 0)),
+              HasSubstr("not a finite number (or beyond 3.4e38, where float ends)"));
+  EXPECT_THAT(errorOf("t.obj", tetrahedronObj(1e-47, 0)),
+              AllOf(HasSubstr("no face with an area"),
+                    HasSubstr("coordinates reach 0, where the reader keeps them 1.4e-45 apart")));
+  EXPECT_THAT(errorOf("t.obj", tetrahedronObj(1, 1e9)),
+              AllOf(HasSubstr("no face with an area"),
+                    HasSubstr("coordinates reach 1e+09, where the reader keeps them 64 apart")));
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -502,6 +584,26 @@ TEST(Triangulate, ACombIsNotFilled) {
   polygon.emplace_back(0, 0, 0);
   const auto area = areaOf(polygon, Vector3::UnitZ());
   EXPECT_NEAR(area.sum, 40 + 20 * 4, 1e-12);
+  EXPECT_GT(area.least, 0);
+}
+
+/// Twice around and back, a thousandth of the radius beside: all pairs of its corners would take minutes.
+TEST(Triangulate, ASpiralOfManyCorners) {
+  constexpr int kAlong = 50000;
+  std::vector<Vector3> polygon;
+  const auto add = [&](int i, double radius) {
+    const double angle = 4 * std::numbers::pi * i / kAlong;
+    polygon.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0);
+  };
+  for (int i = 0; i < kAlong; ++i) add(i, 1.001 + double(i) / kAlong);
+  for (int i = kAlong; i-- > 0;) add(i, 1 + double(i) / kAlong);
+  double expected = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector3& next = polygon[(i + 1) % polygon.size()];
+    expected += (polygon[i].x() * next.y() - polygon[i].y() * next.x()) / 2;
+  }
+  const auto area = areaOf(polygon, Vector3::UnitZ());
+  EXPECT_NEAR(area.sum, expected, 1e-9);
   EXPECT_GT(area.least, 0);
 }
 

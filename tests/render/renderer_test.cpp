@@ -723,6 +723,39 @@ class Gl : public testing::Test {
   }
 };
 
+/// Squares of such lengths are beyond float.
+TEST_F(Gl, FieldsOfAnySizeLookTheSame) {
+  const Field field = randomField(5, {.roughness = 0.05});
+  for (const double size : {0x1p-120, 0x1p-70, 0x1p70, 0x1p120}) {
+    FieldData data = field.data();
+    data.domain = Box(size * data.domain.min(), size * data.domain.max());
+    for (double& c : std::get<std::vector<double>>(data.coefficients)) c *= size;
+    const Field sized(std::move(data));
+    const auto one = makeGlRenderer(field, GlChoice::software), other = makeGlRenderer(sized, GlChoice::software);
+    const auto expectSame = [&](const ViewBuffers& expected, const ViewBuffers& found) {
+      EXPECT_EQ(found.cell, expected.cell);
+      EXPECT_EQ(found.normal, expected.normal);
+      const auto expectTimes = [&](const std::vector<float>& lengths, const std::vector<float>& shown) {
+        ASSERT_EQ(shown.size(), lengths.size());
+        for (std::size_t i = 0; i < shown.size(); ++i) EXPECT_EQ(shown[i], float(size * double(lengths[i])));
+      };
+      expectTimes(expected.value, found.value);
+      expectTimes(expected.distance, found.distance);
+    };
+    expectSame(one->slice(axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), kWidth, kHeight),
+               other->slice(axisSlice(sized.domain(), 2, size * 0.1, kWidth, kHeight), kWidth, kHeight));
+    for (const Projection projection : {Projection::perspective, Projection::orthographic}) {
+      const auto view = [&](const Field& of, double scale) {
+        return SurfaceView{cameraOf({.projection = projection}, of.domain(), kWidth, kHeight), scale * 0.05,
+                           ClipPlane{2, scale * 0.1}};
+      };
+      const ViewBuffers expected = one->surface(view(field, 1), kWidth, kHeight);
+      EXPECT_GT(hits(expected), std::size_t(kWidth) * kHeight / 20);
+      expectSame(expected, other->surface(view(sized, size), kWidth, kHeight));
+    }
+  }
+}
+
 TEST_F(Gl, SlicesOfBuiltInShapes) {
   BufferTolerance tolerance = kSliceTolerance;
   tolerance.pixels = 0;  // positions are in double precision on both sides

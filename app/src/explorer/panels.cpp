@@ -11,6 +11,7 @@
 #include "explorer/explorer.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/field.h"
+#include "hpsdf/memory.h"
 #include "pictures.h"
 #include "summaries.h"
 

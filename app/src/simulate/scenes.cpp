@@ -10,8 +10,10 @@
 #include <random>
 
 #include "hpsdf/error.h"
+#include "hpsdf/memory.h"
 #include "hpsdf/shapes.h"
 #include "simulate/scene.h"
+#include "summaries.h"
 
 namespace hpsdf::app {
 namespace {
@@ -292,7 +294,9 @@ std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request
 std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request) {
   struct Cloth final : PileScene {
     Cloth(const Console& to, const SceneRequest& from) : PileScene(from) {
-      constexpr double kMargin = 0.01, kSide = 1.6;
+      constexpr double kMargin = 0.01, kSide = 1.6, kBytesANode = 2000;
+      requireMemory("a cloth of " + grouped(from.nodes) + " nodes", kBytesANode * double(from.nodes),
+                    "take fewer nodes");
       const TriangleMesh mesh = sceneMesh(to, from.ground, from.filesAreYUp, 1);
       const double stands = -boundingBox(mesh).min().z();
       const double top = boundingBox(mesh).sizes().z();

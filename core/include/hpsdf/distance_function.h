@@ -51,7 +51,7 @@ class DistanceFunction {
       : DistanceFunction(std::forward<F>(f), sourceOf(f)) {}
 
   template <typename F>
-  DistanceFunction(F&& f, Source source) : source_(std::move(source)) {
+  DistanceFunction(F&& f, Source source) : source_(std::move(source)), bytes_(bytesOf(f)) {
     using Callable = std::remove_cvref_t<F>;
     if constexpr (std::is_lvalue_reference_v<F>)
       evaluate_ = adapt<Callable>([&f]() -> const Callable& { return f; });
@@ -68,7 +68,20 @@ class DistanceFunction {
 
   const Source& source() const { return source_; }
 
+  /// Bytes that the callable holds, where it tells by a `std::size_t bytes() const`; else 0.
+  std::size_t bytes() const { return bytes_; }
+
  private:
+  template <typename F>
+  static std::size_t bytesOf(const F& f) {
+    if constexpr (requires {
+                    { f.bytes() } -> std::convertible_to<std::size_t>;
+                  })
+      return f.bytes();
+    else
+      return 0;
+  }
+
   template <typename F>
   static Source sourceOf(const F& f) {
     if constexpr (requires {
@@ -96,6 +109,7 @@ class DistanceFunction {
 
   Batch evaluate_;
   Source source_;
+  std::size_t bytes_;
 };
 
 }  // namespace hpsdf

@@ -26,17 +26,23 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,
 /// n-gons triangulated, then `cleaned`.
 ///
-/// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6),
-/// and indices out of range in OFF and PLY files are mended (in glTF files, their faces left out) silently, so that
-/// they cannot be reported.
+/// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6;
+/// see `coordinateSpacing`), and indices out of range in OFF and PLY files are mended (in glTF files, their faces left
+/// out) silently, so that they cannot be reported.
 ///
 /// It reads within the caller's process, without a limit of time or memory, and what brings assimp down brings that
 /// process down: a deeply nested glTF file its stack, others its asserts, which are on in Debian. Some files keep it,
-/// or the cutting of a face with very many corners, busy for minutes. For files from strangers do as the program
-/// `hpsdf` does, and read in a process of its own.
+/// or the cutting of a face with very many corners that crosses itself, busy for minutes. For files from strangers do
+/// as the program `hpsdf` does, and read in a process of its own.
 ///
-/// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, non-finite, or without area.
+/// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, beyond float's range or too
+/// small for it, or without area.
 ImportedMesh importMesh(const std::filesystem::path& file);
+
+/// How far apart the reader keeps coordinates, in mesh units: the spacing of `float` at the largest one of `mesh`,
+/// which was read from `file`; numbers with exponents may be off by twice as much. 0 where that holds floats itself, so
+/// that reading loses nothing (3DS, glTF, binary STL and most binary PLY), and for what is no mesh file.
+double coordinateSpacing(const std::filesystem::path& file, const TriangleMesh& mesh);
 
 /// The mesh of `importMesh`, or, for a name that starts with `builtin:`, the shape of `shapes::mesh`.
 TriangleMesh loadMesh(const std::string& fileOrShape);

@@ -199,7 +199,7 @@ class Finder {
     const Box& mine = levels_[0][slot];
     if (!levels_[level][box].intersects(mine)) return;
     if (level == 0) {
-      if (meets(slot, box)) found.push_back(crossing(slot, box));
+      if (box != slot && meets(slot, box)) found.push_back(crossing(slot, box));
       return;
     }
     const auto end =

@@ -82,6 +82,7 @@ class Construction {
                 progress) {
     tree_.domain = domain;
     tree_.grid = options.grid;
+    requireRoom(0, 0);  // for Φ
   }
 
   /// Keeps its state there from now on, and goes on from the one that is there already, if any: whether there was.
@@ -152,7 +153,7 @@ class Construction {
     std::size_t coefficients = 0;
     for (const BuildNode& node : tree.nodes)
       if (node.firstChild == 0) coefficients += coefficientCount(raised(node));
-    checkFitsMemory({tree.nodes.size(), coefficients}, options_);
+    requireRoom(tree.nodes.size(), coefficients);
     for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
       report("raising every degree", double(begin) / double(tree.nodes.size()));
       tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
@@ -355,6 +356,10 @@ class Construction {
     return options_.criterion == Criterion::optimal ? 4 * coefficients_ : coefficients_;
   }
 
+  void requireRoom(std::size_t nodes, std::size_t coefficients, double times = 1) const {
+    checkFitsMemory({nodes, coefficients, times, distance_.bytes()}, options_);
+  }
+
   /// Of the field as it will be, but for its directory.
   double bytes() const {
     return nodeBytes() * double(tree_.nodes.size()) + coefficientBytes(options_) * double(coefficients_);
@@ -418,7 +423,7 @@ class Construction {
 
   void refineRound(const std::function<void(std::uint64_t)>& afterStep) {
     report("refining", fractionDone());
-    checkFitsMemory({tree_.nodes.size(), coefficientsInMemory(), leastGrowth()}, options_);
+    requireRoom(tree_.nodes.size(), coefficientsInMemory(), leastGrowth());
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
       const std::uint32_t next = queue_.top().node;
@@ -514,7 +519,7 @@ class Construction {
       stage_ = Stage::looking;
     }
     while (passed_ < waiting_.size()) {
-      checkFitsMemory({tree_.nodes.size(), coefficientsInMemory()}, options_);
+      requireRoom(tree_.nodes.size(), coefficientsInMemory());
       report("looking for the maximum error", double(passed_) / double(waiting_.size()));
       const std::size_t count = std::min<std::size_t>(kLookRound, waiting_.size() - passed_);
       std::vector<Looked> looked(count);

@@ -1,7 +1,5 @@
 #include "field/build_options.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +8,7 @@
 
 #include "field/weak_continuity.h"
 #include "hpsdf/error.h"
+#include "hpsdf/memory.h"
 
 namespace hpsdf {
 namespace {
@@ -23,15 +22,8 @@ template <typename... Parts>
 
 /// In bytes.
 double allowedMemory(const BuildOptions& options) {
-  const double machines = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-  return options.memoryLimit ? std::min(0.75 * machines, double(*options.memoryLimit)) : 0.75 * machines;
-}
-
-std::string bytesText(double bytes) {
-  std::ostringstream text;
-  text.precision(3);
-  text << (bytes < 1e9 ? bytes / 1e6 : bytes / 1e9) << (bytes < 1e9 ? " MB" : " GB");
-  return text.str();
+  const double most = hpsdf::allowedMemory();
+  return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
 // of the construction: a leaf's node, its queue entry, the vector of its fit, the final arrays
@@ -143,9 +135,13 @@ void checkBuild(const Box& domain, const BuildOptions& options) {
 
 void checkFitsMemory(const Growth& growth, const BuildOptions& options) {
   constexpr double kDoubt = 1.5;  // about what is yet to come
+  const double held = double(growth.held), most = allowedMemory(options);
+  if (held > most)
+    refuse("the distance that the field is made from holds ", bytesText(held), " of memory, more than the ",
+           bytesText(most), " allowed: simplify the mesh, or allow more memory");
   const double bytes = kBytesPerNode * double(growth.nodes) + kBytesPerCoefficient * double(growth.coefficients);
-  const double needed = bytes * growth.times, most = allowedMemory(options);
-  if (bytes <= most && needed <= kDoubt * most) return;
+  const double needed = held + bytes * growth.times;
+  if (held + bytes <= most && needed <= kDoubt * most) return;
   std::ostringstream cells;
   cells.precision(2);
   cells << std::fixed << double(growth.nodes) * growth.times / 1e6;

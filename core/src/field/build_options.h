@@ -22,10 +22,12 @@ double coefficientBytes(const BuildOptions& options);
 /// What has grown so far, and how many times as much there will be.
 struct Growth {
   std::size_t nodes = 0, coefficients = 0;
-  double times = 1;  ///< 1 where there is no telling
+  double times = 1;      ///< 1 where there is no telling
+  std::size_t held = 0;  ///< bytes besides, which do not grow
 };
 
-/// Throws `Error` where a tree like this does not fit into the memory that is allowed, or will not in the end.
+/// Throws `Error` where a tree like this, and what is held besides, does not fit into the memory that is allowed, or
+/// will not in the end.
 void checkFitsMemory(const Growth& growth, const BuildOptions& options);
 
 }  // namespace hpsdf

@@ -6,6 +6,7 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -75,6 +76,37 @@ double promisedElements(const fs::path& file) {
     }
   }
   return most;
+}
+
+/// Whether coordinates stand there as text, or as doubles.
+bool plySaysMoreThanFloat(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string line;
+  for (int i = 0; i < 1000 && std::getline(stream, line) && !line.starts_with("end_header"); ++i) {
+    std::istringstream words(line);
+    std::string keyword, kind, name;
+    words >> keyword >> kind >> name;
+    if (keyword == "format" && kind == "ascii") return true;
+    if (keyword == "property" && name == "x" && kind != "float" && kind != "float32") return true;
+  }
+  return false;
+}
+
+/// By the size that the count of its faces asks for, as assimp tells them apart.
+bool isBinaryStl(const fs::path& file) {
+  constexpr std::uintmax_t kHeader = 80, kFace = 50;
+  std::uint32_t faces = 0;
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(kHeader);
+  std::error_code error;
+  return stream.read(reinterpret_cast<char*>(&faces), sizeof faces) &&
+         fs::file_size(file, error) == kHeader + sizeof faces + kFace * faces;
+}
+
+bool saysMoreThanFloat(const fs::path& file) {
+  const std::string extension = extensionOf(file);
+  if (extension == "stl") return !isBinaryStl(file);
+  return extension == "obj" || extension == "off" || (extension == "ply" && plySaysMoreThanFloat(file));
 }
 
 /// Whether a line of the text, whatever ends its lines, says no more than that.
@@ -175,6 +207,11 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& world
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (unsigned v = 0; v < part.mNumVertices; ++v) {
     const aiVector3D& p = part.mVertices[v];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      throw Error(
+          mesh.name + ": vertex " + std::to_string(std::size_t{first} + v + 1) +
+          " has a coordinate that is not a finite number (or beyond 3.4e38, where float ends); repair the mesh, "
+          "or scale it down, before it is exported again");
     mesh.vertices.push_back(worldFromPart * Vector3(p.x, p.y, p.z));
   }
   const bool mirrored = worldFromPart.linear().determinant() < 0;  // would turn the faces inside out
@@ -204,7 +241,41 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
   return mesh;
 }
 
+double largestCoordinate(const Box& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff(); }
+
+double floatSpacing(double coordinate) {
+  constexpr int kBits = std::numeric_limits<float>::digits, kSmallest = std::numeric_limits<float>::min_exponent;
+  const int exponent = coordinate > 0 ? std::ilogb(coordinate) + 1 : kSmallest;
+  return std::ldexp(1.0, std::max(exponent, kSmallest) - kBits);
+}
+
+/// What is wrong with faces of which rounding has left nothing is not said by their having no area.
+std::string spacingHint(const fs::path& file, const Box& box) {
+  constexpr double kFew = 16;
+  const double largest = largestCoordinate(box), spacing = floatSpacing(largest);
+  if (!saysMoreThanFloat(file) || box.sizes().maxCoeff() > kFew * spacing) return "";
+  std::ostringstream hint;
+  hint.precision(2);
+  hint << "; coordinates reach " << largest << ", where the reader keeps them " << spacing
+       << " apart: scale the mesh, or move it nearer to the origin, before it is exported";
+  return hint.str();
+}
+
+ImportedMesh cleaned(TriangleMesh mesh, const fs::path& file) {
+  const Box box = boundingBox(mesh);
+  try {
+    return hpsdf::cleaned(std::move(mesh));  // its messages name the file as it was given
+  } catch (const Error& error) {
+    throw Error(error.what() + (box.isEmpty() ? "" : spacingHint(file, box)));
+  }
+}
+
 }  // namespace
+
+double coordinateSpacing(const fs::path& file, const TriangleMesh& mesh) {
+  const Box box = boundingBox(mesh);
+  return box.isEmpty() || !saysMoreThanFloat(file) ? 0 : floatSpacing(largestCoordinate(box));
+}
 
 ImportedMesh importMesh(const fs::path& file) {
   requireReadable(file);
@@ -215,7 +286,7 @@ ImportedMesh importMesh(const fs::path& file) {
     Assimp::Importer importer;  // gone, with its copy of the mesh, before the cleaning takes memory
     mesh = joined(readScene(importer, file), file);
   }
-  ImportedMesh result = cleaned(std::move(mesh));  // its messages name the file as it was given
+  ImportedMesh result = cleaned(std::move(mesh), file);
   result.mesh.name = file.filename().string();
   return result;
 }

@@ -12,6 +12,7 @@
 #include "grid_space.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
+#include "scaled_renderer.h"
 #include "surface_blocks.h"
 #include "view_buffers.h"
 
@@ -362,7 +363,7 @@ class GlRenderer final : public Renderer {
 }  // namespace
 
 std::unique_ptr<Renderer> makeGlRenderer(const Field& field, GlChoice choice) {
-  return std::make_unique<GlRenderer>(field, choice);
+  return inUnitsNearOne(field, [&](const Field& near) { return std::make_unique<GlRenderer>(near, choice); });
 }
 
 std::string glDescription(GlChoice choice) { return EglContext(choice).renderer(); }
