@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -307,8 +308,8 @@ std::vector<Parameter> buildParameters() {
        .type = ParameterType::wholeNumber,
        .help =
            "Memory that the construction may take. Where more will be needed it stops as soon as that is plain, and "
-           "says how much. Left out: 1e8, some 240,000 cells, where the target error is left out too, for which most "
-           "meshes take less than 100,000; else three quarters of the machine's memory.",
+           "says how much. Left out: 1e8, some 240,000 cells, where target error, grid and max-steps are left out too; "
+           "most meshes take less than 100,000 then. Else three quarters of the machine's memory.",
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},
@@ -529,7 +530,9 @@ BuildOptions buildOptions(const Arguments& arguments) {
   requireOwner(arguments, "blend-width", "continuity exact", exact);
   requireOwner(arguments, "near-distance", "near-error", options.nearError > 0);
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
-  const bool untold = arguments.has("target-error") && !arguments.given("target-error") && !endsOtherwise;
+  const bool untold = arguments.has("target-error") && !endsOtherwise &&
+                      std::ranges::none_of(std::array{"target-error", "grid", "max-steps"},
+                                           [&](const char* name) { return arguments.given(name); });
   if (arguments.given("memory-limit"))
     options.memoryLimit = static_cast<std::uint64_t>(arguments.number("memory-limit"));
   else if (untold)
