@@ -309,7 +309,8 @@ std::vector<Parameter> buildParameters() {
        .help =
            "Memory that the construction may take. Where more will be needed it stops as soon as that is plain, and "
            "says how much. Left out: 1e8, some 240,000 cells, where target error, grid and max-steps are left out too; "
-           "most meshes take less than 100,000 then. Else three quarters of the machine's memory.",
+           "most meshes take less than 100,000 then. Else three quarters of the machine's memory, or of "
+           "what its control group allows.",
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},

@@ -75,7 +75,8 @@ struct BuildOptions {
   double blend = 0;     ///< exact continuity: `FieldData::blend` of the finished field, 0 to `kMaxBlend`
   bool bounds = false;  ///< for each leaf keeps what is certain of its error, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
-  /// Bytes that the growing octree may take, by a generous estimate; nothing: three quarters of the machine's memory.
+  /// Bytes that the growing octree may take, by a generous estimate; nothing: three quarters of the machine's memory,
+  /// or of what control groups (Linux) leave this process, which is also the most.
   /// `build` throws when more are needed, and before, where the way in which the error falls says that half as much
   /// again will be.
   std::optional<std::uint64_t> memoryLimit = {};

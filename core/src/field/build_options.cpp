@@ -1,7 +1,5 @@
 #include "field/build_options.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +8,7 @@
 
 #include "field/weak_continuity.h"
 #include "hpsdf/error.h"
+#include "machine_memory.h"
 
 namespace hpsdf {
 namespace {
@@ -23,8 +22,8 @@ template <typename... Parts>
 
 /// In bytes.
 double allowedMemory(const BuildOptions& options) {
-  const double machines = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-  return options.memoryLimit ? std::min(0.75 * machines, double(*options.memoryLimit)) : 0.75 * machines;
+  const double most = 0.75 * machineMemory();
+  return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
 std::string bytesText(double bytes) {
