@@ -158,7 +158,7 @@ class Batch {
       throw Cancelled();
     const std::optional<Claim> claim = claims_.take(mesh.number);
     if (!claim) return false;
-    console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), mesh.surface);
+    console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), printable(mesh.surface));
     const auto start = std::chrono::steady_clock::now();
     const Made made = make(mesh, again);
     ++done_;
@@ -224,14 +224,14 @@ class Batch {
   }
 
   void tell(const BatchMesh& mesh, const Made& made, double seconds) const {
-    const std::string position = fmt::format("{} of {}", done_, meshes_.size());
+    const std::string position = fmt::format("{} of {}", done_, meshes_.size()), name = printable(mesh.surface);
     if (made.status == Status::failed) {
       // some errors speak of what is wrong alone
-      const bool named = made.error.find(mesh.surface) != std::string::npos;
-      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : mesh.surface + ": ",
-                                  printable(made.error));
+      const std::string error = printable(made.error);
+      const bool named = error.find(name) != std::string::npos;
+      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : name + ": ", error);
     } else {
-      console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, mesh.surface, statusName(made.status),
+      console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, name, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
     }
     console_.err << std::flush;
@@ -269,9 +269,13 @@ class Batch {
 std::vector<BatchMesh> readList(const Console& console, const std::string& list) {
   const bool typed = list == "-";
   std::string text = typed ? std::string(std::istreambuf_iterator<char>(console.in), {}) : readTextFile(list);
-  std::vector<BatchMesh> meshes = parseBatchList(text);
-  if (meshes.empty()) throw Error(fmt::format("{}: names no mesh; write one a line", typed ? "standard input" : list));
-  return meshes;
+  try {
+    std::vector<BatchMesh> meshes = parseBatchList(text);
+    if (meshes.empty()) throw Error("names no mesh; write one a line");
+    return meshes;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", typed ? "standard input" : list, error.what()));
+  }
 }
 
 }  // namespace

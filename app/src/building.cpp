@@ -17,6 +17,7 @@
 #include "hpsdf/shapes.h"
 #include "long_work.h"
 #include "mesh_process.h"
+#include "printable.h"
 #include "progress_line.h"
 #include "summaries.h"
 
@@ -81,7 +82,7 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
 /// Errors of the construction speak of options; the user thinks of the mesh.
 [[noreturn]] void rethrowNaming(const std::string& surface, const Error& error) {
   const std::string message = error.what();
-  if (message.find(surface) != std::string::npos) throw error;
+  if (printable(message).find(printable(surface)) != std::string::npos) throw error;  // some are printable already
   throw Error(surface + ": " + message);
 }
 
@@ -156,7 +157,7 @@ std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
-  tellSign(console, surface, *prepared.report, exact->signChoice());
+  tellSign(console, printable(surface), *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
 }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "batch_list.h"
+#include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "started_program.h"
 #include "support/temporary_directory.h"
@@ -67,6 +68,22 @@ TEST(BatchLists, holdAMeshALine) {
   EXPECT_THAT(surfacesIn("\xef\xbb\xbf# as some editors begin\na.obj\r\n"), ElementsAre("a.obj"));
   EXPECT_THAT(surfacesIn("a.obj\nb.obj\n a.obj\n"), ElementsAre("a.obj", "b.obj")) << "each once";
   EXPECT_THAT(surfacesIn(" \n\r\n# \n"), IsEmpty());
+}
+
+/// As `find -print0` and some editors write them.
+TEST(BatchLists, ofZeroBytesAreRefused) {
+  const auto complaint = [](std::string_view list) {
+    try {
+      parseBatchList(list);
+      return std::string();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  using namespace std::string_view_literals;
+  EXPECT_EQ(complaint("a.obj\0b.obj\0"sv), "line 1 holds a zero byte: expected one name a line, in UTF-8");
+  EXPECT_THAT(complaint("a.obj\n\n#\0\n"sv), StartsWith("line 3 holds a zero byte"));
+  EXPECT_THAT(complaint("\xff\xfe.\0/\0t\0.\0o\0b\0j\0\n\0"sv), StartsWith("line 1 holds a zero byte"));
 }
 
 TEST(BatchLists, namesAreSafeAndOfTheLineAlone) {
@@ -281,6 +298,21 @@ TEST_F(Batches, whatAGltfFileNamesCounts) {
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
 }
 
+/// One that is built, with a word about its sign, one that is no mesh and one that is not there.
+TEST_F(Batches, namesMoveNoCursor) {
+  const std::string open = tetrahedron(1).substr(0, tetrahedron(1).rfind("f ")), clear = "\x1b[2J";
+  writeFile(folder_ / (clear + "open.obj"), open);
+  writeFile(folder_ / (clear + "bad.obj"), "this is no mesh\n");
+  const std::string list = clear + "open.obj\n" + clear + "bad.obj\n" + clear + "none.obj\n";
+  const Outcome outcome = run(batch(list, kCoarse));
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("built", "failed", "failed"));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("\nhpsdf: error: 2 of 3:  [2Jbad.obj: "), HasSubstr("1 of 3:  [2Jopen.obj: ")));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("none.obj:  [2Jnone.obj: "))) << "once is enough";
+  EXPECT_EQ(linesOf(outcome)[0].at("file"), clear + "open.obj") << "as the list has it";
+}
+
 TEST_F(Batches, listsMayBeTyped) {
   Call call{.words = {"build", "--batch", "-", "-o", at("fields"), "--json"}, .input = "builtin:box\n"};
   call.words.insert(call.words.end(), kCoarse.begin(), kCoarse.end());
@@ -305,6 +337,7 @@ TEST_F(Batches, mistakesAreRefusedBeforeWork) {
   expectRefused({{"run", "-e", "build batch=list"}}, "give output");
   expectRefused({{"build", "--batch", at("none"), "-o", at("fields")}}, at("none") + ": no such file");
   expectRefused(batch("# none\n\n"), "list: names no mesh");
+  expectRefused(batch(std::string("builtin:box\0builtin:gear", 24)), "list: line 1 holds a zero byte");
   expectRefused(batch(list, {"--near-error", "1e-3"}), "near error and far error belong together");
   expectRefused(batch(list, {"--continuity-weight", "1"}), "continuity-weight belongs to");
   expectRefused(batch(list, {"--sign", "unsigned-shell"}), "thickness");
