@@ -56,7 +56,8 @@ std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
   if (!fs::is_regular_file(surface, missing)) return {};
-  if (lowerExtension(surface) == ".gltf")
+  const std::string extension = lowerExtension(surface);
+  if (extension == ".gltf" || extension == ".glb")
     return fmt::format("mesh {:016x}", fingerprint(importSurface(console, surface).mesh));
   std::ifstream file(surface, std::ios::binary);
   std::vector<char> piece(std::size_t{1} << 20);

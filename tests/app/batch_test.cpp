@@ -276,26 +276,42 @@ TEST_F(Batches, whatIsDamagedIsBuiltAnew) {
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
 }
 
-/// The file itself stays the same.
+/// The binary kind of a glTF file: its header, JSON and the first buffer as chunks.
+std::string binaryGltf(std::string json, const std::string& buffer) {
+  const auto words = [](const std::vector<std::uint32_t>& numbers) {
+    return std::string(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof numbers[0]);
+  };
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto jsonSize = std::uint32_t(json.size()), bufferSize = std::uint32_t(buffer.size());
+  return words({0x46546c67, 2, 28 + jsonSize + bufferSize, jsonSize, 0x4e4f534a}) + json +
+         words({bufferSize, 0x004e4942}) + buffer;
+}
+
+/// The files themselves stay the same.
 TEST_F(Batches, whatAGltfFileNamesCounts) {
   const auto corners = [&](float height) {
     const std::array<float, 12> numbers = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, height};
     writeFile(folder_ / "t.bin", {reinterpret_cast<const char*>(numbers.data()), sizeof numbers});
   };
-  writeFile(folder_ / "t.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-                                R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
-                                R"("buffers":[{"byteLength":48,"uri":"t.bin"},)"
-                                R"({"byteLength":12,"uri":"data:application/octet-stream;base64,AAIBAAEDAQIDAAMC"}],)"
-                                R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":1,"byteLength":12}],)"
-                                R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
-                                R"({"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}]})");
-  const Call call = batch("t.gltf\n", kCoarse);
+  const auto json = [](const std::string& faces) {
+    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+           R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+           R"("buffers":[{"byteLength":12)" +
+           faces +
+           R"(},{"byteLength":48,"uri":"t.bin"}],)"
+           R"("bufferViews":[{"buffer":1,"byteLength":48},{"buffer":0,"byteLength":12}],)"
+           R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+           R"({"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}]})";
+  };
+  writeFile(folder_ / "t.gltf", json(R"(,"uri":"data:application/octet-stream;base64,AAIBAAEDAQIDAAMC")"));
+  writeFile(folder_ / "b.glb", binaryGltf(json(""), {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}));
+  const Call call = batch("t.gltf\nb.glb\n", kCoarse);
   corners(1);
   const Outcome first = run(call);
-  EXPECT_THAT(statusesOf(first), ElementsAre("built")) << first.err;
-  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped"));
+  EXPECT_THAT(statusesOf(first), ElementsAre("built", "built")) << first.err;
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
   corners(2);
-  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "built"));
 }
 
 /// One that is built, with a word about its sign, one that is no mesh and one that is not there.
