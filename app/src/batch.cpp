@@ -170,8 +170,12 @@ class Batch {
 
   Made make(const BatchMesh& mesh, bool again) {
     try {
-      if (auto field = finished(mesh)) return {again ? Status::elsewhere : Status::skipped, std::move(field)};
-      return {Status::built, built(mesh)};
+      std::optional<CurrentField> field = finished(mesh);
+      const Status status = !field ? Status::built : again ? Status::elsewhere : Status::skipped;
+      if (!field) field = built(mesh);
+      std::error_code ignored;
+      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // of other options too: later it would stop a construction
+      return {status, std::move(field)};
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
@@ -206,8 +210,6 @@ class Batch {
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
     save(field, output);
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
-    std::error_code ignored;
-    fs::remove(checkpoint, ignored);
     return {std::move(field), output.string(), fs::file_size(output)};
   }
 

@@ -476,6 +476,18 @@ TEST_F(Batches, aCheckpointIsTakenOver) {
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
 }
 
+/// Kept by a process that was killed: neither does it stay for ever, nor does it stop a later one.
+TEST_F(Batches, aCheckpointGoesWhenTheFieldIsThere) {
+  const std::string shape = "analytic:box";
+  const fs::path state = fieldOf(shape).string() + ".checkpoint";
+  fs::create_directory(fields());
+  for (const char* status : {"built", "skipped"}) {
+    writeFile(state, "of other options\n");
+    EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre(status));
+    EXPECT_FALSE(fs::exists(state)) << status;
+  }
+}
+
 TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
   constexpr int kShapes = 40;
   const std::vector<std::string> options = {"--target-error", "1e-4", "--grid", "3", "--threads", "1"};
