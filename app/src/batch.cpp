@@ -96,6 +96,21 @@ Json optionsJson(const Arguments& arguments) {
   return options;
 }
 
+/// An empty file that is there while a process builds a field, and after its death.
+class Mark {
+ public:
+  explicit Mark(fs::path file) : file_(std::move(file)) { std::ofstream{file_}; }
+  ~Mark() {
+    std::error_code ignored;
+    fs::remove(file_, ignored);
+  }
+  Mark(const Mark&) = delete;
+  Mark& operator=(const Mark&) = delete;
+
+ private:
+  fs::path file_;
+};
+
 class Batch {
  public:
   Batch(const Console& console, const Arguments& arguments, const std::vector<BatchMesh>& meshes,
@@ -134,6 +149,7 @@ class Batch {
 
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
   fs::path recordOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".json"); }
+  fs::path markOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".begun"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
   /// In the list's order; what others are at work on at the end, as they end.
@@ -170,6 +186,7 @@ class Batch {
 
   Made make(const BatchMesh& mesh, bool again) {
     try {
+      sweep(mesh);
       std::optional<CurrentField> field = finished(mesh);
       const Status status = !field ? Status::built : again ? Status::elsewhere : Status::skipped;
       if (!field) field = built(mesh);
@@ -199,12 +216,20 @@ class Batch {
     }
   }
 
-  /// The claim is ours: what others have left half-written is abandoned, whatever machine they were on.
+  /// The claim is ours: who left a mark has died, and what it left half-written is abandoned, whatever machine it was
+  /// on. Without a mark there is none, which saves a look through the whole folder.
+  void sweep(const BatchMesh& mesh) const {
+    if (!fs::exists(markOf(mesh))) return;
+    const fs::path output = outputOf(mesh);
+    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
+      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
+    fs::remove(markOf(mesh));
+  }
+
   CurrentField built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
-      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
+    const Mark mark(markOf(mesh));
     // before the mesh is read: if it changes in between, the next run sees that
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;

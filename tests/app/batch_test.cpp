@@ -464,16 +464,31 @@ TEST_F(Batches, aCheckpointIsTakenOver) {
     ASSERT_FALSE(fs::exists(fieldOf(shape)));
   };
   kill();
+  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
+  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome other = run(batch(shape, options("1e-3")));
   EXPECT_EQ(other.status, 3);
   EXPECT_THAT(other.err, HasSubstr("is a checkpoint of a build with other options; delete it"));
-  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
-  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome outcome = run(batch(shape, options("1e-6")));
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr(".checkpoint, after "));
   EXPECT_TRUE(readFile(fieldOf(shape)) == loneBytes(shape, {"--target-error", "1e-6"}));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
+}
+
+/// Which takes long where many fields are.
+TEST_F(Batches, theFolderIsLookedThroughAfterADeathAlone) {
+  const std::string shape = "analytic:box";
+  const fs::path mark = fields() / ".batch" / (nameOf(shape) + ".begun"), half = fieldOf(shape).string() + ".part-1-0";
+  fs::create_directories(mark.parent_path());
+  writeFile(half, "half a fie");
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("built"));
+  EXPECT_TRUE(fs::exists(half)) << "nobody has looked";
+  EXPECT_FALSE(fs::exists(mark));
+  writeFile(mark, "");
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("skipped"));
+  EXPECT_FALSE(fs::exists(half));
+  EXPECT_FALSE(fs::exists(mark));
 }
 
 /// Kept by a process that was killed: neither does it stay for ever, nor does it stop a later one.
