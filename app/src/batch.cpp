@@ -56,7 +56,8 @@ std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
   if (!fs::is_regular_file(surface, missing)) return {};
-  if (lowerExtension(surface) == ".gltf")
+  const std::string extension = lowerExtension(surface);
+  if (extension == ".gltf" || extension == ".glb")
     return fmt::format("mesh {:016x}", fingerprint(importSurface(console, surface).mesh));
   std::ifstream file(surface, std::ios::binary);
   std::vector<char> piece(std::size_t{1} << 20);
@@ -94,6 +95,21 @@ Json optionsJson(const Arguments& arguments) {
   for (std::string line; std::getline(lines, line);) options.push_back(line);
   return options;
 }
+
+/// An empty file that is there while a process builds a field, and after its death.
+class Mark {
+ public:
+  explicit Mark(fs::path file) : file_(std::move(file)) { std::ofstream{file_}; }
+  ~Mark() {
+    std::error_code ignored;
+    fs::remove(file_, ignored);
+  }
+  Mark(const Mark&) = delete;
+  Mark& operator=(const Mark&) = delete;
+
+ private:
+  fs::path file_;
+};
 
 class Batch {
  public:
@@ -133,6 +149,7 @@ class Batch {
 
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
   fs::path recordOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".json"); }
+  fs::path markOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".begun"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
   /// In the list's order; what others are at work on at the end, as they end.
@@ -158,7 +175,7 @@ class Batch {
       throw Cancelled();
     const std::optional<Claim> claim = claims_.take(mesh.number);
     if (!claim) return false;
-    console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), mesh.surface);
+    console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), printable(mesh.surface));
     const auto start = std::chrono::steady_clock::now();
     const Made made = make(mesh, again);
     ++done_;
@@ -169,8 +186,13 @@ class Batch {
 
   Made make(const BatchMesh& mesh, bool again) {
     try {
-      if (auto field = finished(mesh)) return {again ? Status::elsewhere : Status::skipped, std::move(field)};
-      return {Status::built, built(mesh)};
+      sweep(mesh);
+      std::optional<CurrentField> field = finished(mesh);
+      const Status status = !field ? Status::built : again ? Status::elsewhere : Status::skipped;
+      if (!field) field = built(mesh);
+      std::error_code ignored;
+      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // of other options too: later it would stop a construction
+      return {status, std::move(field)};
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
@@ -194,19 +216,25 @@ class Batch {
     }
   }
 
-  /// The claim is ours: what others have left half-written is abandoned, whatever machine they were on.
+  /// The claim is ours: who left a mark has died, and what it left half-written is abandoned, whatever machine it was
+  /// on. Without a mark there is none, which saves a look through the whole folder.
+  void sweep(const BatchMesh& mesh) const {
+    if (!fs::exists(markOf(mesh))) return;
+    const fs::path output = outputOf(mesh);
+    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
+      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
+    fs::remove(markOf(mesh));
+  }
+
   CurrentField built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
-      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
+    const Mark mark(markOf(mesh));
     // before the mesh is read: if it changes in between, the next run sees that
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
     save(field, output);
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
-    std::error_code ignored;
-    fs::remove(checkpoint, ignored);
     return {std::move(field), output.string(), fs::file_size(output)};
   }
 
@@ -224,14 +252,14 @@ class Batch {
   }
 
   void tell(const BatchMesh& mesh, const Made& made, double seconds) const {
-    const std::string position = fmt::format("{} of {}", done_, meshes_.size());
+    const std::string position = fmt::format("{} of {}", done_, meshes_.size()), name = printable(mesh.surface);
     if (made.status == Status::failed) {
       // some errors speak of what is wrong alone
-      const bool named = made.error.find(mesh.surface) != std::string::npos;
-      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : mesh.surface + ": ",
-                                  printable(made.error));
+      const std::string error = printable(made.error);
+      const bool named = error.find(name) != std::string::npos;
+      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : name + ": ", error);
     } else {
-      console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, mesh.surface, statusName(made.status),
+      console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, name, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
     }
     console_.err << std::flush;
@@ -269,9 +297,13 @@ class Batch {
 std::vector<BatchMesh> readList(const Console& console, const std::string& list) {
   const bool typed = list == "-";
   std::string text = typed ? std::string(std::istreambuf_iterator<char>(console.in), {}) : readTextFile(list);
-  std::vector<BatchMesh> meshes = parseBatchList(text);
-  if (meshes.empty()) throw Error(fmt::format("{}: names no mesh; write one a line", typed ? "standard input" : list));
-  return meshes;
+  try {
+    std::vector<BatchMesh> meshes = parseBatchList(text);
+    if (meshes.empty()) throw Error("names no mesh; write one a line");
+    return meshes;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", typed ? "standard input" : list, error.what()));
+  }
 }
 
 }  // namespace

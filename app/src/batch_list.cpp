@@ -7,6 +7,7 @@
 #include <sstream>
 #include <unordered_set>
 
+#include "hpsdf/error.h"
 #include "summaries.h"
 
 namespace hpsdf::app {
@@ -37,7 +38,11 @@ std::vector<BatchMesh> parseBatchList(std::string_view text) {
   std::vector<BatchMesh> meshes;
   std::unordered_set<std::string> known;
   std::istringstream lines{std::string(text)};
+  std::size_t number = 0;
   for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (line.find('\0') != std::string::npos)
+      throw Error(fmt::format("line {} holds a zero byte: expected one name a line, in UTF-8", number));
     const std::string surface(trimmed(line));
     if (surface.empty() || surface.starts_with('#') || !known.insert(surface).second) continue;
     const std::uint64_t hash = XXH3_64bits(surface.data(), surface.size());

@@ -16,6 +16,7 @@ struct BatchMesh {
 
 /// What a list names, a mesh a line, each once; blanks around it do not count, nor do empty lines and those that begin
 /// with #. Names depend on the line alone, so that they stay when the list grows, and differ where lines do.
+/// Throws `Error` for a line with a zero byte, as of `find -print0` or in UTF-16: names would be lost.
 std::vector<BatchMesh> parseBatchList(std::string_view text);
 
 }  // namespace hpsdf::app

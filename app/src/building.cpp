@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -18,6 +19,7 @@
 #include "hpsdf/shapes.h"
 #include "long_work.h"
 #include "mesh_process.h"
+#include "printable.h"
 #include "progress_line.h"
 #include "summaries.h"
 
@@ -106,7 +108,7 @@ ImportedMesh readFile(const Console& console, const std::string& file) {
 /// Errors of the construction speak of options; the user thinks of the mesh.
 [[noreturn]] void rethrowNaming(const std::string& surface, const Error& error) {
   const std::string message = error.what();
-  if (message.find(surface) != std::string::npos) throw error;
+  if (printable(message).find(printable(surface)) != std::string::npos) throw error;  // some are printable already
   throw Error(surface + ": " + message);
 }
 
@@ -189,7 +191,7 @@ std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const
   requireMemory("the exact distance of " + grouped(prepared.mesh.triangles.size()) + " faces",
                 kBytesAFace * double(prepared.mesh.triangles.size()), "simplify the mesh first");
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
-  tellSign(console, surface, *prepared.report, exact->signChoice());
+  tellSign(console, printable(surface), *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
 }
 
@@ -342,9 +344,8 @@ std::vector<Parameter> buildParameters() {
        .help =
            "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it "
            "stops as soon as that is plain, and says how much. Left out: 1e8 besides that distance, some 240,000 "
-           "cells, "
-           "where the target error is left out too, for which most meshes take less than 100,000; else three quarters "
-           "of the machine's memory.",
+           "cells, where target error, grid and max-steps are left out too; most meshes take less than 100,000 then. "
+           "Else three quarters of the machine's memory, or of what its control group allows.",
        .unit = "bytes",
        .minimum = 1,
        .maximum = 1e15},
@@ -565,7 +566,9 @@ BuildOptions buildOptions(const Arguments& arguments) {
   requireOwner(arguments, "blend-width", "continuity exact", exact);
   requireOwner(arguments, "near-distance", "near-error", options.nearError > 0);
   if (arguments.given("max-steps")) options.maxSteps = static_cast<std::uint64_t>(arguments.number("max-steps"));
-  const bool untold = arguments.has("target-error") && !arguments.given("target-error") && !endsOtherwise;
+  const bool untold = arguments.has("target-error") && !endsOtherwise &&
+                      std::ranges::none_of(std::array{"target-error", "grid", "max-steps"},
+                                           [&](const char* name) { return arguments.given(name); });
   if (arguments.given("memory-limit"))
     options.memoryLimit = static_cast<std::uint64_t>(arguments.number("memory-limit"));
   else if (untold)

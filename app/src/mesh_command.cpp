@@ -309,12 +309,7 @@ Command meshCommand(const Registry& registry) {
                       .valueName = "PLACES",
                       .minimum = 1,
                       .maximum = 1e9},
-                     {.name = "seed",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Of the random places.",
-                      .defaultText = "1",
-                      .minimum = 0,
-                      .maximum = 9007199254740992}},
+                     seedParameter()},
       .action = runMesh,
       .check = checkMesh};
   std::ranges::move(meshLookParameters(registry), std::back_inserter(command.parameters));

@@ -1,15 +1,14 @@
 #include "hpsdf/memory.h"
 
-#include <unistd.h>
-
 #include <array>
 #include <cstdio>
 
 #include "hpsdf/error.h"
+#include "machine_memory.h"
 
 namespace hpsdf {
 
-double allowedMemory() { return 0.75 * double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)); }
+double allowedMemory() { return 0.75 * machineMemory(); }
 
 std::string bytesText(double bytes) {
   struct Unit {

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "batch_list.h"
+#include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "started_program.h"
 #include "support/temporary_directory.h"
@@ -67,6 +68,22 @@ TEST(BatchLists, holdAMeshALine) {
   EXPECT_THAT(surfacesIn("\xef\xbb\xbf# as some editors begin\na.obj\r\n"), ElementsAre("a.obj"));
   EXPECT_THAT(surfacesIn("a.obj\nb.obj\n a.obj\n"), ElementsAre("a.obj", "b.obj")) << "each once";
   EXPECT_THAT(surfacesIn(" \n\r\n# \n"), IsEmpty());
+}
+
+/// As `find -print0` and some editors write them.
+TEST(BatchLists, ofZeroBytesAreRefused) {
+  const auto complaint = [](std::string_view list) {
+    try {
+      parseBatchList(list);
+      return std::string();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  using namespace std::string_view_literals;
+  EXPECT_EQ(complaint("a.obj\0b.obj\0"sv), "line 1 holds a zero byte: expected one name a line, in UTF-8");
+  EXPECT_THAT(complaint("a.obj\n\n#\0\n"sv), StartsWith("line 3 holds a zero byte"));
+  EXPECT_THAT(complaint("\xff\xfe.\0/\0t\0.\0o\0b\0j\0\n\0"sv), StartsWith("line 1 holds a zero byte"));
 }
 
 TEST(BatchLists, namesAreSafeAndOfTheLineAlone) {
@@ -259,26 +276,57 @@ TEST_F(Batches, whatIsDamagedIsBuiltAnew) {
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
 }
 
-/// The file itself stays the same.
+/// The binary kind of a glTF file: its header, JSON and the first buffer as chunks.
+std::string binaryGltf(std::string json, const std::string& buffer) {
+  const auto words = [](const std::vector<std::uint32_t>& numbers) {
+    return std::string(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof numbers[0]);
+  };
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto jsonSize = std::uint32_t(json.size()), bufferSize = std::uint32_t(buffer.size());
+  return words({0x46546c67, 2, 28 + jsonSize + bufferSize, jsonSize, 0x4e4f534a}) + json +
+         words({bufferSize, 0x004e4942}) + buffer;
+}
+
+/// The files themselves stay the same.
 TEST_F(Batches, whatAGltfFileNamesCounts) {
   const auto corners = [&](float height) {
     const std::array<float, 12> numbers = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, height};
     writeFile(folder_ / "t.bin", {reinterpret_cast<const char*>(numbers.data()), sizeof numbers});
   };
-  writeFile(folder_ / "t.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-                                R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
-                                R"("buffers":[{"byteLength":48,"uri":"t.bin"},)"
-                                R"({"byteLength":12,"uri":"data:application/octet-stream;base64,AAIBAAEDAQIDAAMC"}],)"
-                                R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":1,"byteLength":12}],)"
-                                R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
-                                R"({"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}]})");
-  const Call call = batch("t.gltf\n", kCoarse);
+  const auto json = [](const std::string& faces) {
+    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+           R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+           R"("buffers":[{"byteLength":12)" +
+           faces +
+           R"(},{"byteLength":48,"uri":"t.bin"}],)"
+           R"("bufferViews":[{"buffer":1,"byteLength":48},{"buffer":0,"byteLength":12}],)"
+           R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+           R"({"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}]})";
+  };
+  writeFile(folder_ / "t.gltf", json(R"(,"uri":"data:application/octet-stream;base64,AAIBAAEDAQIDAAMC")"));
+  writeFile(folder_ / "b.glb", binaryGltf(json(""), {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}));
+  const Call call = batch("t.gltf\nb.glb\n", kCoarse);
   corners(1);
   const Outcome first = run(call);
-  EXPECT_THAT(statusesOf(first), ElementsAre("built")) << first.err;
-  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped"));
+  EXPECT_THAT(statusesOf(first), ElementsAre("built", "built")) << first.err;
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
   corners(2);
-  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "built"));
+}
+
+/// One that is built, with a word about its sign, one that is no mesh and one that is not there.
+TEST_F(Batches, namesMoveNoCursor) {
+  const std::string open = tetrahedron(1).substr(0, tetrahedron(1).rfind("f ")), clear = "\x1b[2J";
+  writeFile(folder_ / (clear + "open.obj"), open);
+  writeFile(folder_ / (clear + "bad.obj"), "this is no mesh\n");
+  const std::string list = clear + "open.obj\n" + clear + "bad.obj\n" + clear + "none.obj\n";
+  const Outcome outcome = run(batch(list, kCoarse));
+  EXPECT_THAT(statusesOf(outcome), ElementsAre("built", "failed", "failed"));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("\nhpsdf: error: 2 of 3:  [2Jbad.obj: "), HasSubstr("1 of 3:  [2Jopen.obj: ")));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("none.obj:  [2Jnone.obj: "))) << "once is enough";
+  EXPECT_EQ(linesOf(outcome)[0].at("file"), clear + "open.obj") << "as the list has it";
 }
 
 TEST_F(Batches, listsMayBeTyped) {
@@ -305,6 +353,7 @@ TEST_F(Batches, mistakesAreRefusedBeforeWork) {
   expectRefused({{"run", "-e", "build batch=list"}}, "give output");
   expectRefused({{"build", "--batch", at("none"), "-o", at("fields")}}, at("none") + ": no such file");
   expectRefused(batch("# none\n\n"), "list: names no mesh");
+  expectRefused(batch(std::string("builtin:box\0builtin:gear", 24)), "list: line 1 holds a zero byte");
   expectRefused(batch(list, {"--near-error", "1e-3"}), "near error and far error belong together");
   expectRefused(batch(list, {"--continuity-weight", "1"}), "continuity-weight belongs to");
   expectRefused(batch(list, {"--sign", "unsigned-shell"}), "thickness");
@@ -415,16 +464,43 @@ TEST_F(Batches, aCheckpointIsTakenOver) {
     ASSERT_FALSE(fs::exists(fieldOf(shape)));
   };
   kill();
+  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
+  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome other = run(batch(shape, options("1e-3")));
   EXPECT_EQ(other.status, 3);
   EXPECT_THAT(other.err, HasSubstr("is a checkpoint of a build with other options; delete it"));
-  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
-  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome outcome = run(batch(shape, options("1e-6")));
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr(".checkpoint, after "));
   EXPECT_TRUE(readFile(fieldOf(shape)) == loneBytes(shape, {"--target-error", "1e-6"}));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
+}
+
+/// Which takes long where many fields are.
+TEST_F(Batches, theFolderIsLookedThroughAfterADeathAlone) {
+  const std::string shape = "analytic:box";
+  const fs::path mark = fields() / ".batch" / (nameOf(shape) + ".begun"), half = fieldOf(shape).string() + ".part-1-0";
+  fs::create_directories(mark.parent_path());
+  writeFile(half, "half a fie");
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("built"));
+  EXPECT_TRUE(fs::exists(half)) << "nobody has looked";
+  EXPECT_FALSE(fs::exists(mark));
+  writeFile(mark, "");
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("skipped"));
+  EXPECT_FALSE(fs::exists(half));
+  EXPECT_FALSE(fs::exists(mark));
+}
+
+/// Kept by a process that was killed: neither does it stay for ever, nor does it stop a later one.
+TEST_F(Batches, aCheckpointGoesWhenTheFieldIsThere) {
+  const std::string shape = "analytic:box";
+  const fs::path state = fieldOf(shape).string() + ".checkpoint";
+  fs::create_directory(fields());
+  for (const char* status : {"built", "skipped"}) {
+    writeFile(state, "of other options\n");
+    EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre(status));
+    EXPECT_FALSE(fs::exists(state)) << status;
+  }
 }
 
 TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {

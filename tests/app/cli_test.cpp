@@ -57,6 +57,7 @@ using started::readFile;
 using started::run;
 using started::writeFile;
 using testing::AllOf;
+using testing::ContainsRegex;
 using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
@@ -241,6 +242,10 @@ TEST_F(Cli, memoryIsLimitedWhereNothingSaysHowFineToBe) {
   EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1.00 MB allowed"));
   EXPECT_FALSE(std::filesystem::exists(at("soup.hpsdf")));
   EXPECT_EQ(built({"--memory-limit", "1e8", "--target-error", "1"}).status, 0);
+  const Outcome small = run({{"build", "analytic:sphere", "-o", at("s.hpsdf"), "--grid", "1", "--target-error", "1e-14",
+                              "--memory-limit", "1e5"}});
+  EXPECT_EQ(small.status, 2);
+  EXPECT_THAT(small.err, ContainsRegex("about [0-9]+ cells and [0-9.]+ MB of memory are needed")) << "not 0.00 million";
 }
 
 TEST_F(Cli, memoryOfTheDistanceCountsWhereALimitIsGiven) {
@@ -1442,6 +1447,11 @@ TEST_F(Cli, badOptionsAreRefused) {
   expectRefused(build({"--grid", "0"}), "--grid: expected");
   expectRefused(build({"--grid", "100000"}), "builtin:torus: base grid 100000");
   expectRefused(build({"--grid", "2000000000"}), "base grid");
+  expectRefused(
+      build({"--grid", "100", "--memory-limit", "1e8"}),
+      "1e+06 cells and would need 330 MB, more than the 100 MB allowed: take at most 67 an axis, or allow more "
+      "memory");
+  expectRefused(build({"--grid", "800", "--memory-limit", "1e15"}), "base grid 800");
   expectRefused(build({"--max-degree", "31"}), "--max-degree: expected a whole number from 1 to 30");
   expectRefused(build({"--domain", "1,1,1,0,0,0"}), "expected lower corner");
   expectRefused(build({"--nearness", "nan"}), "--nearness");

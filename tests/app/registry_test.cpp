@@ -175,6 +175,9 @@ TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   EXPECT_EQ(limit(""), 100'000'000u);
   EXPECT_EQ(limit(" --target-error 1e-6"), std::nullopt);
   EXPECT_EQ(limit(" --max-error 1e-3"), std::nullopt);
+  EXPECT_EQ(limit(" --grid 100"), std::nullopt);
+  EXPECT_EQ(limit(" --max-steps 0"), std::nullopt);
+  EXPECT_EQ(limit(" --max-depth 3 --paper"), 100'000'000u);
   EXPECT_EQ(limit(" --memory-limit 3e9"), 3'000'000'000u);
   EXPECT_EQ(limit(" --memory-limit 3e9 --target-error 1e-6"), 3'000'000'000u);
 }

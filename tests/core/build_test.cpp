@@ -310,6 +310,7 @@ TEST(Build, SaysEarlyThatMemoryWillNotDo) {
     FAIL() << "it holds no more than a third";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("of memory are needed, more than the"));
+    EXPECT_THAT(error.what(), testing::StartsWith("about ")) << "it is read off how the error falls";
   }
   EXPECT_LT(taken.load(), all / 4) << "more than it takes to fill that third";
   options.memoryLimit = 10'000;

@@ -275,6 +275,8 @@ TEST(Sign, IsCheckedAgainstTheWholeSum) {
   const SignCheck alone = withThreads(1, [&] { return checkSign(mesh, byNormals, 4000); });
   EXPECT_EQ(alone.wrong, wrong.wrong);
   EXPECT_EQ(alone.worst, wrong.worst);
+  // it keeps none of the places: so many would not fit into any memory
+  EXPECT_THROW(checkSign(ball, ExactDistance(ball), 1'000'000'000'000'000, 1, {{}, [] { return true; }}), Cancelled);
 }
 
 TEST(Sign, IsCheckedOfAMeshThatLooksInwards) {

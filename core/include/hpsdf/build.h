@@ -75,9 +75,9 @@ struct BuildOptions {
   double blend = 0;     ///< exact continuity: `FieldData::blend` of the finished field, 0 to `kMaxBlend`
   bool bounds = false;  ///< for each leaf keeps what is certain of its error, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
-  /// Bytes that the growing octree and Φ (`DistanceFunction::bytes`) may take, by a generous estimate; nothing: three
-  /// quarters of the machine's memory. `build` throws when more are needed, and before, where the way in which the
-  /// error falls says that half as much again will be.
+  /// Bytes that the growing octree and Φ (`DistanceFunction::bytes`) may take, by a generous estimate; nothing:
+  /// `allowedMemory`, which is also the most. `build` throws when more are needed, and before, where the way in which
+  /// the error falls says that half as much again will be.
   std::optional<std::uint64_t> memoryLimit = {};
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };

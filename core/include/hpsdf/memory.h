@@ -6,7 +6,7 @@
 
 namespace hpsdf {
 
-/// Three quarters of the machine's, in bytes.
+/// Three quarters of the machine's, or of what control groups (Linux) leave this process, in bytes.
 double allowedMemory();
 
 /// In the unit that suits, such as "8.40 MB".

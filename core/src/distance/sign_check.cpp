@@ -1,9 +1,8 @@
 #include "hpsdf/sign_check.h"
 
-#include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numbers>
-#include <vector>
 
 #include "chunks.h"
 #include "distance/solid_angle.h"
@@ -27,6 +26,22 @@ Vector3 placeOf(const TriangleMesh& mesh, const Box& box, Random random, std::si
   return foot + random.inBall(0.01 * box.sizes().maxCoeff());
 }
 
+/// Of some of the places; the same in whatever order they are added.
+struct Tally {
+  std::size_t tooNear = 0;
+  std::size_t wrong = 0;
+  double depth = 0;       ///< of the wrong ones, the greatest
+  std::size_t worst = 0;  ///< the number of the first that is so deep
+
+  void add(const Tally& other) {
+    tooNear += other.tooNear;
+    wrong += other.wrong;
+    if (other.depth < depth || (other.depth == depth && other.worst >= worst)) return;
+    depth = other.depth;
+    worst = other.worst;
+  }
+};
+
 }  // namespace
 
 double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
@@ -44,30 +59,27 @@ SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std
   const double size = surface.sizes().maxCoeff();
   const Vector3 beyond = Vector3::Constant(0.1 * size);
   const Box box(surface.min() - beyond, surface.max() + beyond);
-  std::vector<Vector3> place(places);
-  std::vector<double> found(places);
-  std::vector<char> inside(places);
+  SignCheck check{.places = places, .nearest = 1e-6 * size};
+  Tally all;
+  std::mutex adding;
   forEachChunk(places, kTogether, progress, "asking all triangles",
                [&](std::size_t, std::size_t first, std::size_t count) {
+                 Tally tally;
                  for (std::size_t i = first; i < first + count; ++i) {
-                   place[i] = placeOf(mesh, box, Random(seed, i), i);
-                   found[i] = distance(place[i]);
-                   inside[i] = windingNumber(mesh, place[i]) > level;
+                   const Vector3 place = placeOf(mesh, box, Random(seed, i), i);
+                   const double found = distance(place), away = std::abs(found);
+                   if (!(away > check.nearest))
+                     tally.add({.tooNear = 1});
+                   else if ((found < 0) != (windingNumber(mesh, place) > level))
+                     tally.add({.wrong = 1, .depth = away, .worst = i});
                  }
+                 const std::lock_guard lock(adding);
+                 all.add(tally);
                });
-  SignCheck check{.places = places, .nearest = 1e-6 * size};
-  for (std::size_t i = 0; i < places; ++i) {
-    const double away = std::abs(found[i]);
-    if (!(away > check.nearest)) {
-      ++check.tooNear;
-    } else if ((found[i] < 0) != bool(inside[i])) {
-      ++check.wrong;
-      if (away > check.depth) {
-        check.depth = away;
-        check.worst = place[i];
-      }
-    }
-  }
+  check.tooNear = all.tooNear;
+  check.wrong = all.wrong;
+  check.depth = all.depth;
+  if (all.wrong > 0) check.worst = placeOf(mesh, box, Random(seed, all.worst), all.worst);
   return check;
 }
 

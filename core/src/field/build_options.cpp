@@ -26,6 +26,15 @@ double allowedMemory(const BuildOptions& options) {
   return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
+/// A number of cells that is about right.
+std::string cellsText(double cells) {
+  constexpr double kFew = 1e4;
+  std::ostringstream text;
+  text.precision(cells < kFew ? 0 : 2);
+  text << std::fixed << (cells < kFew ? cells : cells / 1e6) << (cells < kFew ? " cells" : " million cells");
+  return text.str();
+}
+
 // of the construction: a leaf's node, its queue entry, the vector of its fit, the final arrays
 constexpr double kBytesPerNode = 250;
 constexpr double kBytesPerCoefficient = 8;
@@ -33,12 +42,16 @@ constexpr double kBytesPerCoefficient = 8;
 void checkGridFitsMemory(const BuildOptions& options) {
   const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
   const double bytesPerCell = kBytesPerNode + kBytesPerCoefficient * coefficientCount(startDegree(options));
-  const double most =
-      std::min(allowedMemory(options) / bytesPerCell, 0xffffffff / double(coefficientCount(startDegree(options))));
-  if (cells > most)
-    refuse("base grid ", options.grid[0], " x ", options.grid[1], " x ", options.grid[2], " has ", cells,
-           " cells and would need ", bytesText(cells * bytesPerCell), "; memory allows at most ",
-           std::floor(std::cbrt(most)), " an axis");
+  const double allowed = allowedMemory(options), byMemory = allowed / bytesPerCell;
+  const double byNumbers = 0xffffffff / double(coefficientCount(startDegree(options)));
+  if (cells <= std::min(byMemory, byNumbers)) return;
+  std::ostringstream grid;
+  grid << "base grid " << options.grid[0] << " x " << options.grid[1] << " x " << options.grid[2] << " has " << cells
+       << " cells ";
+  if (byNumbers < byMemory)
+    refuse(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)), " an axis");
+  refuse(grid.str(), "and would need ", bytesText(cells * bytesPerCell), ", more than the ", bytesText(allowed),
+         " allowed: take at most ", std::floor(std::cbrt(byMemory)), " an axis, or allow more memory");
 }
 
 /// τ in the field's own units^5.
@@ -142,11 +155,9 @@ void checkFitsMemory(const Growth& growth, const BuildOptions& options) {
   const double bytes = kBytesPerNode * double(growth.nodes) + kBytesPerCoefficient * double(growth.coefficients);
   const double needed = held + bytes * growth.times;
   if (held + bytes <= most && needed <= kDoubt * most) return;
-  std::ostringstream cells;
-  cells.precision(2);
-  cells << std::fixed << double(growth.nodes) * growth.times / 1e6;
-  refuse("at least ", cells.str(), " million cells and ", bytesText(needed), " of memory are needed, more than the ",
-         bytesText(most), " allowed: take a larger target error or a lower maximum depth, or allow more memory");
+  refuse("about ", cellsText(double(growth.nodes) * growth.times), " and ", bytesText(needed),
+         " of memory are needed, more than the ", bytesText(most),
+         " allowed: take a larger target error or a lower maximum depth, or allow more memory");
 }
 
 double referenceLength(const Source& source, const Box& domain) {
