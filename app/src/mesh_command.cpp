@@ -203,17 +203,17 @@ void checkMesh(const Arguments& arguments) {
   requireOwner(arguments, "seed", "check-sign");
   requireOwner(arguments, "up", "picture");
   for (const char* name : kLooks) requireOwner(arguments, name, "picture");
-  if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
   if (!arguments.given("picture")) return;
   const std::string file = arguments.text("picture");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   cameraPicture(arguments);
   backend(arguments);
-  checkWritable(file);
 }
 
 void runMesh(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
+  if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
+  if (arguments.given("picture")) checkWritable(arguments.text("picture"));
   const Inspected found = inspected(session, arguments);
   const MeshReport& report = found.imported.report;
   std::optional<RepairedMesh> mended;

@@ -271,7 +271,7 @@ TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
   EXPECT_FALSE(refused(bounds, 1e30f));
   for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{2})) << flag;
   EXPECT_FALSE(refused(since + kSinceVersion3, Sign::shell));
-  EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{4})) << "sign";
+  EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{5})) << "sign";
 }
 
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
