@@ -695,9 +695,21 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
   }
 }
 
+MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
+  try {
+    const PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
+    if (prepared.analytic) throw Error(surface + ": an analytic shape has no mesh, and so no defects");
+    return findDefects(prepared.mesh, findCrossings(prepared.mesh));
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
 std::string surfaceFor(const Session& session, const Arguments& arguments) {
-  if (arguments.has("mesh")) return arguments.text("mesh");
-  const CurrentField& current = session.current();
+  return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(session.current());
+}
+
+std::string surfaceOf(const CurrentField& current) {
   const std::string& source = current.field.metadata().source.name;
   if (!current.surface.empty()) return current.surface;
   if (isShape(source)) return source;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/mesh_defects.h"
 #include "hpsdf/mesh_import.h"
 #include "session.h"
 
@@ -96,6 +97,13 @@ struct ReferenceSurface {
 
 /// Of a mesh file or a shape, for a field that was made from `source`. Throws `Error` naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
+
+/// What is wrong with the mesh `surface`, in the units of a field that was made from `source`. Throws `Error` naming
+/// it.
+MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
+
+/// The surface that a field was made from; throws `Error` where it does not say.
+std::string surfaceOf(const CurrentField& current);
 
 /// The surface that the argument `mesh` names, or the one that the current field itself names; throws `Error` where
 /// neither does.

@@ -132,8 +132,9 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence =
+  render::Evidence evidence =
       session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  if (arguments.given("defects")) evidence.defects = &session.defects(arguments.text("defects"));
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
@@ -578,7 +579,8 @@ void addPictureCommands(Registry& registry) {
                     "hpsdf render bunny.hpsdf -o scene.png --plane z --cells boxes --degrees 4-30 --color degree",
                     "hpsdf render bunny.hpsdf -o cells.png --surface=false --cells lines --depths 0-3",
                     "hpsdf render bunny.hpsdf -o gradients.png --arrows 32",
-                    "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1"},
+                    "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1",
+                    "hpsdf render chair.hpsdf -o defects.png --defects chair.obj"},
        .parameters =
            {fieldParameter(),
             {.name = "output", .type = ParameterType::outputPath, .help = "*.png.", .alias = 'o', .need = Need::always},
@@ -632,6 +634,11 @@ void addPictureCommands(Registry& registry) {
              .help = "Mark in magenta where the surface is torn: the field jumps over the distance drawn from one cell "
                      "to the next. The caption has the widest jump.",
              .defaultText = "false"},
+            {.name = "defects",
+             .type = ParameterType::text,
+             .help = "Mark where this mesh has defects, as 'mesh --picture' does: own for the one that the field was "
+                     "made from, where that is known.",
+             .valueName = "MESH|own"},
             {.name = "surface",
              .type = ParameterType::flag,
              .help = "Whether the surface is drawn: without it, planes and cells can be looked at alone.",

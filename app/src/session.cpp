@@ -28,6 +28,7 @@ Explorer& Session::explorer() {
 
 void Session::setField(CurrentField field) {
   renderer_.reset();
+  defects_.reset();
   jumps_.reset();
   exact_.reset();
   given_.reset();
@@ -89,6 +90,15 @@ render::Evidence Session::evidence(render::ColorBy color, const std::string& sur
     evidence.other = &this->other(other).field;
   }
   return evidence;
+}
+
+const MeshDefects& Session::defects(const std::string& surface) {
+  if (!defects_ || surface != defectsOf_) {
+    defects_ =
+        meshDefects(console_, surface == "own" ? surfaceOf(current()) : surface, current().field.metadata().source);
+    defectsOf_ = surface;
+  }
+  return *defects_;
 }
 
 Session::Other& Session::keptOther(const std::string& file) {

@@ -121,6 +121,10 @@ class Session {
   /// of the file `other`, read once. Good until it is asked for again.
   render::Evidence evidence(render::ColorBy color, const std::string& surface, const std::string& other = "");
 
+  /// What is wrong with the mesh `surface`, in the units of the current field; "own": the one that it was made from.
+  /// Kept. Throws `Error` when it is not to be had.
+  const MeshDefects& defects(const std::string& surface);
+
   /// The renderer of the current field: kept, since its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
   /// Description of the one asked for last; "" before that.
@@ -135,6 +139,8 @@ class Session {
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
   std::optional<Jumps> jumps_;           // of the current field
   std::optional<render::Drawn> picture_;
+  std::optional<MeshDefects> defects_;
+  std::string defectsOf_;                          ///< their mesh, as it was asked for
   std::vector<std::unique_ptr<Other>> others_;     // last asked for first; their renderers refer to them
   std::shared_ptr<const DistanceFunction> exact_;  // of the field's own surface
   std::shared_ptr<const DistanceFunction> given_;  // of a surface that was asked for by its name

@@ -16,6 +16,7 @@
 #include "describe.h"
 #include "hpsdf/error.h"
 #include "legend.h"
+#include "marks.h"
 #include "picture_parts.h"
 #include "quantity.h"
 #include "section.h"
@@ -480,6 +481,11 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (picture.cracks) {
     markCracks(image, buffers, sampling);
     details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
+  }
+  if (evidence.defects) {
+    paintDefects(image, view.camera, buffers, samples, evidence.defects->found, sampling.lineWidth);
+    for (const Swatch& swatch : defectSwatches(*evidence.defects))
+      details.push_back(swatch.count + " " + swatch.names[0]);
   }
   addArrows(image, frame, field, view, buffers, samples, picture.arrows);
   addBodyDetails(picture.bodies, details);

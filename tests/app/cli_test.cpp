@@ -245,7 +245,7 @@ TEST_F(Cli, memoryIsLimitedWhereNothingSaysHowFineToBe) {
   const Outcome small = run({{"build", "analytic:sphere", "-o", at("s.hpsdf"), "--grid", "1", "--target-error", "1e-14",
                               "--memory-limit", "1e5"}});
   EXPECT_EQ(small.status, 2);
-  EXPECT_THAT(small.err, ContainsRegex("about [0-9]+ cells and [0-9.]+ MB of memory are needed")) << "not 0.00 million";
+  EXPECT_THAT(small.err, ContainsRegex("about [0-9]+ cells and [0-9.]+ kB of memory are needed")) << "not 0.00 million";
 }
 
 TEST_F(Cli, memoryOfTheDistanceCountsWhereALimitIsGiven) {

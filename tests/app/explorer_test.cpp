@@ -13,7 +13,9 @@
 #include "commands.h"
 #include "explorer/raster.h"
 #include "hpsdf/error.h"
+#include "hpsdf/mesh_export.h"
 #include "script.h"
+#include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
 
@@ -52,7 +54,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
   Bench bench;
   bench.run(std::string(kTorus) +
             "camera 41.3,-17.25,0.7 target=0.1,0.2,-0.05 up=z projection=orthographic\n"
-            "surface offset=0.03125 cracks=true clip=y clip-offset=0.1 shown=false\n"
+            "surface offset=0.03125 cracks=true defects=builtin:box clip=y clip-offset=0.1 shown=false\n"
             "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
@@ -77,6 +79,25 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
       "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
   other.run(script);
   EXPECT_TRUE(other.view() == wanted);
+}
+
+TEST(Explorer, defectsOfTheMeshAreMarked) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string open = (folder.path() / "open.obj").string();
+  saveMesh(support::openBox(), open);
+  bench.run("build " + open + " target-error=1e-2; show cpu=true size=900x600; camera 30,40,1.1 up=z");
+  const render::Image plain = bench.explorer().frame();
+  bench.run("surface defects=own");
+  const render::Image marked = bench.explorer().frame();
+  EXPECT_FALSE(same(plain, marked));
+  EXPECT_THAT(bench.explorer().picture()->details, testing::Contains("4 boundary edges"));
+  EXPECT_THAT(bench.failure("surface defects=nowhere.obj"), HasSubstr("nowhere.obj"));
+  EXPECT_TRUE(same(bench.explorer().frame(), marked));
+  bench.run("surface defects=none");
+  EXPECT_TRUE(same(bench.explorer().frame(), plain));
+  bench.run("build analytic:torus target-error=1e-3");
+  EXPECT_THAT(bench.failure("surface defects=own"), HasSubstr("an analytic shape has no mesh"));
 }
 
 TEST(Explorer, whatIsShownIsUndoneAndDoneAgainStepByStep) {

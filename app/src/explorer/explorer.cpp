@@ -339,6 +339,7 @@ void Explorer::drawPicture(int shrink) {
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
   render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
+  if (!view_.slice && !view_.defects.empty()) evidence.defects = &session_.defects(view_.defects);
   const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
   const auto levels = [&](const FieldStatistics& all) {
     for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)

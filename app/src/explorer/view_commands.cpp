@@ -70,6 +70,10 @@ void runSurface(Session& session, const Arguments& arguments) {
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
   if (arguments.given("shown")) view.surface = arguments.flag("shown");
   if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
+  if (arguments.given("defects")) {
+    view.defects = textOrNone(arguments, "defects");
+    if (!view.defects.empty()) session.defects(view.defects);  // an unreadable one shows now
+  }
   if (arguments.given("clip")) {
     const std::string axis = arguments.text("clip");
     if (axis == "none")
@@ -379,6 +383,11 @@ Command surfaceCommand() {
                          {.name = "cracks",
                           .type = ParameterType::flag,
                           .help = "Mark where the surface is torn at a face between two cells."},
+                         {.name = "defects",
+                          .type = ParameterType::text,
+                          .help = "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that "
+                                  "the field was made from.",
+                          .valueName = "MESH|own|none"},
                          {.name = "clip",
                           .type = ParameterType::choice,
                           .help = "Cut across this axis; the half towards the camera is left out.",

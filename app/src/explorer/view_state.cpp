@@ -30,8 +30,9 @@ std::string cameraLine(const render::OrbitCamera& camera) {
 }
 
 std::string surfaceLine(const ViewState& view) {
-  std::string line = fmt::format("surface shown={} offset={} cracks={} clip={}", view.surface, view.surfaceOffset,
-                                 view.cracks, view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
+  std::string line =
+      fmt::format("surface shown={} offset={} cracks={} defects={} clip={}", view.surface, view.surfaceOffset,
+                  view.cracks, wordOrNone(view.defects), view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
   if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
   return line + "\n";
 }

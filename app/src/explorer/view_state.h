@@ -38,7 +38,8 @@ struct ViewState {
   double surfaceOffset = 0;
   std::optional<render::ClipPlane> clip;
   bool cracks = false;
-  bool surface = true;  ///< drawn
+  std::string defects = {};  ///< the mesh whose defects are marked, or "own"; empty for none
+  bool surface = true;       ///< drawn
   render::ShownCells cells;
   int arrows = 0;  ///< pixels apart; 0: none
 

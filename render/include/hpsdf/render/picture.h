@@ -12,6 +12,7 @@
 #include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/mesh_defects.h"
 #include "hpsdf/render/bodies.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/renderer.h"
@@ -40,6 +41,8 @@ struct Evidence {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;
   const Field* other = nullptr;  ///< g; outside its domain its continuation counts
+  /// Of the mesh, in the field's units: marked on a surface, as in a picture of the mesh alone (mesh_picture.h).
+  const MeshDefects* defects = nullptr;
 };
 
 /// What colours stand for, so that pictures of several views or fields can be compared.
