@@ -165,12 +165,18 @@ class Groups {
 
 Color defectColor(DefectKind kind) { return kStyles[static_cast<std::size_t>(kind)].color; }
 
+std::vector<Legend::Defects> defectLegend(const MeshDefects& defects) {
+  std::vector<Legend::Defects> legend;
+  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
+    if (defects.counts[kind] > 0) legend.push_back({kStyles[kind].names[0], defects.counts[kind], kStyles[kind].color});
+  return legend;
+}
+
 std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
   std::vector<Swatch> swatches;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
-    if (defects.counts[kind] > 0)
-      swatches.push_back(
-          {{kStyles[kind].names[0], kStyles[kind].names[1]}, formatCount(defects.counts[kind]), kStyles[kind].color});
+    if (const auto& [names, color] = kStyles[kind]; defects.counts[kind] > 0)
+      swatches.push_back({{names[0], names[1]}, formatCount(defects.counts[kind]), color});
   return swatches;
 }
 

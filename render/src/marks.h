@@ -2,9 +2,11 @@
 // Where a mesh has defects, over a finished view.
 
 #include <span>
+#include <vector>
 
 #include "hpsdf/mesh_defects.h"
 #include "hpsdf/render/image.h"
+#include "hpsdf/render/picture.h"
 #include "hpsdf/render/view.h"
 #include "legend.h"
 
@@ -13,7 +15,9 @@ namespace hpsdf::render {
 /// Kinds are told apart on clay.
 Color defectColor(DefectKind kind);
 
-/// "boundary edges", with their counts, of those that there are.
+/// Those that there are.
+std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);
+/// The same for a panel beside the view.
 std::vector<Swatch> defectSwatches(const MeshDefects& defects);
 
 /// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Faint where

@@ -484,8 +484,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   }
   if (evidence.defects) {
     paintDefects(image, view.camera, buffers, samples, evidence.defects->found, sampling.lineWidth);
-    for (const Swatch& swatch : defectSwatches(*evidence.defects))
-      details.push_back(swatch.count + " " + swatch.names[0]);
+    legend.defects = defectLegend(*evidence.defects);
+    for (const auto& [name, count, color] : legend.defects) details.push_back(name + ": " + formatCount(count));
   }
   addArrows(image, frame, field, view, buffers, samples, picture.arrows);
   addBodyDetails(picture.bodies, details);

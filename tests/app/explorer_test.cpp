@@ -91,7 +91,7 @@ TEST(Explorer, defectsOfTheMeshAreMarked) {
   bench.run("surface defects=own");
   const render::Image marked = bench.explorer().frame();
   EXPECT_FALSE(same(plain, marked));
-  EXPECT_THAT(bench.explorer().picture()->details, testing::Contains("4 boundary edges"));
+  EXPECT_THAT(bench.explorer().picture()->details, testing::Contains("boundary edges: 4"));
   EXPECT_THAT(bench.failure("surface defects=nowhere.obj"), HasSubstr("nowhere.obj"));
   EXPECT_TRUE(same(bench.explorer().frame(), marked));
   bench.run("surface defects=none");

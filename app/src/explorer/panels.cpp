@@ -308,11 +308,24 @@ void drawColorBar(const render::Legend& legend) {
   ImGui::Dummy({widthLeft(), height + 20});
 }
 
+void drawDefectSwatches(const std::vector<render::Legend::Defects>& defects) {
+  constexpr float kRow = 18, kSide = 10;
+  for (const auto& [name, count, color] : defects) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const ImVec2 from = cursor();
+    list.AddRectFilled(from, {from.x + kSide, from.y + kSide}, IM_COL32(60, 64, 78, 255));
+    list.AddRectFilled({from.x + 1, from.y + 1}, {from.x + kSide - 1, from.y + kSide - 1}, packed(color));
+    textAt(from.x + kSide + 8, from.y - 2, name + ": " + grouped(count), IM_COL32(32, 34, 44, 255));
+    ImGui::Dummy({widthLeft(), kRow});
+  }
+}
+
 void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
   if (!picture) return;
   const render::Legend& legend = picture->legend;
+  drawDefectSwatches(legend.defects);
   if (legend.title.empty()) {
-    ui.text("light only: choose a color", true);
+    if (legend.defects.empty()) ui.text("light only: choose a color", true);
     return;
   }
   ui.text(legend.title);

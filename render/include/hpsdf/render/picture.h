@@ -155,6 +155,12 @@ struct Legend {
   std::vector<Level> levels = {};  ///< ascending; of colours by degree or depth
   std::vector<Color> bar = {};     ///< from its low end to its high end; of all others
   std::vector<Mark> marks = {};
+  struct Defects {
+    std::string name;  ///< "boundary edges"
+    std::size_t count;
+    Color color;
+  };
+  std::vector<Defects> defects = {};  ///< of the mesh, where they are marked
 };
 
 /// A finished picture and the view in it.
