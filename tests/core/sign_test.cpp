@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "distance/hole_rims.h"
 #include "distance/solid_angle.h"
 #include "distance/winding.h"
 #include "hpsdf/build.h"
@@ -26,6 +27,7 @@ namespace hpsdf {
 namespace {
 
 using distance::Hierarchy;
+using distance::HoleRims;
 using distance::Winding;
 using support::boxOfTwo;
 using support::joined;
@@ -88,6 +90,73 @@ TEST(Winding, EstimatesAreAsNearAsTheySay) {
     }
     EXPECT_TRUE(mesh.triangles.size() < 1000 || greatest > 1e-9) << "clusters are not taken at all";
   }
+}
+
+/// Every so many of its faces are gone.
+TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
+  std::vector<std::array<std::uint32_t, 3>> left;
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+    if (f % every != 0) left.push_back(mesh.triangles[f]);
+  mesh.triangles = std::move(left);
+  return mesh;
+}
+
+TEST(Winding, GradientsAreAsNearAsTheySay) {
+  const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
+  const Hierarchy hierarchy(withHoles(sphere, 7), boundingBox(sphere));
+  const HoleRims rims(hierarchy);
+  ASSERT_GT(rims.size(), 1000u);
+  double greatest = 0;
+  std::size_t terms = 0;
+  for (const Vector3& x : placesIn(boundingBox(sphere), 200)) {
+    const Vector3 local = hierarchy.local(x);
+    const HoleRims::Gradient exact = rims.gradient(local, 0);
+    EXPECT_EQ(exact.terms, rims.size());
+    EXPECT_EQ(exact.error, 0);
+    for (const double error : {1.0, 1e-2, 1e-4}) {
+      const HoleRims::Gradient found = rims.gradient(local, error);
+      EXPECT_LE(found.error, error);
+      EXPECT_LE((found.value - exact.value).norm(), found.error + 1e-9);
+      EXPECT_GE(found.change, exact.change * (1 - 1e-9));
+      EXPECT_LE(found.nearest, exact.nearest * (1 + 1e-9));
+      if (error == 1) {
+        terms += found.terms;
+        greatest = std::max(greatest, (found.value - exact.value).norm());
+      }
+    }
+  }
+  EXPECT_LT(terms, 200 * rims.size() / 5) << "clusters hardly stand for their sides";
+  EXPECT_GT(greatest, 1e-6) << "clusters are not taken at all";
+}
+
+TEST(Winding, GradientsAreHowItChanges) {
+  const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
+  const TriangleMesh mesh = withHoles(sphere, 7);
+  const Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const HoleRims rims(hierarchy);
+  const double step = 1e-4;
+  int tried = 0;
+  for (const Vector3& x : placesIn(boundingBox(mesh), 20)) {
+    const HoleRims::Gradient found = rims.gradient(hierarchy.local(x), 1e-4);
+    if (found.nearest < 0.1) continue;
+    ++tried;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 aside = step * Vector3::Unit(k);
+      const double change = (sumOfAngles(mesh, x + aside) - sumOfAngles(mesh, x - aside)) / (2 * step);
+      EXPECT_NEAR(found.value[k] * hierarchy.scale(), change, 2e-4);
+    }
+  }
+  EXPECT_GT(tried, 5);
+}
+
+/// Few sides are summed one by one, whatever error is allowed.
+TEST(Winding, GradientsOfFewRimsAreExact) {
+  const TriangleMesh mesh = openBox();
+  const Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const HoleRims rims(hierarchy);
+  const HoleRims::Gradient found = rims.gradient({100, 0, 0}, HUGE_VAL);
+  EXPECT_EQ(found.error, 0);
+  EXPECT_EQ(found.terms, rims.size());
 }
 
 TEST(Sign, OfAClosedMeshIsThePseudonormals) {
@@ -212,7 +281,8 @@ TEST(Sign, AFieldOfAnOpenMeshChasesNoJump) {
 
 TEST(Sign, OneAndManyAreTheSameToTheBit) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
-  for (const TriangleMesh& mesh : {openBox(), joined(ball, moved(ball, {1, 0, 0}))}) {
+  const TriangleMesh torn = withHoles(shapes::mesh("builtin:sphere,subdivisions=4"), 7);
+  for (const TriangleMesh& mesh : {openBox(), torn, joined(ball, moved(ball, {1, 0, 0}))}) {
     const ExactDistance distance(mesh, kAutomatic);
     ASSERT_EQ(distance.signChoice().sign, Sign::winding);
     for (const double size : {2.0, 0.3, 0.01}) {  // of the places' box: the smaller, the more they tell each other

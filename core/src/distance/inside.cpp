@@ -16,6 +16,9 @@ namespace {
 constexpr std::size_t kTogether = 512;  // points that learn from each other
 /// So exact a winding number tells how far a hole's patch is: less would be noise that refinement chases.
 constexpr double kExact = 2e-3;
+/// So exact a change of the winding number over the distance to the triangles mostly tells that no patch is nearer, and
+/// so exact a one adds little to that noise.
+constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
 
 /// By their order; what is no number comes last.
 std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
@@ -67,22 +70,26 @@ Inside::Known Inside::find(const Vector3& x, double free, double distance) const
   if (!std::isfinite(distance)) return {x, 0, distance, false, 0, 0, 0, 0};
   if (rims_.empty()) return {x, free, distance, winding_.inside(x, level_), 0.5, 0, 0, HUGE_VAL};
   const double scale = hierarchy_->scale();
-  const HoleRims::Gradient rims = rims_.gradient(hierarchy_->local(x));
-  const double gradient = rims.value.norm() * scale;
+  const auto gradientTo = [&](double change) {
+    return rims_.gradient(hierarchy_->local(x), change / (distance * scale));
+  };
+  HoleRims::Gradient rims = gradientTo(kRoughChange);
   const auto away = [&](const Winding::Estimate& found) { return std::abs(found.value - level_); };
-  const Winding::Estimate found = winding_.within(x, kExact, [&](const Winding::Estimate& estimate) {
-    return away(estimate) - estimate.error > 1.01 * gradient * distance;
-  });
+  const auto isFar = [&](const Winding::Estimate& found) {
+    return away(found) - found.error > 1.01 * (rims.value.norm() + rims.error) * scale * distance;
+  };
+  const Winding::Estimate found = winding_.within(x, kExact, isFar);
+  if (!isFar(found) && rims.error > 0) rims = gradientTo(kExactChange);
   const bool inside = away(found) > found.error ? found.value > level_ : winding_.inside(x, level_);
-  const double toPatch = away(found) / gradient;
+  const double gradient = rims.value.norm() * scale, toPatch = away(found) / gradient;
   return {x,
           free,
           toPatch < distance ? toPatch : distance,
           inside,
           away(found) - found.error,
-          gradient,
+          gradient + rims.error * scale,
           rims.change * scale * scale,
-          rims.nearest / scale};
+          std::max(rims.nearest / scale, free)};
 }
 
 void Inside::sign(std::span<const Vector3> points, std::span<const double> free, std::span<double> distances) const {
