@@ -1,0 +1,52 @@
+// Inside or outside by the winding number: the hierarchy against the sum over all faces, and what it costs a
+// construction.
+
+#include "distance/winding.h"
+#include "hpsdf/sign_check.h"
+#include "scene.h"
+
+namespace hpsdf::bench {
+namespace {
+
+void allFaces(benchmark::State& state) {
+  const std::vector<Vector3> points = uniformPoints(100);
+  timeEach(state, points.size(), [&] {
+    for (const Vector3& x : points) benchmark::DoNotOptimize(windingNumber(bunny(), x) > 0.5);
+  });
+}
+
+void byHierarchy(benchmark::State& state) {
+  static const distance::Hierarchy hierarchy(bunny(), boundingBox(bunny()));
+  static const distance::Winding winding(hierarchy);
+  const std::vector<Vector3> points = uniformPoints(10'000);
+  timeEach(state, points.size(), [&] {
+    for (const Vector3& x : points) benchmark::DoNotOptimize(winding.inside(x));
+  });
+}
+
+void construction(benchmark::State& state, Sign sign) {
+  const BuildOptions options{.targetError = 1e-6};
+  for ([[maybe_unused]] auto _ : state)
+    benchmark::DoNotOptimize(build(ExactDistance(bunny(), {.sign = sign}), paperDomain(), options));
+}
+
+BENCHMARK(allFaces)->Name("winding/all_faces");
+BENCHMARK(byHierarchy)->Name("winding/ours");
+BENCHMARK_CAPTURE(construction, normals, Sign::pseudonormal)
+    ->Name("winding/build_normals")
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(1);
+BENCHMARK_CAPTURE(construction, winding, Sign::winding)
+    ->Name("winding/build")
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(1);
+BENCHMARK_CAPTURE(construction, automatic, Sign::automatic)
+    ->Name("winding/build_auto")
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(1);
+
+}  // namespace
+}  // namespace hpsdf::bench
