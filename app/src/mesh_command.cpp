@@ -22,6 +22,7 @@
 #include "hpsdf/sign_check.h"
 #include "long_work.h"
 #include "pictures.h"
+#include "printable.h"
 #include "summaries.h"
 
 namespace hpsdf::app {
@@ -120,13 +121,13 @@ std::string verdictText(const MeshReport& report, const MeshDefects& defects) {
              : text;
 }
 
-std::string placeText(const Defect& defect) {
-  return isPlace(defect) ? vectorText(defect.ends[0])
-                         : vectorText(defect.ends[0]) + " to " + vectorText(defect.ends[1]);
+std::string placeText(const Defect& defect, const Box& mesh) {
+  const std::string from = vectorText(defect.ends[0], mesh);
+  return isPlace(defect) ? from : from + " to " + vectorText(defect.ends[1], mesh);
 }
 
 /// A row for each kind that there is, with its first places.
-std::string defectsText(const MeshDefects& defects) {
+std::string defectsText(const MeshDefects& defects, const Box& mesh) {
   std::string text;
   for (std::size_t i = 0; i < kDefectKinds; ++i) {
     if (defects.counts[i] == 0) continue;
@@ -136,7 +137,7 @@ std::string defectsText(const MeshDefects& defects) {
           (defects.allCrossings ? "" : "at least ") + row + (defects.counts[i] == 1 ? " pair" : " pairs") + " of faces";
     std::string places;
     for (const Defect& defect : firstOf(defects, DefectKind(i), kPlacesInText))
-      places += (places.empty() ? ", as at " : "; ") + placeText(defect);
+      places += (places.empty() ? ", as at " : "; ") + placeText(defect, mesh);
     text += summaryRow(kKinds[i].text, row + places);
   }
   return text;
@@ -180,7 +181,7 @@ std::string repairText(const RepairedMesh& mended, const std::string& file) {
   std::string text = summaryRow("repaired", done.empty() ? "nothing to do" : done);
   if (mended.leftEdges > 0)
     text += summaryRow("left", countOf(mended.leftEdges, "edge", "edges") + " of surfaces that have one side only");
-  return text + summaryRow("written", file + ": " + closednessText(report));
+  return text + summaryRow("written", printable(file) + ": " + closednessText(report));
 }
 
 /// Draws the mesh with its defects.
@@ -216,12 +217,12 @@ void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("picture")) checkWritable(arguments.text("picture"));
   const Inspected found = inspected(session, arguments);
   const MeshReport& report = found.imported.report;
+  if (arguments.given("picture")) drawPicture(session, arguments, found);
   std::optional<RepairedMesh> mended;
   if (arguments.given("repair")) {
     mended = repaired(found.imported);
     saveMesh(mended->imported.mesh, arguments.text("repair"));
   }
-  if (arguments.given("picture")) drawPicture(session, arguments, found);
   if (session.wantsJson(arguments)) {
     Json json = meshJson(surface, report);
     json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
@@ -233,12 +234,14 @@ void runMesh(Session& session, const Arguments& arguments) {
     if (arguments.given("picture")) json["picture"] = arguments.text("picture");
     printJson(session.console().out, json);
   } else {
-    session.console().out << meshText(surface, report) << spacingText(surface, found.imported.mesh)
-                          << defectsText(found.defects) << summaryRow("verdict", verdictText(report, found.defects))
+    session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
+                          << defectsText(found.defects, report.box)
+                          << summaryRow("verdict", verdictText(report, found.defects))
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "")
                           << (mended ? repairText(*mended, arguments.text("repair")) : "")
-                          << (arguments.given("picture") ? summaryRow("picture", arguments.text("picture")) : "");
+                          << (arguments.given("picture") ? summaryRow("picture", printable(arguments.text("picture")))
+                                                         : "");
   }
   if (found.check && found.check->wrong > 0)
     throw Failed(fmt::format("{}: {} of {} signs are wrong", surface, found.check->wrong, found.check->places));

@@ -50,15 +50,14 @@ Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
 
-std::string boxText(const Box& box) {
+std::string vectorText(const Vector3& v, const Box& box) {
   const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
   const double size = box.sizes().maxCoeff();
   const int more = size > 0 && largest > size ? int(std::log10(largest / size)) : 0;
-  const auto corner = [&](const Vector3& v) {
-    return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + more, 17), v.x(), v.y(), v.z());
-  };
-  return corner(box.min()) + " to " + corner(box.max());
+  return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + more, 17), v.x(), v.y(), v.z());
 }
+
+std::string boxText(const Box& box) { return vectorText(box.min(), box) + " to " + vectorText(box.max(), box); }
 
 std::string summaryRow(std::string_view label, const std::string& value) {
   return fmt::format("  {:<22} {}\n", label, value);

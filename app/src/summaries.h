@@ -45,6 +45,8 @@ std::string shortNumber(double number);
 Json vectorJson(const Vector3& v);
 /// "(0.1, 0.2, 0.3)"
 std::string vectorText(const Vector3& v);
+/// With as many digits more as a place in a box far from the origin needs.
+std::string vectorText(const Vector3& v, const Box& box);
 /// "(0, 0, 0) to (1, 2, 3)", with as many digits more as it lies farther from the origin than it is long.
 std::string boxText(const Box& box);
 

@@ -52,7 +52,7 @@ void checkVertices(const TriangleMesh& mesh, std::span<const Vector3> vertices) 
   const auto wrong = std::ranges::find_if_not(vertices, isPlace);
   if (wrong != vertices.end())
     throw Error(nameOf(mesh) + " has a vertex, " + std::to_string(wrong - vertices.begin()) +
-                ", that is not finite or beyond 1e15: give finite coordinates");
+                ", that is not finite or beyond 1e15: scale the mesh to be drawn");
 }
 
 void checkMesh(const TriangleMesh& mesh) {

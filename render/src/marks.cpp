@@ -63,8 +63,18 @@ class Painter {
     const int y1 = end(std::max(from.y(), to.y()), buffers_.height / samples_);
     const Eigen::Vector2d along = to - from;
     const double squared = along.squaredNorm();
-    for (int y = first(std::min(from.y(), to.y())); y < y1; ++y)
-      for (int x = first(std::min(from.x(), to.x())); x < x1; ++x) {
+    for (int y = first(std::min(from.y(), to.y())); y < y1; ++y) {
+      // of the segment, what is no farther above or below the row than the stroke reaches
+      double begin = 0, last = 1;
+      if (along.y() != 0) {
+        const auto [low, high] =
+            std::minmax({(y + 0.5 - reach - from.y()) / along.y(), (y + 0.5 + reach - from.y()) / along.y()});
+        begin = std::clamp(low, 0.0, 1.0);
+        last = std::clamp(high, 0.0, 1.0);
+      }
+      const double xBegin = from.x() + begin * along.x(), xLast = from.x() + last * along.x();
+      const int rowEnd = std::min(x1, end(std::max(xBegin, xLast), x1));
+      for (int x = first(std::min(xBegin, xLast)); x < rowEnd; ++x) {
         const Eigen::Vector2d middle(x + 0.5, y + 0.5);
         const double t = squared > 0 ? std::clamp((middle - from).dot(along) / squared, 0.0, 1.0) : 0.0;
         const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
@@ -74,6 +84,7 @@ class Painter {
         Color& pixel = picture_.at(x, y);
         pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
       }
+    }
   }
 
   /// A ring is where its middle is.
@@ -126,8 +137,8 @@ class Groups {
 
  private:
   void add(const PicturePoint& p) {
-    const int column = int(std::floor(p.x / kGroupCell)), row = int(std::floor(p.y / kGroupCell));
-    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
+    if (!(p.x >= 0 && p.y >= 0 && p.x < columns_ * kGroupCell && p.y < rows_ * kGroupCell)) return;
+    const int column = int(p.x) / kGroupCell, row = int(p.y) / kGroupCell;
     Cell& cell = here_[std::size_t(row) * columns_ + column];
     if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
     cell.used = true;

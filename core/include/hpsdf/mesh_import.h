@@ -32,7 +32,7 @@ ImportedMesh cleaned(TriangleMesh mesh);
 ///
 /// It reads within the caller's process, without a limit of time or memory, and what brings assimp down brings that
 /// process down: a deeply nested glTF file its stack, others its asserts, which are on in Debian. Some files keep it,
-/// or the cutting of a face with very many corners that crosses itself, busy for minutes. For files from strangers do
+/// or the cutting of a face with very many corners, above all one that crosses itself, busy for minutes. For files from strangers do
 /// as the program `hpsdf` does, and read in a process of its own.
 ///
 /// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, beyond float's range or too

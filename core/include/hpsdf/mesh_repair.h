@@ -16,8 +16,9 @@ struct RepairedMesh {
 /// Turns triangles so that inside and outside are told consistently. Positions stay, no triangle is added or left out.
 ///
 /// Patches are what hangs together by edges of two triangles. Within each, all look the way of the greater part of its
-/// area. A closed patch that looks inwards is turned unless it is a cavity: one within an odd number of other closed
-/// ones. An open patch is turned when its volume is negative and plain, as of the whole mesh in `cleaned`.
+/// area; one that has one side only, as a Möbius strip, stays as it is. A closed patch that looks inwards is turned
+/// unless it is a cavity: one within an odd number of other closed ones. An open patch is turned when its volume is
+/// negative and plain, as of the whole mesh in `cleaned`.
 RepairedMesh repaired(ImportedMesh imported);
 
 }  // namespace hpsdf

@@ -56,13 +56,13 @@ std::vector<Patch> measured(const TriangleMesh& mesh, const Patches& patches, st
   return found;
 }
 
-/// Makes the triangles of each patch look one way; how many were turned.
+/// Makes the triangles of each patch look one way, but for those that cannot; how many were turned.
 std::size_t agree(TriangleMesh& mesh, const Patches& patches, const std::vector<Patch>& found) {
   std::size_t turned = 0;
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
     const Patch& patch = found[patches.of[f]];
     const char minority = patch.areaAgainst <= patch.area / 2 ? 1 : 0;
-    if (patches.against[f] != minority) continue;
+    if (patches.oneSided[patches.of[f]] || patches.against[f] != minority) continue;
     turn(mesh, f);
     ++turned;
   }
@@ -114,7 +114,6 @@ RepairedMesh repaired(ImportedMesh imported) {
   std::vector<Patch> found = measured(mesh, patches, sides);
   RepairedMesh result;
   result.turnedFaces = agree(mesh, patches, found);
-  result.leftEdges = patches.torn;
   addVolumes(mesh, patches, found);
   for (Patch& patch : found) patch.turned = looksInward(patch.volume, patch.area, patch.box, patch.closed);
   TriangleMesh outward = mesh;
@@ -127,6 +126,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   imported.report.inconsistentEdges = now.inconsistentEdges;  // nothing else depends on which way faces look
   imported.report.unbalancedEdges = now.unbalancedEdges;
   imported.report.volume = now.volume;
+  result.leftEdges = now.inconsistentEdges;
   result.imported = std::move(imported);
   return result;
 }

@@ -65,7 +65,7 @@ MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings) {
   const std::vector<Side> sides = sidesByEdge(mesh.triangles);
   MeshDefects defects;
   defects.allCrossings = crossings.all;
-  defects.orientable = patchesOf(mesh.triangles.size(), sides).torn == 0;
+  defects.orientable = std::ranges::count(patchesOf(mesh.triangles.size(), sides).oneSided, 1) == 0;
   addEdges(mesh, sides, defects.found);
   addPinched(mesh, sides, defects.found);
 

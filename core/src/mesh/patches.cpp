@@ -29,11 +29,13 @@ Patches patchesOf(std::size_t faces, std::span<const Side> sides) {
   });
 
   constexpr std::uint32_t kNone = 0xffffffff;
-  Patches patches{.of = std::vector<std::uint32_t>(faces, kNone), .against = std::vector<char>(faces, 0)};
+  Patches patches{
+      .of = std::vector<std::uint32_t>(faces, kNone), .against = std::vector<char>(faces, 0), .oneSided = {}};
   std::vector<std::uint32_t> pending;
   for (std::uint32_t lowest = 0; lowest < faces; ++lowest) {
     if (patches.of[lowest] != kNone) continue;
     const auto patch = static_cast<std::uint32_t>(patches.count++);
+    patches.oneSided.push_back(0);
     patches.of[lowest] = patch;
     pending.push_back(lowest);
     while (!pending.empty()) {
@@ -47,8 +49,8 @@ Patches patchesOf(std::size_t faces, std::span<const Side> sides) {
           patches.of[other] = patch;
           patches.against[other] = against;
           pending.push_back(other);
-        } else if (patches.against[other] != against && face < other) {
-          ++patches.torn;
+        } else if (patches.against[other] != against) {
+          patches.oneSided[patch] = 1;
         }
       }
     }

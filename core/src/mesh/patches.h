@@ -15,7 +15,7 @@ struct Patches {
   std::size_t count = 0;
   std::vector<std::uint32_t> of;  ///< each face's, numbered by their lowest faces
   std::vector<char> against;      ///< 1 for faces that look the other way than their patch's lowest face
-  std::size_t torn = 0;           ///< edges of two faces that go on looking different ways then: of one-sided patches
+  std::vector<char> oneSided;     ///< 1 for patches whose faces cannot be made to agree
 };
 
 /// `sides`: by edge, of so many faces.
