@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <vector>
 
 #include "hpsdf/build.h"
@@ -22,23 +21,13 @@ namespace {
 using support::boxOfTwo;
 using support::joined;
 using support::moved;
+using support::placesIn;
 
 const DistanceOptions kHull{.sign = Sign::hull}, kWinding{.sign = Sign::winding};
 
 TriangleMesh twoBalls() {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=4");
   return joined(ball, moved(ball, {1, 0, 0}));
-}
-
-std::vector<Vector3> placesIn(const Box& box, int count) {
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> u(-0.1, 1.1);
-  std::vector<Vector3> places(static_cast<std::size_t>(count));
-  for (Vector3& x : places) {
-    const double a = u(random), b = u(random), c = u(random);
-    x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
-  }
-  return places;
 }
 
 /// Within the union of two unit balls, a unit apart along x: to the nearer of the caps that are outside, or to the
@@ -61,7 +50,7 @@ TEST(Hull, OfTwoBallsIsTheirUnions) {
   EXPECT_EQ(hull.source().fingerprint, plain.source().fingerprint);
   EXPECT_EQ(hull.source().faces, mesh.triangles.size());
   std::size_t inside = 0, deeper = 0;
-  for (const Vector3& x : placesIn(boundingBox(mesh), 4000)) {
+  for (const Vector3& x : placesIn(boundingBox(mesh), 4000, 3)) {
     const double found = hull(x), before = plain(x);
     ASSERT_EQ(found < 0, before < 0);
     if (found >= 0) {
@@ -81,7 +70,7 @@ TEST(Hull, OfTwoBallsIsTheirUnions) {
 TEST(Hull, OfAMeshWithoutWallsIsTheMesh) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
   const ExactDistance hull(mesh, kHull), plain(mesh);
-  for (const Vector3& x : placesIn(boundingBox(mesh), 500)) EXPECT_EQ(hull(x), plain(x));
+  for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_EQ(hull(x), plain(x));
 }
 
 /// A wall in one plane with another is cut along the other's sides.
@@ -110,7 +99,7 @@ TEST(Hull, OfOpenBodiesHasTheSameSign) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(support::openAbove(ball, 0.8), moved(ball, {0.7, 0, 0}));
   const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
-  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000);
+  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000, 3);
   std::vector<double> together(places.size());
   hull(places, together);
   std::size_t deeper = 0;
@@ -127,7 +116,7 @@ TEST(Hull, OfOpenBodiesHasTheSameSign) {
 TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull);
-  for (const Vector3& x : placesIn(boundingBox(mesh), 300)) {
+  for (const Vector3& x : placesIn(boundingBox(mesh), 300, 3)) {
     const ClosestPoint closest = hull.closestPoint(x);
     ASSERT_LT(closest.triangle, mesh.triangles.size());
     const TriangleMesh one{.vertices = mesh.vertices, .triangles = {mesh.triangles[closest.triangle]}, .name = {}};

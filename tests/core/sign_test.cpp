@@ -33,6 +33,7 @@ using support::boxOfTwo;
 using support::joined;
 using support::moved;
 using support::openBox;
+using support::placesIn;
 using support::turned;
 
 /// The winding number by all triangles, each an integral of its own: the solid angle from the three angles between the
@@ -54,17 +55,6 @@ double sumOfAngles(const TriangleMesh& mesh, const Vector3& x) {
     sum += volume > 0 ? angles : -angles;
   }
   return double(sum / (4 * std::numbers::pi_v<long double>));
-}
-
-std::vector<Vector3> placesIn(const Box& box, int count, std::uint64_t seed = 1) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> u(-0.1, 1.1);
-  std::vector<Vector3> places(static_cast<std::size_t>(count));
-  for (Vector3& x : places) {
-    const double a = u(random), b = u(random), c = u(random);
-    x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
-  }
-  return places;
 }
 
 const DistanceOptions kAutomatic{.sign = Sign::automatic};

@@ -1,9 +1,11 @@
 #pragma once
-// Meshes made of others.
+// Meshes made of others, and places to ask in and around them.
 
 #include <algorithm>
 #include <cstdint>
+#include <random>
 #include <utility>
+#include <vector>
 
 #include "hpsdf/shapes.h"
 #include "hpsdf/triangle_mesh.h"
@@ -40,5 +42,17 @@ inline TriangleMesh boxOfTwo() { return shapes::mesh("box,width=2,height=2,depth
 
 /// The same without its upper side.
 inline TriangleMesh openBox() { return openAbove(boxOfTwo(), 0.999); }
+
+/// In a box and a little around it.
+inline std::vector<Vector3> placesIn(const Box& box, int count, std::uint64_t seed = 1) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> u(-0.1, 1.1);
+  std::vector<Vector3> places(static_cast<std::size_t>(count));
+  for (Vector3& x : places) {
+    const double a = u(random), b = u(random), c = u(random);
+    x = box.min() + box.sizes().cwiseProduct(Vector3(a, b, c));
+  }
+  return places;
+}
 
 }  // namespace hpsdf::support
