@@ -112,12 +112,6 @@ ImportedMesh readFile(const Console& console, const std::string& file) {
   throw Error(surface + ": " + message);
 }
 
-/// An option that says nothing without another is a mistake.
-void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given) {
-  if (arguments.given(name) && !given)
-    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
-}
-
 /// A surface as a field is made from it.
 struct PreparedSurface {
   std::optional<DistanceFunction> analytic;  ///< else the mesh
@@ -575,6 +569,11 @@ BuildOptions buildOptions(const Arguments& arguments) {
     options.memoryLimit = kMemoryUnlessTold;
   options.threads = arguments.whole("threads");
   return options;
+}
+
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given) {
+  if (arguments.given(name) && !given)
+    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
 }
 
 void requireConsistent(const Arguments& arguments) {

@@ -38,6 +38,10 @@ BuildOptions buildOptions(const Arguments& arguments);
 /// Throws `Error` for arguments of `buildParameters` that no surface could be built with.
 void requireConsistent(const Arguments& arguments);
 
+/// An option that says nothing without another is a mistake. `owner` names that other, `given` tells whether it is
+/// there. Throws `Error`.
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given);
+
 /// Whether what a construction comes to depends on a parameter of `buildParameters`.
 bool decides(const Parameter& parameter);
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,11 +64,9 @@ Inspected inspected(Session& session, const Arguments& arguments) {
 bool isPlace(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
 
 /// Those of a kind, the first ones.
-std::vector<Defect> firstOf(const MeshDefects& defects, DefectKind kind, std::size_t limit) {
-  std::vector<Defect> first;
-  for (const Defect& defect : defects.found)
-    if (defect.kind == kind && first.size() < limit) first.push_back(defect);
-  return first;
+std::span<const Defect> firstOf(const MeshDefects& defects, DefectKind kind, std::size_t limit) {
+  const std::span<const Defect> all = defects.of(kind);
+  return all.first(std::min(limit, all.size()));
 }
 
 Json defectsJson(const MeshDefects& defects, std::size_t limit) {
@@ -194,17 +193,12 @@ void drawPicture(Session& session, const Arguments& arguments, const Inspected& 
   session.setLastRenderer(renderer->description());
 }
 
-/// An option that says nothing without another is a mistake.
-void requireOwner(const Arguments& arguments, const char* name, const char* owner) {
-  if (arguments.given(name) && !arguments.given(owner))
-    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
-}
-
 void checkMesh(const Arguments& arguments) {
-  requireOwner(arguments, "seed", "check-sign");
-  requireOwner(arguments, "up", "picture");
-  for (const char* name : kLooks) requireOwner(arguments, name, "picture");
-  if (!arguments.given("picture")) return;
+  const bool draws = arguments.given("picture");
+  requireOwner(arguments, "seed", "check-sign", arguments.given("check-sign"));
+  requireOwner(arguments, "up", "picture", draws);
+  for (const char* name : kLooks) requireOwner(arguments, name, "picture", draws);
+  if (!draws) return;
   const std::string file = arguments.text("picture");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   cameraPicture(arguments);

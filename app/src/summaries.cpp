@@ -189,7 +189,7 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   if (report.unreferencedVertices > 0)
     text += summaryRow("unused", grouped(report.unreferencedVertices) + " vertices dropped");
   const auto dropped = [&](const char* kind, std::size_t faces, const Vector3& place) {
-    if (faces > 0) text += summaryRow(kind, grouped(faces) + " faces dropped, as at " + vectorText(place));
+    if (faces > 0) text += summaryRow(kind, grouped(faces) + " faces dropped, as at " + vectorText(place, report.box));
   };
   dropped("degenerate", report.degenerateFaces, report.degeneratePlace);
   if (report.flippedFaces > 0)

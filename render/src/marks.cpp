@@ -18,9 +18,10 @@ constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface ma
 constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
 constexpr double kDotRadius = 2.6;
 constexpr double kCasingBorder = 0.9;
-constexpr double kSmallGroup = 16;  // pixels: what is no larger gets a ring
-constexpr double kLeastRing = 9;    // pixels, its radius
-constexpr int kGroupCell = 8;       // pixels: what lies in neighbouring cells of this size is one group
+constexpr double kSmallGroup = 16;     // pixels: what is no larger gets a ring
+constexpr double kLeastRing = 9;       // pixels, its radius
+constexpr double kNearestMark = 1e-3;  // before the eye, of how far away an edge's other end is
+constexpr int kGroupCell = 8;          // pixels: what lies in neighbouring cells of this size is one group
 
 struct Style {
   std::array<const char*, 2> names;
@@ -31,6 +32,13 @@ constexpr std::array<Style, kDefectKinds> kStyles = {{{{"boundary edges", "bound
                                                       {{"inconsistent edges", "inconsistent"}, {0, 176, 80}},
                                                       {{"pinched vertices", "pinched"}, {255, 255, 255}},
                                                       {{"pairs of faces that meet", "pairs meet"}, {232, 24, 24}}}};
+
+/// Calls visit(style, count) for each kind that there is.
+template <typename Visit>
+void forEachKind(const MeshDefects& defects, const Visit& visit) {
+  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
+    if (defects.counts[kind] > 0) visit(kStyles[kind], defects.counts[kind]);
+}
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
 
@@ -172,37 +180,49 @@ class Groups {
   std::vector<Cell> here_;
 };
 
+/// The ends of what of a segment is before the eye; behind it where nothing is.
+std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
+  const auto place = [&](const Vector3& point) { return project(camera, point, width, height); };
+  PicturePoint from = place(ends[0]), to = place(ends[1]);
+  const double nearest = kNearestMark * std::max(from.depth, to.depth);
+  if (!(nearest > 0)) return {from, from};
+  const auto share = [&](double depth, double other) { return (nearest - depth) / (other - depth); };
+  const Vector3 along = ends[1] - ends[0];
+  if (from.depth < nearest) return {place(ends[0] + share(from.depth, to.depth) * along), to};
+  if (to.depth < nearest) return {from, place(ends[1] - share(to.depth, from.depth) * along)};
+  return {from, to};
+}
+
 }  // namespace
 
 Color defectColor(DefectKind kind) { return kStyles[static_cast<std::size_t>(kind)].color; }
 
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects) {
   std::vector<Legend::Defects> legend;
-  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
-    if (defects.counts[kind] > 0) legend.push_back({kStyles[kind].names[0], defects.counts[kind], kStyles[kind].color});
+  forEachKind(defects, [&](const Style& style, std::size_t count) {
+    legend.push_back({style.names[0], count, style.color});
+  });
   return legend;
 }
 
 std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
   std::vector<Swatch> swatches;
-  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
-    if (const auto& [names, color] = kStyles[kind]; defects.counts[kind] > 0)
-      swatches.push_back({{names[0], names[1]}, formatCount(defects.counts[kind]), color});
+  forEachKind(defects, [&](const Style& style, std::size_t count) {
+    swatches.push_back({{style.names[0], style.names[1]}, formatCount(count), style.color});
+  });
   return swatches;
 }
 
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
-                  std::span<const Defect> defects, double lineWidth) {
+                  const MeshDefects& defects, double lineWidth) {
   const int width = buffers.width / samples, height = buffers.height / samples;
   std::vector<Stroke> strokes;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
     Groups groups(width, height);
     const Color color = kStyles[kind].color;
-    for (const Defect& defect : defects) {
-      if (defect.kind != DefectKind(kind)) continue;
-      const PicturePoint from = project(camera, defect.ends[0], width, height);
-      const PicturePoint to = project(camera, defect.ends[1], width, height);
-      if (!(from.depth > 0) || !(to.depth > 0)) continue;
+    for (const Defect& defect : defects.of(DefectKind(kind))) {
+      const auto [from, to] = beforeEye(camera, defect.ends, width, height);
+      if (!(from.depth > 0)) continue;
       const double tolerance = kHiddenBeyond * pixelSize(camera, std::max(from.depth, to.depth), height);
       groups.add(from, to);
       if (isEdge(defect.kind))

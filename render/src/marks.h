@@ -1,7 +1,8 @@
 #pragma once
 // Where a mesh has defects, over a finished view.
 
-#include <span>
+#include <array>
+#include <string>
 #include <vector>
 
 #include "hpsdf/mesh_defects.h"
@@ -11,6 +12,9 @@
 #include "legend.h"
 
 namespace hpsdf::render {
+
+/// Of a panel; the first that fits is taken.
+inline const std::array<std::string, 2> kDefectTitles = {"Defects of the mesh", "Defects"};
 
 /// Kinds are told apart on clay.
 Color defectColor(DefectKind kind);
@@ -23,6 +27,6 @@ std::vector<Swatch> defectSwatches(const MeshDefects& defects);
 /// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Faint where
 /// something in the buffers hides it. The view lies in the picture's upper left corner.
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
-                  std::span<const Defect> defects, double lineWidth);
+                  const MeshDefects& defects, double lineWidth);
 
 }  // namespace hpsdf::render

@@ -24,9 +24,8 @@ constexpr Color kCrossing = {214, 70, 58};
 /// For each triangle, whether it meets another.
 std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
   std::vector<char> result(mesh.triangles.size(), 0);
-  for (const Defect& defect : defects.found)
-    if (defect.kind == DefectKind::crossing)
-      for (const std::uint32_t face : defect.faces) result[face] = 1;
+  for (const Defect& defect : defects.of(DefectKind::crossing))
+    for (const std::uint32_t face : defect.faces) result[face] = 1;
   return result;
 }
 
@@ -72,11 +71,10 @@ Image drawMesh(BodyRenderer& renderer, const TriangleMesh& mesh, const MeshDefec
   const Sampling sampling{samples, lineWidthOf(frame), 1};
   const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
   place(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
-  paintDefects(image, camera, buffers, samples, defects.found, sampling.lineWidth);
+  paintDefects(image, camera, buffers, samples, defects, sampling.lineWidth);
 
   Furniture furniture;
-  const std::array<std::string, 2> titles = {"Defects of the mesh", "Defects"};
-  addSwatches(furniture, frame, titles, swatchesOf(defects));
+  addSwatches(furniture, frame, kDefectTitles, swatchesOf(defects));
   const std::array<std::string, 3> details = {formatCount(mesh.triangles.size()) + " faces",
                                               formatCount(mesh.vertices.size()) + " vertices",
                                               "camera " + formatNumber(picture.camera.azimuthDegrees) + "°, " +

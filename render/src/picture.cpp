@@ -467,7 +467,10 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     colorScene(quantityColors(measured.values, measured.scale));
     details = {titlesOf(picture.color).back() + onSurface, describeGreatest(measured.values)};
   } else if (picture.color == ColorBy::normal) {
-    addFieldFacts(furniture, frame, field, figures);
+    if (evidence.defects)
+      addSwatches(furniture, frame, kDefectTitles, defectSwatches(*evidence.defects));
+    else
+      addFieldFacts(furniture, frame, field, figures);
     colorScene({});
     if (picture.surface) details = {surface};
   } else {
@@ -483,7 +486,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   }
   if (evidence.defects) {
-    paintDefects(image, view.camera, buffers, samples, evidence.defects->found, sampling.lineWidth);
+    paintDefects(image, view.camera, buffers, samples, *evidence.defects, sampling.lineWidth);
     legend.defects = defectLegend(*evidence.defects);
     for (const auto& [name, count, color] : legend.defects) details.push_back(name + ": " + formatCount(count));
   }

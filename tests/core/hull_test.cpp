@@ -12,6 +12,7 @@
 
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_import.h"
 #include "hpsdf/sign_check.h"
 #include "support/made_meshes.h"
 
@@ -83,6 +84,15 @@ TEST(Hull, LeavesOutTheWallBetweenBodiesThatTouch) {
   EXPECT_NEAR(hull(Vector3(1, 0.52, 0)), 0, 1e-12);
   EXPECT_NEAR(hull(Vector3(1.1, 0, 0)), -0.5, 0.02);
   EXPECT_EQ(checkSign(mesh, hull, 4000).wrong, 0u);
+}
+
+TEST(Hull, LeavesOutWallsThatBodiesHaveInCommon) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i) mesh = joined(mesh, moved(boxOfTwo(), 2 * Vector3(i & 1, i >> 1 & 1, i >> 2)));
+  mesh = cleaned(mesh).mesh;
+  const ExactDistance hull(mesh, kHull), plain(mesh), whole(moved(boxOfTwo(), {1, 1, 1}, 2));
+  for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_NEAR(hull(x), whole(x), 1e-12);
+  EXPECT_EQ(plain(Vector3(1, 0.5, 0.2)), 0) << "else this tells nothing";
 }
 
 TEST(Hull, KeepsOneTriangleThatIsPartlyOutside) {

@@ -196,6 +196,43 @@ TEST(MeshCleanup, DropsFacesOverTheSameCornersWhicheverWayTheyLook) {
   EXPECT_TRUE(report.closed());
 }
 
+TEST(MeshCleanup, KeepsBothFacesOfAWallBetweenBodiesThatTouch) {
+  TriangleMesh cubes = joined(cube(), cube(1, {2, 0, 0}));
+  for (const Vector3& center : {Vector3(0, 2, 0), Vector3(2, 2, 0), Vector3(0, 0, 2)})
+    cubes = joined(cubes, cube(1, center));
+  const auto [clean, report] = cleaned(cubes);
+  EXPECT_EQ(clean.triangles.size(), 5 * 12u);
+  EXPECT_EQ(report.duplicateFaces, 0u);
+  EXPECT_EQ(report.boundaryEdges, 0u);
+  EXPECT_EQ(report.unbalancedEdges, 0u);
+  EXPECT_DOUBLE_EQ(report.volume, 5 * 8);
+
+  const auto [again, twice] = cleaned(joined(cubes, cubes));
+  EXPECT_EQ(again.triangles, clean.triangles);
+  EXPECT_EQ(twice.duplicateFaces, 5 * 12u);
+}
+
+TEST(MeshCleanup, OfASurfaceGivenWithBothSidesTheFirstStays) {
+  for (const TriangleMesh& one : {cube(), turned(cube())}) {
+    const auto [clean, report] = cleaned(joined(one, turned(one)));
+    EXPECT_EQ(clean.triangles, cube().triangles);
+    EXPECT_EQ(report.duplicateFaces, 12u);
+    EXPECT_TRUE(report.closed());
+  }
+  // a lid with both sides, without which the edges around it have no other face
+  TriangleMesh lid = cube(), box = cube();
+  lid.triangles.erase(lid.triangles.begin(), lid.triangles.begin() + 10);
+  box.triangles.resize(10);
+  const auto [closed, report] = cleaned(joined(joined(box, lid), turned(lid)));
+  EXPECT_EQ(closed.triangles, cube().triangles);
+  EXPECT_TRUE(report.closed());
+}
+
+TEST(MeshCleanup, OfUnequalNumbersEitherWayMostWin) {
+  EXPECT_EQ(cleaned(joined(joined(turned(cube()), cube()), cube())).mesh.triangles, cube().triangles);
+  EXPECT_FALSE(cleaned(joined(joined(turned(cube()), cube()), cube())).report.turned);
+}
+
 TEST(MeshCleanup, SizeDoesNotMatter) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(0.9, 1.1);

@@ -678,7 +678,7 @@ INSTANTIATE_TEST_SUITE_P(
                       KnownMesh{"broken/suzanne.obj", 505, 968, false, 3, 42, 0, 0, 0, 0, false},
                       KnownMesh{"broken/mp_bed.obj", 7113, 14042, false, 11, 187, 10, 2, 41, 0, false},
                       KnownMesh{"broken/chair_model.obj", 3158, 12756, false, 3, 10, 51, 0, 0, 6382, true},
-                      KnownMesh{"broken/joined_tetrahedra.obj", 5, 8, false, 1, 0, 3, 0, 0, 1, false},
+                      KnownMesh{"broken/joined_tetrahedra.obj", 5, 8, false, 1, 0, 3, 0, 0, 0, false},
                       KnownMesh{"broken/boxNotManifold.obj", 9, 12, false, 1, 4, 0, 0, 0, 0, false},
                       KnownMesh{"broken/featuretype.STL", 2010, 3476, false, 1, 576, 0, 0, 0, 0, false},
                       KnownMesh{"broken/wallhole.obj", 35, 66, true, 1, 0, 0, 0, 0, 0, false},

@@ -95,6 +95,20 @@ TEST(MeshPicture, DrawsEdgesInTheirColourAndFaintlyWhereHidden) {
   EXPECT_LT(hidden, plain - 20) << "not seen at all";
 }
 
+TEST(MeshPicture, DrawsEdgesThatBeginBehindTheEye) {
+  const TriangleMesh open = openBox();
+  MeshPicture within = pictureFrom(0, 10);
+  within.camera.target = Vector3(0.8, 0, 1.1);
+  within.camera.distance = 0.05;
+  const PixelRect view = frame(kWidth, kHeight).view;
+  const Camera camera = cameraOf(within.camera, domainAround(open), view.width(), view.height());
+  ASSERT_LT(project(camera, {1, -1, 1}, view.width(), view.height()).depth, 0);
+  ASSERT_GT(project(camera, {1, 1, 1}, view.width(), view.height()).depth, 0);
+  const Color yellow = defectColor(DefectKind::boundaryEdge);
+  for (const double y : {0.3, 0.6, 0.9})
+    EXPECT_LT(nearestTo(yellow, drawn(open, within), open, within, {1, y, 1}), 150) << y;
+}
+
 TEST(MeshPicture, RingsWhatIsSmall) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=5");
   const MeshPicture front = pictureFrom(0, 0);

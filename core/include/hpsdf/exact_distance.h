@@ -33,7 +33,7 @@ struct DistanceOptions {
 /// Which sign distances have, and why.
 struct SignChoice {
   Sign sign = Sign::pseudonormal;  ///< never automatic
-  std::string reason = {};         ///< half a sentence, such as "the mesh is closed and does not meet itself"
+  std::string reason = {};         ///< half a sentence, such as "the mesh has no holes and does not meet itself"
 };
 
 /// Exact signed distance to a triangle mesh in double precision.

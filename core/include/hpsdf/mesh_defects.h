@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "hpsdf/crossings.h"
@@ -30,11 +31,14 @@ struct MeshDefects {
   std::vector<Defect> found;  ///< by kind; edges and vertices by their indices, crossings by their triangles
   std::array<std::size_t, kDefectKinds> counts = {};
   bool allCrossings = true;
-  std::size_t crossingsWithinParts = 0;  ///< of triangles that hang together over edges: the surface folds into itself
+  /// Of triangles that hang together over edges: the surface folds into itself. But for walls that bodies share, of two
+  /// triangles over the same corners.
+  std::size_t crossingsWithinParts = 0;
   /// Faces can be turned until no edge is inconsistent.
   bool orientable = true;
 
   std::size_t count(DefectKind kind) const { return counts[static_cast<std::size_t>(kind)]; }
+  std::span<const Defect> of(DefectKind kind) const;
 };
 
 /// Everything about a mesh that a solid's surface would not have, with its places. Corners are the same where their

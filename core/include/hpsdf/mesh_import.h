@@ -18,9 +18,10 @@ constexpr double kLargestCoordinate = 1e100;
 
 /// Welds equal positions, drops degenerate and duplicate faces and unused vertices (a face on one line that keeps its
 /// neighbours connected is mended by an edge flip instead: dropping it would open the mesh), and turns the *whole* mesh
-/// when its signed volume is negative (never part by part: a cavity's faces look inward on purpose). Throws `Error` for
-/// indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or when no face with an area
-/// is left.
+/// when its signed volume is negative (never part by part: a cavity's faces look inward on purpose). Of a wall that two
+/// bodies share both faces stay, one each way, so that each body is closed; of a surface given with both its sides one
+/// does. Throws `Error` for indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or
+/// when no face with an area is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
 /// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,
@@ -32,8 +33,8 @@ ImportedMesh cleaned(TriangleMesh mesh);
 ///
 /// It reads within the caller's process, without a limit of time or memory, and what brings assimp down brings that
 /// process down: a deeply nested glTF file its stack, others its asserts, which are on in Debian. Some files keep it,
-/// or the cutting of a face with very many corners, above all one that crosses itself, busy for minutes. For files from strangers do
-/// as the program `hpsdf` does, and read in a process of its own.
+/// or the cutting of a face with very many corners, above all one that crosses itself, busy for minutes. For files from
+/// strangers do as the program `hpsdf` does, and read in a process of its own.
 ///
 /// Throws `Error` naming the file: missing, a directory, unreadable, empty, not a mesh, beyond float's range or too
 /// small for it, or without area.

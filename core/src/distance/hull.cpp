@@ -10,6 +10,7 @@
 #include "distance/crossings.h"
 #include "hpsdf/error.h"
 #include "hpsdf/hull.h"
+#include "mesh/duplicates.h"
 #include "mesh/message_prefix.h"
 
 namespace hpsdf::distance {
@@ -133,6 +134,7 @@ std::vector<Piece> piecesOf(const Hierarchy& hierarchy, const TriangleMesh& mesh
     crossers.clear();
     for (; next != pairs.end() && (*next)[0] == t; ++next) {
       const std::uint32_t other = (*next)[1];
+      if (areTwins(mesh.triangles[t], mesh.triangles[other])) continue;  // cuts nothing of it
       crossers.push_back({other, cornersOf(other), lieInOnePlane(corners, cornersOf(other))});
     }
     leaveOutInnerSides(mesh, pairs, crossers);

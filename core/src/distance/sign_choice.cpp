@@ -23,9 +23,12 @@ constexpr int kLattice = 16;  // places along each axis
 /// Of coordinates of order 1: of two triangles nearer than that, distances may round to be the same.
 constexpr double kTooNear = 0x1p-44;
 
-std::string textOf(const Vector3& x) {
+/// With so many digits that places of the mesh are told apart, far from the origin, too.
+std::string textOf(const Vector3& x, const Box& mesh) {
+  const double largest = std::max(mesh.min().cwiseAbs().maxCoeff(), mesh.max().cwiseAbs().maxCoeff());
+  const double size = mesh.sizes().maxCoeff();
   std::ostringstream text;
-  text.precision(4);
+  text.precision(size > 0 ? std::clamp(4 + int(std::log10(largest / size)), 4, 17) : 4);
   text << "(" << x.x() << ", " << x.y() << ", " << x.z() << ")";
   return text.str();
 }
@@ -93,19 +96,20 @@ std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const Trian
   // All that follows is about what rounds: normals would then speak of another surface.
   const auto thin = std::ranges::find_if_not(hierarchy.frames(), hasArea);
   if (thin != hierarchy.frames().end())
-    return byWinding("a face is thinner than what coordinates round, as at " + textOf(thin->origin),
+    return byWinding("a face is thinner than what coordinates round, as at " + textOf(thin->origin, box),
                      Inside(hierarchy, mesh, std::move(rims)));
   if (const Crossings crossings = findCrossings(hierarchy, 1, kTooNear); !crossings.found.empty())
-    return byWinding("the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place),
-                     Inside(hierarchy, mesh, std::move(rims)));
+    return byWinding(
+        "the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place, box),
+        Inside(hierarchy, mesh, std::move(rims)));
   const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
   if (pieces.size() > 1) {
     Inside inside(hierarchy, mesh, std::move(rims));
     if (const auto place = misplaced(hierarchy, pieces, inside))
-      return byWinding("a part looks the wrong way, or lies within another, as at " + textOf(*place),
+      return byWinding("a part looks the wrong way, or lies within another, as at " + textOf(*place, box),
                        std::move(inside));
   }
-  return {SignChoice{Sign::pseudonormal, "the mesh is closed and does not meet itself"}, Inside()};
+  return {SignChoice{Sign::pseudonormal, "the mesh has no holes and does not meet itself"}, Inside()};
 }
 
 }  // namespace hpsdf::distance

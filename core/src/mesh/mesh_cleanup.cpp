@@ -7,13 +7,13 @@
 #include <limits>
 #include <string>
 #include <unordered_map>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_import.h"
 #include "mesh/collinear_faces.h"
+#include "mesh/duplicates.h"
 #include "mesh/looks_inward.h"
 #include "mesh/message_prefix.h"
 
@@ -79,15 +79,10 @@ Dropped dropWithoutArea(TriangleMesh& mesh) {
   return drop(mesh, [&](const Triangle& t) { return hasNoArea(mesh, t); });
 }
 
-/// Of faces over the same corners the first stays, whichever way they look: of a sheet with two sides one remains. (The
-/// wall between two bodies that share a face remains too, and makes the mesh one that is not closed.)
 Dropped dropDuplicates(TriangleMesh& mesh) {
-  std::unordered_set<Triangle, HashBytes<std::uint32_t>> seen;
-  seen.reserve(mesh.triangles.size());
-  return drop(mesh, [&](Triangle corners) {
-    std::sort(corners.begin(), corners.end());
-    return !seen.insert(corners).second;
-  });
+  const std::vector<char> superfluous = superfluousFaces(mesh.triangles);
+  auto next = superfluous.begin();
+  return drop(mesh, [&](const Triangle&) { return *next++ != 0; });
 }
 
 std::size_t dropUnusedVertices(TriangleMesh& mesh) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "mesh/duplicates.h"
 #include "mesh/face_sets.h"
 #include "mesh/patches.h"
 #include "mesh/sides.h"
@@ -58,7 +59,25 @@ void addPinched(const TriangleMesh& mesh, std::span<const Side> sides, std::vect
           {DefectKind::pinchedVertex, {at[v].first / 3, at[v].other / 3}, {mesh.vertices[v], mesh.vertices[v]}});
 }
 
+/// How many are of triangles of one part, but for walls.
+std::size_t foldsAmong(const TriangleMesh& mesh, std::span<const Side> sides, const Crossings& crossings) {
+  if (crossings.found.empty()) return 0;
+  FaceSets parts(mesh.triangles.size());
+  forEachEdge(sides, [&](std::span<const Side> edge) {
+    for (const Side& side : edge) parts.join(edge.front().face, side.face);
+  });
+  return static_cast<std::size_t>(std::ranges::count_if(crossings.found, [&](const Crossing& crossing) {
+    const auto [one, other] = crossing.triangles;
+    return parts.first(one) == parts.first(other) && !areTwins(mesh.triangles[one], mesh.triangles[other]);
+  }));
+}
+
 }  // namespace
+
+std::span<const Defect> MeshDefects::of(DefectKind kind) const {
+  const auto first = std::ranges::lower_bound(found, kind, {}, &Defect::kind);
+  return {first, count(kind)};
+}
 
 MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings) {
   requireValidIndices(mesh);
@@ -69,15 +88,9 @@ MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings) {
   addEdges(mesh, sides, defects.found);
   addPinched(mesh, sides, defects.found);
 
-  FaceSets parts(mesh.triangles.size());
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    for (const Side& side : edge) parts.join(edge.front().face, side.face);
-  });
-  for (const Crossing& crossing : crossings.found) {
+  defects.crossingsWithinParts = foldsAmong(mesh, sides, crossings);
+  for (const Crossing& crossing : crossings.found)
     defects.found.push_back({DefectKind::crossing, crossing.triangles, {crossing.place, crossing.place}});
-    const auto [one, other] = crossing.triangles;
-    if (parts.first(one) == parts.first(other)) ++defects.crossingsWithinParts;
-  }
   std::ranges::stable_sort(defects.found, {}, &Defect::kind);
   for (const Defect& defect : defects.found) ++defects.counts[static_cast<std::size_t>(defect.kind)];
   return defects;
