@@ -194,13 +194,13 @@ TEST(Sign, OfBodiesSideBySideIsThePseudonormals) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-/// Two boxes with an edge in common, welded: four faces there, which look the right way all the same.
+/// Two boxes with an edge in common, welded: four faces there, whose normals cancel.
 TEST(Sign, OfBodiesThatShareAnEdgeIsCertainToo) {
   const TriangleMesh box = shapes::mesh("box,width=2,height=2,depth=2");
   const TriangleMesh mesh = cleaned(joined(box, moved(box, {2, 2, 0}))).mesh;
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
   EXPECT_GT(inspect(mesh).nonManifoldEdges, 0u);
-  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
+  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
@@ -378,6 +378,26 @@ TEST(Sign, IsRightBesideFacesThinnerThanRounding) {
   EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("thinner"));
   EXPECT_EQ(checkSign(mesh, distance, 3000).wrong, 0u);
   EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.sign = Sign::pseudonormal}), 3000).wrong, 0u);
+}
+
+/// A blade along z, its edge at x = 1: beyond that edge all is outside, however little.
+TEST(Sign, IsRightBesideBlades) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1), exponent(-18, -1);
+  for (const double half : {1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3}) {
+    const TriangleMesh blade{
+        .vertices = {{1, 0, -1}, {0, half, -1}, {0, -half, -1}, {1, 0, 1}, {0, half, 1}, {0, -half, 1}},
+        .triangles = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}, {2, 0, 3}, {2, 3, 5}},
+        .name = "blade"};
+    const ExactDistance distance(blade);
+    EXPECT_EQ(distance.signChoice().sign, half < 1e-6 ? Sign::winding : Sign::pseudonormal) << half;
+    std::size_t inside = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const Vector3 x(1 + std::pow(10, exponent(random)), 0.3 * uniform(random), 0.9 * uniform(random));
+      inside += x.x() > 1 && distance(x) < 0;
+    }
+    EXPECT_EQ(inside, 0u) << half;
+  }
 }
 
 TEST(Sign, OfBodiesThatShareAnEdgeIsTurnedToo) {

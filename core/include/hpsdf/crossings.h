@@ -27,8 +27,7 @@ constexpr std::size_t kMostCrossings = 1'000'000;  ///< unless asked for others
 /// Where a mesh meets itself, decided without rounding (Shewchuk 1997). Corners are the same where their indices are:
 /// weld them first. Triangles whose corners lie on one line are passed over, as their neighbours hold their sides.
 ///
-/// About `limit` at least, if there are so many; the same ones for any number of threads. Throws `Error` as
-/// `ExactDistance` does.
+/// `limit` of them at most, the same ones for any number of threads. Throws `Error` as `ExactDistance` does.
 Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit = kMostCrossings);
 
 }  // namespace hpsdf

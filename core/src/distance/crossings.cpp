@@ -4,7 +4,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -168,12 +170,40 @@ class Finder {
     makeBoxes();
   }
 
-  /// With triangles of later slots.
-  void find(std::uint32_t slot, std::vector<Crossing>& found) const {
-    if (spansPlane(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, found);
+  /// Those of triangles of the slots [begin, end) with those of later ones, by the former's slots; nothing if there are
+  /// so many or more.
+  std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most) const {
+    std::vector<std::vector<Crossing>> ofSlot(end - begin);
+    std::atomic<std::size_t> count = 0;
+    tbb::parallel_for(begin, end, [&](std::uint32_t slot) {
+      find(slot, [&](const Crossing& crossing) {
+        ofSlot[slot - begin].push_back(crossing);
+        return ++count < most;
+      });
+    });
+    if (count >= most) return std::nullopt;
+    std::vector<Crossing> found;
+    for (const auto& crossings : ofSlot) found.insert(found.end(), crossings.begin(), crossings.end());
+    return found;
+  }
+
+  /// The first ones of a slot's.
+  std::vector<Crossing> findFirst(std::uint32_t slot, std::size_t most) const {
+    std::vector<Crossing> found;
+    find(slot, [&](const Crossing& crossing) {
+      found.push_back(crossing);
+      return found.size() < most;
+    });
+    return found;
   }
 
  private:
+  /// With triangles of later slots, as long as `take` wants more.
+  template <typename Take>
+  void find(std::uint32_t slot, const Take& take) const {
+    if (spansPlane(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, take);
+  }
+
   static constexpr std::uint32_t kWide = 4;
 
   Triangle cornersOf(const Corners& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
@@ -195,18 +225,18 @@ class Finder {
     }
   }
 
-  void visit(int level, std::uint32_t box, std::uint32_t slot, std::vector<Crossing>& found) const {
+  template <typename Take>
+  bool visit(int level, std::uint32_t box, std::uint32_t slot, const Take& take) const {
     const Box& mine = levels_[0][slot];
-    if (!levels_[level][box].intersects(mine)) return;
-    if (level == 0) {
-      if (box != slot && meets(slot, box)) found.push_back(crossing(slot, box));
-      return;
-    }
+    if (!levels_[level][box].intersects(mine)) return true;
+    if (level == 0) return box == slot || !meets(slot, box) || take(crossing(slot, box));
     const auto end =
         static_cast<std::uint32_t>(std::min<std::size_t>((std::size_t{box} + 1) * kWide, levels_[level - 1].size()));
     for (std::uint32_t child = box * kWide; child < end; ++child)
-      if ((std::uint64_t{child} + 1) << (2 * (level - 1)) > slot + std::uint64_t{1})  // its last slot comes after
-        visit(level - 1, child, slot, found);
+      if ((std::uint64_t{child} + 1) << (2 * (level - 1)) > slot + std::uint64_t{1} &&  // its last slot comes after
+          !visit(level - 1, child, slot, take))
+        return false;
+    return true;
   }
 
   bool meets(std::uint32_t slot, std::uint32_t other) const {
@@ -272,14 +302,27 @@ Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double ma
   const Finder finder(hierarchy, margin);
   const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
   Crossings crossings;
-  std::vector<std::vector<Crossing>> ofSlot;
-  // In parts that grow, so that a heap of triangles that all meet is not searched to its end.
-  for (std::uint32_t begin = 0, end = 0; begin < count && crossings.all; begin = end) {
-    end = begin + std::min(count - begin, 64 + begin);
-    ofSlot.assign(end - begin, {});
-    tbb::parallel_for(begin, end, [&](std::uint32_t slot) { finder.find(slot, ofSlot[slot - begin]); });
-    for (const auto& found : ofSlot) crossings.found.insert(crossings.found.end(), found.begin(), found.end());
-    crossings.all = end == count || crossings.found.size() < limit;
+  const auto add = [&](const std::vector<Crossing>& found) {
+    crossings.found.insert(crossings.found.end(), found.begin(), found.end());
+  };
+  // In parts that grow. One with too many is given up as soon as that shows, and halved until it is clear at which slot
+  // the limit is reached: a heap of triangles that all meet is neither searched to its end nor kept.
+  std::uint32_t size = 64;
+  bool halving = false;
+  for (std::uint32_t begin = 0; begin < count && crossings.all;) {
+    const std::uint32_t end = begin + std::min(count - begin, size);
+    const std::size_t left = limit - crossings.found.size();
+    if (const auto found = finder.findFewer(begin, end, left)) {
+      add(*found);
+      begin = end;
+      size = halving ? (size + 1) / 2 : 2 * size;
+    } else if (end - begin > 1) {
+      halving = true;
+      size = (end - begin + 1) / 2;
+    } else {
+      add(finder.findFirst(begin, left));
+      crossings.all = false;
+    }
   }
   std::ranges::sort(crossings.found, {}, &Crossing::triangles);
   return crossings;

@@ -6,7 +6,6 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -48,13 +47,18 @@ struct ExactDistance::Data {
     tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
                          [&] { hierarchy = distance::Hierarchy(mesh, source.box); });
     choice.sign = options.sign;
-    if (options.sign == Sign::automatic)
-      std::tie(choice, inside) = distance::chooseSign(hierarchy, mesh);
-    else if (options.sign == Sign::winding)
+    if (options.sign == Sign::automatic) {
+      distance::ChosenSign chosen = distance::chooseSign(hierarchy, mesh);
+      choice = std::move(chosen.choice);
+      inside = std::move(chosen.inside);
+      normals = std::move(chosen.normals);
+    } else if (options.sign == Sign::pseudonormal) {
+      normals = distance::Pseudonormals(hierarchy);
+    } else if (options.sign == Sign::winding) {
       inside = distance::Inside(hierarchy, mesh, distance::HoleRims(hierarchy));
-    else if (options.sign == Sign::hull)
+    } else if (options.sign == Sign::hull) {
       leaveOutBuried(mesh);
-    if (choice.sign == Sign::pseudonormal) normals = distance::Pseudonormals(hierarchy);
+    }
     source.sign = choice.sign;
   }
 

@@ -22,6 +22,9 @@ namespace {
 constexpr int kLattice = 16;  // places along each axis
 /// Of coordinates of order 1: of two triangles nearer than that, distances may round to be the same.
 constexpr double kTooNear = 0x1p-44;
+/// Of the sum of an edge's unit normals, the angle between its faces: above a face, beside such an edge, the product
+/// that decides is half its square, which is to be far above what rounds.
+constexpr double kSharp = 1e-6;
 
 /// With so many digits that places of the mesh are told apart, far from the origin, too.
 std::string textOf(const Vector3& x, const Box& mesh) {
@@ -75,11 +78,25 @@ std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<s
   return hierarchy.frames()[pieces[std::size_t(first - wrong.begin())]].origin;
 }
 
+/// The first corner where the pseudonormal of it, or of the edge from there, is next to nothing.
+std::optional<Vector3> tooSharp(const Hierarchy& hierarchy, const Pseudonormals& normals) {
+  const auto triangles = hierarchy.triangles();
+  std::vector<char> sharp(triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t slot) {
+    for (std::uint32_t k = 0; k < 3; ++k)
+      sharp[slot] |= normals.ofVertex(triangles[slot][k]).norm() < kSharp ||
+                     normals.ofEdge(hierarchy, static_cast<std::uint32_t>(slot), k).norm() < kSharp;
+  });
+  const auto first = std::ranges::find(sharp, 1);
+  if (first == sharp.end()) return std::nullopt;
+  return hierarchy.frames()[std::size_t(first - sharp.begin())].origin;
+}
+
 }  // namespace
 
-std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
+ChosenSign chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
   const auto byWinding = [](std::string reason, Inside inside) {
-    return std::pair(SignChoice{Sign::winding, std::move(reason)}, std::move(inside));
+    return ChosenSign{.choice = {Sign::winding, std::move(reason)}, .inside = std::move(inside)};
   };
   const Box box = boundingBox(mesh);
   const std::vector<Side> sides = sidesByEdge(hierarchy.triangles());
@@ -109,7 +126,12 @@ std::pair<SignChoice, Inside> chooseSign(const Hierarchy& hierarchy, const Trian
       return byWinding("a part looks the wrong way, or lies within another, as at " + textOf(*place, box),
                        std::move(inside));
   }
-  return {SignChoice{Sign::pseudonormal, "the mesh has no holes and does not meet itself"}, Inside()};
+  Pseudonormals normals(hierarchy);
+  if (const auto place = tooSharp(hierarchy, normals))
+    return byWinding("an edge or corner is too sharp for normals, as at " + textOf(*place, box),
+                     Inside(hierarchy, mesh, std::move(rims)));
+  return {.choice = {Sign::pseudonormal, "the mesh has no holes and does not meet itself"},
+          .normals = std::move(normals)};
 }
 
 }  // namespace hpsdf::distance
