@@ -1,10 +1,13 @@
 #include "distance/hull.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "distance/crossings.h"
@@ -18,15 +21,20 @@ namespace {
 
 using Corners = std::array<Vector3, 3>;
 
-constexpr double kFinest = 1.0 / 512;  // of the mesh's longest side: pieces are not cut further
-constexpr std::size_t kMostPairs = 10'000'000;
-constexpr std::size_t kMostPieces = 4'000'000;  // besides whole triangles
+/// Of the mesh's longest side: pieces are not cut further, unless they are too many; then twice as large ones, and so
+/// on.
+constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
+constexpr std::size_t kMostPairs = 2'000'000;
+constexpr std::size_t kMostPieces = 1'000'000;  // besides whole triangles
+
+/// Whether both sides of a triangle, or of a part of it, are the inside.
+enum class Kind : char { surface, buried, unsure };
 
 struct Piece {
   Corners corners;
   std::uint32_t triangle;  ///< of which it is a part
   bool isWhole;
-  bool isCut;  ///< by others still
+  Kind kind = Kind::surface;
 };
 
 /// One of the triangles that a triangle meets.
@@ -52,15 +60,30 @@ bool cuts(const Crosser& crosser, const Corners& piece) {
               "it meets itself in too many places for a hull: leave out the hull, or mend the mesh first");
 }
 
+std::array<Corners, 4> quarters(const Corners& t) {
+  const auto& [a, b, c] = t;
+  const Vector3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+  return {{{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}}};
+}
+
+struct TooManyPieces {};
+
 /// Cuts triangles where others meet them. All coordinates are scaled to order 1.
 class Cutter {
  public:
-  Cutter(const TriangleMesh& mesh, double finest) : mesh_(mesh), finest_(finest) {}
+  Cutter(std::size_t most, double finest) : most_(most), finest_(finest) {}
 
-  /// Adds the pieces of a triangle.
+  /// Adds the pieces of a triangle: surface where others cut them still, unsure where not.
   void add(const Corners& corners, std::uint32_t triangle, const std::vector<Crosser>& crossers) {
-    add({corners, triangle, true, false}, crossers);
+    add({corners, triangle, true}, crossers);
   }
+
+  /// Adds a quarter of each that is unsure in place of it, while these are not too small.
+  void refine(const Piece& piece) {
+    for (const Corners& quarter : quarters(piece.corners)) keep({quarter, piece.triangle, false, Kind::unsure});
+  }
+
+  bool canCut(const Corners& corners) const { return longestSide(corners) > finest_; }
 
   std::vector<Piece> pieces;
 
@@ -69,19 +92,17 @@ class Cutter {
     std::vector<Crosser> cutting;
     for (const Crosser& crosser : crossers)
       if (cuts(crosser, piece.corners)) cutting.push_back(crosser);
-    piece.isCut = !cutting.empty();
-    if (pieces.size() >= mesh_.triangles.size() + kMostPieces) refuse(mesh_);
-    if (!piece.isCut || longestSide(piece.corners) <= finest_) {
-      pieces.push_back(piece);
-      return;
-    }
-    const auto& [a, b, c] = piece.corners;
-    const Vector3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
-    for (const Corners& quarter : {Corners{a, ab, ca}, Corners{ab, b, bc}, Corners{ca, bc, c}, Corners{ab, bc, ca}})
-      add({quarter, piece.triangle, false, false}, cutting);
+    if (cutting.empty()) piece.kind = Kind::unsure;
+    if (cutting.empty() || !canCut(piece.corners)) return keep(piece);
+    for (const Corners& quarter : quarters(piece.corners)) add({quarter, piece.triangle, false}, cutting);
   }
 
-  const TriangleMesh& mesh_;
+  void keep(const Piece& piece) {
+    if (pieces.size() >= most_) throw TooManyPieces();
+    pieces.push_back(piece);
+  }
+
+  std::size_t most_;
   double finest_;
 };
 
@@ -101,32 +122,34 @@ std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& 
   return pairs;
 }
 
-bool hasSide(const std::array<std::uint32_t, 3>& triangle, std::uint32_t from, std::uint32_t to) {
-  for (int k = 0; k < 3; ++k)
-    if (triangle[k] == from && triangle[(k + 1) % 3] == to) return true;
-  return false;
-}
-
 /// Neighbours go on beyond the side that they share, unless they are folded onto each other and so meet.
 void leaveOutInnerSides(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Crosser>& crossers) {
+  using DirectedSide = std::array<std::uint32_t, 3>;  // from, to, of which triangle
+  std::vector<DirectedSide> sides;
+  for (const Crosser& crosser : crossers)
+    for (int k = 0; k < 3 && crosser.inPlane; ++k) {
+      const auto& triangle = mesh.triangles[crosser.triangle];
+      sides.push_back({triangle[k], triangle[(k + 1) % 3], crosser.triangle});
+    }
+  std::ranges::sort(sides);
   for (Crosser& crosser : crossers) {
     if (!crosser.inPlane) continue;
     const auto& triangle = mesh.triangles[crosser.triangle];
-    for (int k = 0; k < 3; ++k)
-      crosser.counts[k] = std::ranges::none_of(crossers, [&](const Crosser& other) {
-        return other.inPlane && hasSide(mesh.triangles[other.triangle], triangle[(k + 1) % 3], triangle[k]) &&
-               !std::ranges::binary_search(pairs, Pair{crosser.triangle, other.triangle});
-      });
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t from = triangle[(k + 1) % 3], to = triangle[k];
+      for (auto side = std::ranges::lower_bound(sides, DirectedSide{from, to, 0});
+           side != sides.end() && (*side)[0] == from && (*side)[1] == to && crosser.counts[k]; ++side)
+        crosser.counts[k] = std::ranges::binary_search(pairs, Pair{crosser.triangle, (*side)[2]});
+    }
   }
 }
 
-std::vector<Piece> piecesOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, double scale) {
-  const std::vector<Pair> pairs = pairsThatMeet(hierarchy, mesh);
+/// Pieces of all triangles. Coordinates are scaled to order 1.
+void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter) {
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
   };
-  Cutter cutter(mesh, scale * kFinest * boundingBox(mesh).sizes().maxCoeff());
   auto next = pairs.begin();
   std::vector<Crosser> crossers;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -140,36 +163,68 @@ std::vector<Piece> piecesOf(const Hierarchy& hierarchy, const TriangleMesh& mesh
     leaveOutInnerSides(mesh, pairs, crossers);
     cutter.add(corners, t, crossers);
   }
-  return std::move(cutter.pieces);
 }
 
-/// Whether each has the inside on both sides. One without an area has: its neighbours hold its sides.
-std::vector<char> areBuried(const std::vector<Piece>& pieces, const Inside& inside, double scale, double aside) {
-  std::vector<Vector3> before, behind;
-  for (const Piece& piece : pieces) {
-    const auto& [a, b, c] = piece.corners;
-    const Vector3 middle = (a + b + c) / (3 * scale);
-    const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
-    before.push_back(middle + step);
-    behind.push_back(middle - step);
+/// What a piece is that no triangle meets. One without an area has the inside on both sides: its neighbours hold its
+/// sides.
+Kind kindOf(const Corners& corners, const Inside& inside, double scale, double aside) {
+  const auto& [a, b, c] = corners;
+  const Vector3 middle = (a + b + c) / (3 * scale);
+  const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
+  if (middle + step == middle - step) return Kind::buried;
+  double reach = 0;
+  for (const Vector3& corner : corners) reach = std::max(reach, (corner / scale - middle).norm());
+  const Inside::Side before = inside.sideOf(middle + step, reach);
+  if (before == Inside::Side::outside) return Kind::surface;
+  const Inside::Side behind = inside.sideOf(middle - step, reach);
+  if (behind == Inside::Side::outside) return Kind::surface;
+  const bool sure = before == Inside::Side::inside && behind == Inside::Side::inside;
+  return sure ? Kind::buried : Kind::unsure;
+}
+
+void setKinds(std::vector<Piece>& pieces, std::size_t first, const Inside& inside, double scale, double aside) {
+  tbb::parallel_for(first, pieces.size(), [&](std::size_t i) {
+    if (pieces[i].kind == Kind::unsure) pieces[i].kind = kindOf(pieces[i].corners, inside, scale, aside);
+  });
+}
+
+/// Pieces that are buried or not; those that are too small to be cut further are none. Coordinates are scaled to order
+/// 1. Nothing if they are too many.
+std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
+                                           const Inside& inside, double finest) {
+  const Box box = boundingBox(mesh);
+  const double aside = besideSurface(box);
+  Cutter cutter(mesh.triangles.size() + kMostPieces, scale * finest * box.sizes().maxCoeff());
+  try {
+    cutTriangles(mesh, scale, pairs, cutter);
+    setKinds(cutter.pieces, 0, inside, scale, aside);
+    // Beside holes the winding number changes along a piece.
+    for (std::size_t first = 0, end = cutter.pieces.size(); first < end; first = end, end = cutter.pieces.size()) {
+      for (std::size_t i = first; i < end; ++i)
+        if (const Piece piece = cutter.pieces[i]; piece.kind == Kind::unsure && cutter.canCut(piece.corners)) {
+          cutter.refine(piece);
+          cutter.pieces[i].kind = Kind::buried;  // its quarters are there instead
+        }
+      setKinds(cutter.pieces, end, inside, scale, aside);
+    }
+  } catch (const TooManyPieces&) {
+    return std::nullopt;
   }
-  const std::vector<char> inFront = inside.contains(before), inBack = inside.contains(behind);
-  std::vector<char> buried(pieces.size());
-  for (std::size_t i = 0; i < pieces.size(); ++i)
-    buried[i] = before[i] == behind[i] || (!pieces[i].isCut && inFront[i] && inBack[i]);
-  return buried;
+  return std::move(cutter.pieces);
 }
 
 }  // namespace
 
 Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside) {
   const double scale = scaleToOne(hierarchy.vertices());
-  const std::vector<Piece> pieces = piecesOf(hierarchy, mesh, scale);
-  const std::vector<char> buried = areBuried(pieces, inside, scale, besideSurface(boundingBox(mesh)));
+  const std::vector<Pair> pairs = pairsThatMeet(hierarchy, mesh);
+  std::optional<std::vector<Piece>> pieces;
+  for (double finest = kFinest; !pieces && finest <= kCoarsest; finest *= 2)
+    pieces = piecesOf(mesh, scale, pairs, inside, finest);
+  if (!pieces) refuse(mesh);
   Hull hull{.mesh = {.vertices = mesh.vertices, .triangles = {}, .name = mesh.name}, .triangles = {}};
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
-    if (buried[i]) continue;
-    const Piece& piece = pieces[i];
+  for (const Piece& piece : *pieces) {
+    if (piece.kind == Kind::buried) continue;
     hull.triangles.push_back(piece.triangle);
     if (piece.isWhole) {
       hull.mesh.triangles.push_back(mesh.triangles[piece.triangle]);

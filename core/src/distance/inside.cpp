@@ -47,18 +47,27 @@ struct Inside::Known {
   double change;    ///< nor does it change by more a way
   double rim;       ///< none is nearer; no less than `free`
 
-  /// What follows for a place of which distances are known. After a way s every rim is at least 1 − s/rim times as far,
-  /// so that what changes with the cube of that does so by no more.
+  /// What follows for a place of which distances are known.
   Known at(const Vector3& x, double itsFree, double distance) const {
     const double squaredWay = (x - place).squaredNorm();
     if (!(squaredWay < 0.998 * free * free)) return {x, itsFree, distance, inside, 0, 0, 0, 0};
-    const double way = std::sqrt(squaredWay), nearer = 1 - way / rim;
-    const double changes = change / (nearer * nearer * nearer), steepest = gradient + changes * way;
-    return {x, itsFree, distance, inside, slack - steepest * way, steepest, changes, std::max(rim - way, itsFree)};
+    return after(std::sqrt(squaredWay), x, itsFree, distance);
   }
+
+  /// Whether all places that far away are on the same side that no triangle keeps apart from here.
+  bool holdsWithin(double way) const { return way < rim && after(way, place, 0, way).slack > 0; }
 
   /// The sign is certain, and the patch of a hole is farther than the triangles.
   bool isSettled() const { return slack > 2 * kExact + 1.01 * gradient * nearest; }
+
+ private:
+  /// After a way s every rim is at least 1 − s/rim times as far, so that what changes with the cube of that does so by
+  /// no more.
+  Known after(double way, const Vector3& x, double itsFree, double distance) const {
+    const double nearer = 1 - way / rim;
+    const double changes = change / (nearer * nearer * nearer), steepest = gradient + changes * way;
+    return {x, itsFree, distance, inside, slack - steepest * way, steepest, changes, std::max(rim - way, itsFree)};
+  }
 };
 
 Inside::Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh, HoleRims rims)
@@ -118,6 +127,12 @@ bool Inside::boundsInside(std::uint32_t slot) const {
   const auto& [a, b, c] = hierarchy_->triangles()[slot];
   const auto vertices = hierarchy_->vertices();
   return std::abs(winding_.withoutOne((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_) < 0.25;
+}
+
+Inside::Side Inside::sideOf(const Vector3& x, double reach) const {
+  const Known known = find(x, 0, reach);
+  if (!known.holdsWithin(reach)) return Side::unsure;
+  return known.inside ? Side::inside : Side::outside;
 }
 
 std::vector<char> Inside::contains(std::span<const Vector3> places) const {
