@@ -307,7 +307,7 @@ TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
   EXPECT_EQ(json.at("sign_check").at("wrong"), 0);
   EXPECT_THAT(run({{"mesh", "builtin:gear"}}).out,
               AllOf(HasSubstr("closed, orientable, does not meet itself"),
-                    HasSubstr("pseudonormal: the mesh is closed"), Not(HasSubstr("as at"))));
+                    HasSubstr("pseudonormal: the mesh has no holes"), Not(HasSubstr("as at"))));
   EXPECT_THAT(run({{"mesh", "builtin:gear", "--seed", "2"}}).err, HasSubstr("seed belongs to check-sign"));
 }
 

@@ -123,6 +123,26 @@ TEST(Hull, OfOpenBodiesHasTheSameSign) {
   EXPECT_GT(deeper, 50u);
 }
 
+/// Where a hole's patch crosses a face that no other meets, part of that face is outside.
+TEST(Hull, KeepsFacesThatLeaveByAHole) {
+  const TriangleMesh blade = moved(shapes::mesh("box,width=0.4,height=0.4,depth=2.85"), {0, 0, 0.475});
+  const TriangleMesh mesh = joined(support::openBox(), blade);
+  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  EXPECT_NEAR(hull(Vector3(0.21, 0, 1.4)), 0.01, 1e-12);
+  EXPECT_NEAR(hull(Vector3(0.19, 0, 1.4)), -0.01, 1e-12);
+  std::size_t outside = 0, deeper = 0;
+  for (const Vector3& x : placesIn(boundingBox(mesh), 4000, 3)) {
+    const double before = plain(x), found = hull(x);
+    outside += before > 0;
+    if (before > 0)
+      EXPECT_NEAR(found, before, 1e-9) << x.transpose();
+    else
+      deeper += found < before - 0.05;
+  }
+  EXPECT_GT(outside, 1000u);
+  EXPECT_GT(deeper, 200u);
+}
+
 TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull);

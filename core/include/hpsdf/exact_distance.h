@@ -61,7 +61,8 @@ struct SignChoice {
 class ExactDistance {
  public:
   /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, for a
-  /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in millions of places.
+  /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in more than
+  /// two million pairs of triangles, or would be cut into more than a million pieces.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;

@@ -165,21 +165,18 @@ void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair
   }
 }
 
-/// What a piece is that no triangle meets. One without an area has the inside on both sides: its neighbours hold its
-/// sides.
+/// What a piece is that no triangle meets: surface, if it is that in its middle. One without an area has the inside on
+/// both sides: its neighbours hold its sides.
 Kind kindOf(const Corners& corners, const Inside& inside, double scale, double aside) {
   const auto& [a, b, c] = corners;
   const Vector3 middle = (a + b + c) / (3 * scale);
   const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
-  if (middle + step == middle - step) return Kind::buried;
+  const Vector3 before = middle + step, behind = middle - step;
+  if (before == behind) return Kind::buried;
+  if (!inside.contains(before) || !inside.contains(behind)) return Kind::surface;
   double reach = 0;
   for (const Vector3& corner : corners) reach = std::max(reach, (corner / scale - middle).norm());
-  const Inside::Side before = inside.sideOf(middle + step, reach);
-  if (before == Inside::Side::outside) return Kind::surface;
-  const Inside::Side behind = inside.sideOf(middle - step, reach);
-  if (behind == Inside::Side::outside) return Kind::surface;
-  const bool sure = before == Inside::Side::inside && behind == Inside::Side::inside;
-  return sure ? Kind::buried : Kind::unsure;
+  return inside.isSameWithin(before, reach) && inside.isSameWithin(behind, reach) ? Kind::buried : Kind::unsure;
 }
 
 void setKinds(std::vector<Piece>& pieces, std::size_t first, const Inside& inside, double scale, double aside) {

@@ -129,15 +129,15 @@ bool Inside::boundsInside(std::uint32_t slot) const {
   return std::abs(winding_.withoutOne((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_) < 0.25;
 }
 
-Inside::Side Inside::sideOf(const Vector3& x, double reach) const {
-  const Known known = find(x, 0, reach);
-  if (!known.holdsWithin(reach)) return Side::unsure;
-  return known.inside ? Side::inside : Side::outside;
+bool Inside::contains(const Vector3& x) const { return find(x, 0, 0).inside; }
+
+bool Inside::isSameWithin(const Vector3& x, double reach) const {
+  return rims_.empty() || find(x, 0, reach).holdsWithin(reach);
 }
 
 std::vector<char> Inside::contains(std::span<const Vector3> places) const {
   std::vector<char> inside(places.size());
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { inside[i] = find(places[i], 0, 0).inside; });
+  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { inside[i] = contains(places[i]); });
   return inside;
 }
 

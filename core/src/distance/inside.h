@@ -36,11 +36,12 @@ class Inside {
   /// winding number of all others is there the middle of both. No step aside could leap over another wall.
   bool boundsInside(std::uint32_t slot) const;
 
-  enum class Side : char { outside, inside, unsure };
+  /// Whether a place is inside.
+  bool contains(const Vector3& x) const;
 
-  /// On which side all places are that are no farther from x than `reach`, and not kept apart from it by a triangle.
-  /// Without holes it is never unsure.
-  Side sideOf(const Vector3& x, double reach) const;
+  /// Whether all places are on the same side as x, for certain, that are no farther away than `reach` and not kept
+  /// apart from it by a triangle.
+  bool isSameWithin(const Vector3& x, double reach) const;
 
   /// Whether these places are inside, 1 or 0, each by a winding number of its own.
   std::vector<char> contains(std::span<const Vector3> places) const;
