@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <iterator>
 #include <optional>
 #include <span>
@@ -188,9 +189,22 @@ void drawPicture(Session& session, const Arguments& arguments, const Inspected& 
   const render::SurfacePicture look = cameraPicture(arguments);
   render::MeshPicture picture{look.camera, look.width, look.height, look.samples};
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
-  const auto renderer = makeBodyRenderer({found.imported.mesh}, backend(arguments));
-  savePng(drawMesh(*renderer, found.imported.mesh, found.defects, picture), arguments.text("picture"));
-  session.setLastRenderer(renderer->description());
+  const auto make = [&](std::vector<TriangleMesh> meshes) {
+    auto renderer = makeBodyRenderer(std::move(meshes), backend(arguments));
+    session.setLastRenderer(renderer->description());
+    return renderer;
+  };
+  savePng(drawMesh(make, found.imported.mesh, found.defects, picture), arguments.text("picture"));
+}
+
+/// Draws it, if that is asked for. What it failed with, to be thrown once all the rest is told.
+std::exception_ptr tryPicture(Session& session, const Arguments& arguments, const Inspected& found) {
+  try {
+    if (arguments.given("picture")) drawPicture(session, arguments, found);
+  } catch (const Error&) {
+    return std::current_exception();
+  }
+  return nullptr;
 }
 
 void checkMesh(const Arguments& arguments) {
@@ -211,12 +225,13 @@ void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("picture")) checkWritable(arguments.text("picture"));
   const Inspected found = inspected(session, arguments);
   const MeshReport& report = found.imported.report;
-  if (arguments.given("picture")) drawPicture(session, arguments, found);
   std::optional<RepairedMesh> mended;
   if (arguments.given("repair")) {
     mended = repaired(found.imported);
     saveMesh(mended->imported.mesh, arguments.text("repair"));
   }
+  const std::exception_ptr undrawn = tryPicture(session, arguments, found);
+  const bool drawn = arguments.given("picture") && !undrawn;
   if (session.wantsJson(arguments)) {
     Json json = meshJson(surface, report);
     json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
@@ -225,7 +240,7 @@ void runMesh(Session& session, const Arguments& arguments) {
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
     if (found.check) json["sign_check"] = checkJson(*found.check);
     if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
-    if (arguments.given("picture")) json["picture"] = arguments.text("picture");
+    if (drawn) json["picture"] = arguments.text("picture");
     printJson(session.console().out, json);
   } else {
     session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
@@ -234,9 +249,9 @@ void runMesh(Session& session, const Arguments& arguments) {
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "")
                           << (mended ? repairText(*mended, arguments.text("repair")) : "")
-                          << (arguments.given("picture") ? summaryRow("picture", printable(arguments.text("picture")))
-                                                         : "");
+                          << (drawn ? summaryRow("picture", printable(arguments.text("picture"))) : "");
   }
+  if (undrawn) std::rethrow_exception(undrawn);
   if (found.check && found.check->wrong > 0)
     throw Failed(fmt::format("{}: {} of {} signs are wrong", surface, found.check->wrong, found.check->places));
 }

@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "body_meshes.h"
@@ -20,6 +22,33 @@ namespace {
 enum Look : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
 constexpr Color kCrossing = {214, 70, 58};
+
+/// Where a mesh is about the origin and 1 to 2 in size: devices count in float, whose squares end near 1e19 and vanish
+/// near 1e-19.
+class NearOne {
+ public:
+  explicit NearOne(const Box& box) : middle_(box.center()) {
+    const double size = box.sizes().maxCoeff();
+    if (size > 0) unit_ = std::ldexp(1.0, std::ilogb(size));  // a power of two rounds nothing
+  }
+
+  Vector3 operator()(const Vector3& place) const { return (place - middle_) / unit_; }
+
+  TriangleMesh operator()(TriangleMesh mesh) const {
+    for (Vector3& vertex : mesh.vertices) vertex = (*this)(vertex);
+    return mesh;
+  }
+
+  MeshDefects operator()(MeshDefects defects) const {
+    for (Defect& defect : defects.found)
+      for (Vector3& end : defect.ends) end = (*this)(end);
+    return defects;
+  }
+
+ private:
+  Vector3 middle_;
+  double unit_ = 1;
+};
 
 /// For each triangle, whether it meets another.
 std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
@@ -54,15 +83,19 @@ std::vector<Swatch> swatchesOf(const MeshDefects& defects) {
 
 }  // namespace
 
-Image drawMesh(BodyRenderer& renderer, const TriangleMesh& mesh, const MeshDefects& defects,
+Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
                const MeshPicture& picture) {
   checkPictureSize(picture.width, picture.height, picture.samples);
   const Frame frame = render::frame(picture.width, picture.height);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const Body body{.mesh = 0, .worldFromBody = Eigen::Isometry3d::Identity(), .color = surfaceColor()};
-  const Camera camera =
-      startingBefore(renderer.bounds({&body, 1}), cameraOf(picture.camera, domainAround(mesh), width, height));
-  BodyBuffers seen = renderer.view(camera, {&body, 1}, width * samples, height * samples);
+  const NearOne nearOne(boundingBox(mesh));
+  const auto renderer = make({nearOne(mesh)});
+  OrbitCamera orbit = picture.camera;
+  if (orbit.target) orbit.target = nearOne(*orbit.target);
+  const Box box = renderer->bounds({&body, 1});
+  const Camera camera = startingBefore(box, cameraOf(orbit, domainAround(box), width, height));
+  BodyBuffers seen = renderer->view(camera, {&body, 1}, width * samples, height * samples);
   setLooks(mesh, defects, camera, seen);
   ViewBuffers buffers = emptyBuffers(seen.width, seen.height, true);
   addBodies(seen, buffers);
@@ -71,7 +104,7 @@ Image drawMesh(BodyRenderer& renderer, const TriangleMesh& mesh, const MeshDefec
   const Sampling sampling{samples, lineWidthOf(frame), 1};
   const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
   place(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
-  paintDefects(image, camera, buffers, samples, defects, sampling.lineWidth);
+  paintDefects(image, camera, buffers, samples, nearOne(defects), sampling.lineWidth);
 
   Furniture furniture;
   addSwatches(furniture, frame, kDefectTitles, swatchesOf(defects));

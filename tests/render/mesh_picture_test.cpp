@@ -8,8 +8,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "expect_tidy.h"
 #include "hpsdf/build.h"
@@ -39,7 +41,7 @@ MeshPicture pictureFrom(double azimuth, double elevation) {
 }
 
 Image drawn(const TriangleMesh& mesh, const MeshPicture& picture) {
-  return drawMesh(*makeCpuBodyRenderer({mesh}), mesh, defectsOf(mesh), picture);
+  return drawMesh(makeCpuBodyRenderer, mesh, defectsOf(mesh), picture);
 }
 
 /// The pixel that shows a place.
@@ -141,16 +143,47 @@ TEST(MeshPicture, ReddensFacesThatMeet) {
   EXPECT_LT(std::abs(meeting[1] - meeting[2]), 40);
 }
 
+/// As GL does it, through llvmpipe.
+std::unique_ptr<BodyRenderer> makeGl(std::vector<TriangleMesh> meshes) {
+  return makeGlBodyRenderer(std::move(meshes), GlChoice::software);
+}
+
+std::size_t differentPixels(const Image& a, const Image& b, int limit) {
+  std::size_t different = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) different += differenceOf(a.at(x, y), b.at(x, y)) > limit;
+  return different;
+}
+
+TEST(MeshPicture, IsTheSameAtAnySizeAndPlace) {
+  HPSDF_REQUIRE_GL();
+  const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
+  for (const Projection projection : {Projection::perspective, Projection::orthographic})
+    for (const MakeBodyRenderer& make : {MakeBodyRenderer(makeCpuBodyRenderer), MakeBodyRenderer(makeGl)}) {
+      const auto drawnBy = [&](double scale, const Vector3& by) {
+        MeshPicture above = pictureFrom(20, 40);
+        above.camera.projection = projection;
+        above.camera.target = scale * Vector3(0.5, 0, 0) + by;
+        const TriangleMesh other = moved(mesh, by, scale);
+        return drawMesh(make, other, defectsOf(other), above);
+      };
+      const Image image = drawnBy(1, {0, 0, 0});
+      for (const int exponent : {-148, -100, 60, 126}) {
+        const double scale = std::ldexp(1.0, exponent);
+        EXPECT_EQ(differentPixels(image, drawnBy(scale, {0, 0, 0}), 0), 0u) << exponent;
+      }
+      const double far = std::ldexp(1.0, 60);  // coordinates 1024 apart there keep the mesh as it is
+      EXPECT_EQ(differentPixels(image, drawnBy(std::ldexp(1.0, 20), {far, -far, far}), 0), 0u);
+    }
+}
+
 TEST(MeshPicture, OpenGlAgrees) {
   HPSDF_REQUIRE_GL();
   const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   const MeshPicture above = pictureFrom(20, 40);
   const Image cpu = drawn(mesh, above);
-  const Image gl = drawMesh(*makeGlBodyRenderer({mesh}, GlChoice::software), mesh, defectsOf(mesh), above);
-  std::size_t different = 0;
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) different += differenceOf(cpu.at(x, y), gl.at(x, y)) > 40;
-  EXPECT_LT(different, std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
+  const Image gl = drawMesh(makeGl, mesh, defectsOf(mesh), above);
+  EXPECT_LT(differentPixels(cpu, gl, 40), std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
 }
 
 TEST(MeshPicture, LegendIsTidyAtAnySize) {
