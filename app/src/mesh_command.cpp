@@ -187,7 +187,7 @@ std::string repairText(const RepairedMesh& mended, const std::string& file) {
 /// Draws the mesh with its defects.
 void drawPicture(Session& session, const Arguments& arguments, const Inspected& found) {
   const render::SurfacePicture look = cameraPicture(arguments);
-  render::MeshPicture picture{look.camera, look.width, look.height, look.samples};
+  render::MeshPicture picture{look.camera, look.width, look.height, look.samples, !arguments.given("camera")};
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   const auto make = [&](std::vector<TriangleMesh> meshes) {
     auto renderer = makeBodyRenderer(std::move(meshes), backend(arguments));
@@ -260,9 +260,11 @@ void runMesh(Session& session, const Arguments& arguments) {
 std::vector<Parameter> meshLookParameters(const Registry& registry) {
   std::vector<Parameter> parameters = lookParameters(registry);
   parameters.push_back(*findParameter(registry.command("render"), "up"));
-  std::ranges::find(parameters, "camera", &Parameter::name)->help =
+  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  camera.help =
       "Azimuth and elevation in degrees, and the eye's distance from the mesh's middle in diagonals of a cube around "
-      "it.";
+      "it. When left out, 30 and 20 degrees, as near as shows the whole mesh.";
+  camera.defaultText.clear();
   std::ranges::find(parameters, "target", &Parameter::name)->help =
       "The point in the picture's middle, which the camera circles; the mesh's middle when left out. With a small "
       "distance in camera, a close look at a defect.";

@@ -19,6 +19,8 @@
 namespace hpsdf::render {
 namespace {
 
+constexpr double kBorder = 0.04;  // left free around a whole mesh, of the view's width and height
+
 enum Look : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
 constexpr Color kCrossing = {214, 70, 58};
@@ -49,6 +51,24 @@ class NearOne {
   Vector3 middle_;
   double unit_ = 1;
 };
+
+/// From where all of the box is seen.
+OrbitCamera nearestForWhole(const Box& box, OrbitCamera orbit, int width, int height) {
+  const Box domain = domainAround(box);
+  OrbitCamera inSpace = orbit;
+  inSpace.projection = Projection::perspective;
+  const Camera camera = cameraOf(inSpace, domain, width, height);
+  const Vector3 target = orbit.target.value_or(box.center());
+  double distance = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Vector3 corner = box.corner(Box::CornerType(i)) - target;
+    const double nearer = orbit.projection == Projection::perspective ? -corner.dot(camera.forward) : 0;
+    for (const Vector3& half : {camera.right, camera.up})  // of the view, as seen at distance 1
+      distance = std::max(distance, nearer + std::abs(corner.dot(half)) / half.squaredNorm() / (1 - 2 * kBorder));
+  }
+  orbit.distance = distance / domain.diagonal().norm();
+  return orbit;
+}
 
 /// For each triangle, whether it meets another.
 std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
@@ -94,6 +114,7 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   OrbitCamera orbit = picture.camera;
   if (orbit.target) orbit.target = nearOne(*orbit.target);
   const Box box = renderer->bounds({&body, 1});
+  if (picture.whole) orbit = nearestForWhole(box, orbit, width, height);
   const Camera camera = startingBefore(box, cameraOf(orbit, domainAround(box), width, height));
   BodyBuffers seen = renderer->view(camera, {&body, 1}, width * samples, height * samples);
   setLooks(mesh, defects, camera, seen);

@@ -143,6 +143,42 @@ TEST(MeshPicture, ReddensFacesThatMeet) {
   EXPECT_LT(std::abs(meeting[1] - meeting[2]), 40);
 }
 
+/// What pictures of two meshes do not share.
+Eigen::AlignedBox2i differenceBox(const Image& a, const Image& b) {
+  Eigen::AlignedBox2i box;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x)
+      if (a.at(x, y) != b.at(x, y)) box.extend(Eigen::Vector2i(x, y));
+  return box;
+}
+
+TEST(MeshPicture, ShowsTheWholeMeshWhateverItsShapeAndTheViews) {
+  for (const Vector3& sizes : {Vector3(1, 1, 1), Vector3(1, 9, 1), Vector3(9, 1, 1), Vector3(3, 1, 3)})
+    for (const auto& [width, height] : {std::pair(480, 300), std::pair(150, 400)})
+      for (const Projection projection : {Projection::perspective, Projection::orthographic})
+        for (const double elevation : {20.0, 90.0}) {
+          TriangleMesh mesh = boxOfTwo();
+          for (Vector3& vertex : mesh.vertices) vertex = vertex.cwiseProduct(sizes);
+          MeshPicture picture = pictureFrom(30, elevation);
+          picture.whole = true;
+          picture.width = width;
+          picture.height = height;
+          picture.camera.projection = projection;
+          MeshPicture away = picture;  // looks past it
+          away.whole = false;
+          away.camera.target = Vector3(1e4, 0, 0);
+          const Eigen::AlignedBox2i seen = differenceBox(drawn(mesh, picture), drawn(mesh, away));
+          const PixelRect view = frame(width, height).view;
+          SCOPED_TRACE(testing::Message() << sizes.transpose() << ", " << width << "x" << height << ", elevation "
+                                          << elevation << ", projection " << int(projection));
+          EXPECT_GT(seen.min().minCoeff(), 0);
+          EXPECT_LT(seen.max().x(), view.x1 - 1);
+          EXPECT_LT(seen.max().y(), view.y1 - 1);
+          const Eigen::Array2d share = seen.sizes().cast<double>().array() / Eigen::Array2d(view.x1, view.y1);
+          EXPECT_GT(share.maxCoeff(), 0.6) << "smaller than need be";
+        }
+}
+
 /// As GL does it, through llvmpipe.
 std::unique_ptr<BodyRenderer> makeGl(std::vector<TriangleMesh> meshes) {
   return makeGlBodyRenderer(std::move(meshes), GlChoice::software);

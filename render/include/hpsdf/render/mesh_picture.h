@@ -18,7 +18,8 @@ struct MeshPicture {
       camera;  ///< around the middle of the mesh; distances in diagonals of a cube about it, as of a field's domain
   int width = 1280;
   int height = 720;
-  int samples = 1;  ///< an axis and pixel, 1 to 8
+  int samples = 1;     ///< an axis and pixel, 1 to 8
+  bool whole = false;  ///< from as near as shows all of the mesh, whatever the camera's distance
 };
 
 /// Makes a renderer of some meshes, as `makeCpuBodyRenderer` does.
