@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace {
 
 constexpr Color kCasing = {24, 22, 34};
 constexpr float kCasingStrength = 0.7F;
-constexpr float kHidden = 0.3F;      // strength of what lies behind something
+constexpr float kHidden = 0.7F;      // strength of what lies behind something: in dashes, so that hues stay apart
+constexpr double kDash = 4;          // in thin lines, a dash and a gap each
 constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface may rise beside an edge of its own
 constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
 constexpr double kDotRadius = 2.6;
@@ -53,8 +55,8 @@ struct Stroke {
 
 class Painter {
  public:
-  Painter(Image& picture, const ViewBuffers& buffers, int samples)
-      : picture_(picture), buffers_(buffers), samples_(samples) {}
+  Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
+      : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
 
   /// Mixes a colour in where strokes, grown by `border`, cover pixels.
   void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
@@ -88,7 +90,9 @@ class Painter {
         const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
         const double covered = std::clamp(stroke.half + border + 0.5 - away, 0.0, 1.0);
         if (covered <= 0) continue;
-        const float strength = isHidden(stroke, t, x, y) ? kHidden : 1.0F;
+        const bool hidden = isHidden(stroke, t, x, y);
+        if (hidden && isGap(stroke, middle)) continue;
+        const float strength = hidden ? kHidden : 1.0F;
         Color& pixel = picture_.at(x, y);
         pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
       }
@@ -106,9 +110,21 @@ class Painter {
     return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
   }
 
+  /// By the place in the picture, not along the line: edges shorter than a dash have gaps too. A dot has none.
+  bool isGap(const Stroke& stroke, const Eigen::Vector2d& place) const {
+    const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
+    double way = across > down ? place.x() : place.y();
+    if (stroke.radius > 0)
+      way = stroke.radius * (std::numbers::pi + std::atan2(place.y() - stroke.from.y, place.x() - stroke.from.x));
+    else if (across == 0 && down == 0)
+      return false;
+    return std::fmod(way, 2 * dash_) >= dash_;
+  }
+
   Image& picture_;
   const ViewBuffers& buffers_;
   int samples_;
+  double dash_;  ///< pixels
 };
 
 /// What hangs together in the picture, of one kind: cells of some pixels that touch.
@@ -241,7 +257,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
     }
   }
   // all casings first, so that none covers a neighbour
-  Painter painter(picture, buffers, samples);
+  Painter painter(picture, buffers, samples, lineWidth);
   painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
   painter.paint(strokes, 0, nullptr, 1);
 }

@@ -23,7 +23,7 @@ constexpr double kBorder = 0.04;  // left free around a whole mesh, of the view'
 
 enum Look : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
-constexpr Color kCrossing = {214, 70, 58};
+constexpr Color kCrossing = {240, 146, 150};  // paler than the rings of where they meet
 
 /// Where a mesh is about the origin and 1 to 2 in size: devices count in float, whose squares end near 1e19 and vanish
 /// near 1e-19.
@@ -52,19 +52,19 @@ class NearOne {
   double unit_ = 1;
 };
 
-/// From where all of the box is seen.
-OrbitCamera nearestForWhole(const Box& box, OrbitCamera orbit, int width, int height) {
-  const Box domain = domainAround(box);
+/// From as near as shows all of these places.
+OrbitCamera nearestForWhole(const std::vector<Vector3>& places, OrbitCamera orbit, const Box& domain, int width,
+                            int height) {
   OrbitCamera inSpace = orbit;
   inSpace.projection = Projection::perspective;
   const Camera camera = cameraOf(inSpace, domain, width, height);
-  const Vector3 target = orbit.target.value_or(box.center());
+  const Vector3 target = orbit.target.value_or(domain.center());
   double distance = 0;
-  for (int i = 0; i < 8; ++i) {
-    const Vector3 corner = box.corner(Box::CornerType(i)) - target;
-    const double nearer = orbit.projection == Projection::perspective ? -corner.dot(camera.forward) : 0;
+  for (const Vector3& place : places) {
+    const Vector3 from = place - target;
+    const double nearer = orbit.projection == Projection::perspective ? -from.dot(camera.forward) : 0;
     for (const Vector3& half : {camera.right, camera.up})  // of the view, as seen at distance 1
-      distance = std::max(distance, nearer + std::abs(corner.dot(half)) / half.squaredNorm() / (1 - 2 * kBorder));
+      distance = std::max(distance, nearer + std::abs(from.dot(half)) / half.squaredNorm() / (1 - 2 * kBorder));
   }
   orbit.distance = distance / domain.diagonal().norm();
   return orbit;
@@ -110,12 +110,13 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
   const Body body{.mesh = 0, .worldFromBody = Eigen::Isometry3d::Identity(), .color = surfaceColor()};
   const NearOne nearOne(boundingBox(mesh));
-  const auto renderer = make({nearOne(mesh)});
+  const TriangleMesh nearMesh = nearOne(mesh);
+  const auto renderer = make({nearMesh});
   OrbitCamera orbit = picture.camera;
   if (orbit.target) orbit.target = nearOne(*orbit.target);
-  const Box box = renderer->bounds({&body, 1});
-  if (picture.whole) orbit = nearestForWhole(box, orbit, width, height);
-  const Camera camera = startingBefore(box, cameraOf(orbit, domainAround(box), width, height));
+  const Box box = renderer->bounds({&body, 1}), domain = domainAround(box);
+  if (picture.whole) orbit = nearestForWhole(nearMesh.vertices, orbit, domain, width, height);
+  const Camera camera = startingBefore(box, cameraOf(orbit, domain, width, height));
   BodyBuffers seen = renderer->view(camera, {&body, 1}, width * samples, height * samples);
   setLooks(mesh, defects, camera, seen);
   ViewBuffers buffers = emptyBuffers(seen.width, seen.height, true);

@@ -25,8 +25,8 @@ struct MeshPicture {
 /// Makes a renderer of some meshes, as `makeCpuBodyRenderer` does.
 using MakeBodyRenderer = std::function<std::unique_ptr<BodyRenderer>(std::vector<TriangleMesh>)>;
 
-/// Clay where faces look at the eye, blue where they are seen from behind, red where they meet others; edges that are
-/// open, shared by more than two faces or run against each other as lines, small defects in rings; faint what is
+/// Clay where faces look at the eye, blue where they are seen from behind, pale red where they meet others; edges that
+/// are open, shared by more than two faces or run against each other as lines, small defects in rings; dashed what is
 /// hidden. Coordinates may be of any size, wherever the mesh is: `make` gets it near the origin and near 1 in size.
 /// `defects`: of this mesh. Throws `Error` for a size, a camera or a mesh out of range.
 Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
