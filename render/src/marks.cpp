@@ -25,21 +25,20 @@ constexpr double kLeastRing = 9;       // pixels, its radius
 constexpr double kNearestMark = 1e-3;  // before the eye, of how far away an edge's other end is
 constexpr int kGroupCell = 8;          // pixels: what lies in neighbouring cells of this size is one group
 
-struct Style {
-  std::array<const char*, 2> names;
-  Color color;
-};
-constexpr std::array<Style, kDefectKinds> kStyles = {{{{"boundary edges", "boundary"}, {255, 208, 0}},
-                                                      {{"non-manifold edges", "non-manifold"}, {226, 0, 206}},
-                                                      {{"inconsistent edges", "inconsistent"}, {0, 176, 80}},
-                                                      {{"pinched vertices", "pinched"}, {255, 255, 255}},
-                                                      {{"pairs of faces that meet", "pairs meet"}, {232, 24, 24}}}};
+/// As of a panel that has them all.
+const Swatch& styleOf(DefectKind kind) {
+  static const std::array<Swatch, kDefectKinds> styles = {
+      {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
+       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {226, 0, 206}},
+       {{"inconsistent edges", "inconsistent", "opposed"}, "", {0, 176, 80}},
+       {{"pinched vertices", "pinched"}, "", {255, 255, 255}},
+       {{"pairs of faces that meet", "pairs meet"}, "", {232, 24, 24}}}};
+  return styles[static_cast<std::size_t>(kind)];
+}
 
-/// Calls visit(style, count) for each kind that there is.
-template <typename Visit>
-void forEachKind(const MeshDefects& defects, const Visit& visit) {
-  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
-    if (defects.counts[kind] > 0) visit(kStyles[kind], defects.counts[kind]);
+std::string countOf(const MeshDefects& defects, DefectKind kind) {
+  const bool all = kind != DefectKind::crossing || defects.allCrossings;
+  return (all ? "" : "≥") + formatCount(defects.count(kind));
 }
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
@@ -211,21 +210,23 @@ std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vec
 
 }  // namespace
 
-Color defectColor(DefectKind kind) { return kStyles[static_cast<std::size_t>(kind)].color; }
+Color defectColor(DefectKind kind) { return styleOf(kind).color; }
 
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects) {
   std::vector<Legend::Defects> legend;
-  forEachKind(defects, [&](const Style& style, std::size_t count) {
-    legend.push_back({style.names[0], count, style.color});
-  });
+  for (const Swatch& swatch : defectSwatches(defects))
+    legend.push_back({swatch.names.front(), swatch.count, swatch.color});
   return legend;
 }
 
 std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
   std::vector<Swatch> swatches;
-  forEachKind(defects, [&](const Style& style, std::size_t count) {
-    swatches.push_back({{style.names[0], style.names[1]}, formatCount(count), style.color});
-  });
+  for (std::size_t i = 0; i < kDefectKinds; ++i) {
+    const auto kind = DefectKind(i);
+    if (defects.count(kind) == 0) continue;
+    swatches.push_back(styleOf(kind));
+    swatches.back().count = countOf(defects, kind);
+  }
   return swatches;
 }
 
@@ -235,7 +236,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
   std::vector<Stroke> strokes;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
     Groups groups(width, height);
-    const Color color = kStyles[kind].color;
+    const Color color = defectColor(DefectKind(kind));
     for (const Defect& defect : defects.of(DefectKind(kind))) {
       const auto [from, to] = beforeEye(camera, defect.ends, width, height);
       if (!(from.depth > 0)) continue;

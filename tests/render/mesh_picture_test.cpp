@@ -243,16 +243,34 @@ TEST(MeshPicture, OpenGlAgrees) {
 TEST(MeshPicture, LegendIsTidyAtAnySize) {
   MeshDefects defects;
   defects.counts = {1234567, 89, 1, 12, 1000000};
+  defects.allCrossings = false;
   const std::array<std::string, 2> titles = {"Defects of the mesh", "Defects"};
-  for (const auto& [width, height] :
-       {std::pair(320, 240), std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
+  for (const auto& [width, height] : {std::pair(200, 140), std::pair(320, 240), std::pair(400, 800),
+                                      std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
     const Frame frame = render::frame(width, height);
     Furniture furniture;
     addSwatches(furniture, frame, titles, defectSwatches(defects));
     expectTidy(furniture, frame, std::to_string(width));
+    for (const TextItem& item : furniture.texts) EXPECT_FALSE(item.text.ends_with("…")) << width << ": " << item.text;
     if (width >= 640) {
       EXPECT_EQ(furniture.texts.size(), 11u) << width;
     }
+  }
+}
+
+TEST(MeshPicture, TellsWhereSomeCrossingsWereLeftOut) {
+  MeshDefects defects;
+  defects.counts = {12, 0, 0, 0, 1234};
+  for (const bool all : {true, false}) {
+    defects.allCrossings = all;
+    const std::vector<Swatch> swatches = defectSwatches(defects);
+    const std::vector<Legend::Defects> legend = defectLegend(defects);
+    ASSERT_EQ(swatches.size(), 2u);
+    ASSERT_EQ(legend.size(), 2u);
+    EXPECT_EQ(swatches[0].count, "12");
+    EXPECT_EQ(swatches[1].count, all ? "1,234" : "≥1,234");
+    EXPECT_EQ(legend[1].count, swatches[1].count);
+    EXPECT_EQ(legend[1].name, "pairs of faces that meet");
   }
 }
 
