@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <iterator>
 #include <optional>
 #include <span>
@@ -186,11 +187,24 @@ std::string repairText(const RepairedMesh& mended, const std::string& file) {
 /// Draws the mesh with its defects.
 void drawPicture(Session& session, const Arguments& arguments, const Inspected& found) {
   const render::SurfacePicture look = cameraPicture(arguments);
-  render::MeshPicture picture{look.camera, look.width, look.height, look.samples};
+  render::MeshPicture picture{look.camera, look.width, look.height, look.samples, !arguments.given("camera")};
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
-  const auto renderer = makeBodyRenderer({found.imported.mesh}, backend(arguments));
-  savePng(drawMesh(*renderer, found.imported.mesh, found.defects, picture), arguments.text("picture"));
-  session.setLastRenderer(renderer->description());
+  const auto make = [&](std::vector<TriangleMesh> meshes) {
+    auto renderer = makeBodyRenderer(std::move(meshes), backend(arguments));
+    session.setLastRenderer(renderer->description());
+    return renderer;
+  };
+  savePng(drawMesh(make, found.imported.mesh, found.defects, picture), arguments.text("picture"));
+}
+
+/// Draws it, if that is asked for. What it failed with, to be thrown once all the rest is told.
+std::exception_ptr tryPicture(Session& session, const Arguments& arguments, const Inspected& found) {
+  try {
+    if (arguments.given("picture")) drawPicture(session, arguments, found);
+  } catch (const Error&) {
+    return std::current_exception();
+  }
+  return nullptr;
 }
 
 void checkMesh(const Arguments& arguments) {
@@ -211,12 +225,13 @@ void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("picture")) checkWritable(arguments.text("picture"));
   const Inspected found = inspected(session, arguments);
   const MeshReport& report = found.imported.report;
-  if (arguments.given("picture")) drawPicture(session, arguments, found);
   std::optional<RepairedMesh> mended;
   if (arguments.given("repair")) {
     mended = repaired(found.imported);
     saveMesh(mended->imported.mesh, arguments.text("repair"));
   }
+  const std::exception_ptr undrawn = tryPicture(session, arguments, found);
+  const bool drawn = arguments.given("picture") && !undrawn;
   if (session.wantsJson(arguments)) {
     Json json = meshJson(surface, report);
     json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
@@ -225,7 +240,7 @@ void runMesh(Session& session, const Arguments& arguments) {
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
     if (found.check) json["sign_check"] = checkJson(*found.check);
     if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
-    if (arguments.given("picture")) json["picture"] = arguments.text("picture");
+    if (drawn) json["picture"] = arguments.text("picture");
     printJson(session.console().out, json);
   } else {
     session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
@@ -234,9 +249,9 @@ void runMesh(Session& session, const Arguments& arguments) {
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "")
                           << (mended ? repairText(*mended, arguments.text("repair")) : "")
-                          << (arguments.given("picture") ? summaryRow("picture", printable(arguments.text("picture")))
-                                                         : "");
+                          << (drawn ? summaryRow("picture", printable(arguments.text("picture"))) : "");
   }
+  if (undrawn) std::rethrow_exception(undrawn);
   if (found.check && found.check->wrong > 0)
     throw Failed(fmt::format("{}: {} of {} signs are wrong", surface, found.check->wrong, found.check->places));
 }
@@ -245,9 +260,11 @@ void runMesh(Session& session, const Arguments& arguments) {
 std::vector<Parameter> meshLookParameters(const Registry& registry) {
   std::vector<Parameter> parameters = lookParameters(registry);
   parameters.push_back(*findParameter(registry.command("render"), "up"));
-  std::ranges::find(parameters, "camera", &Parameter::name)->help =
+  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  camera.help =
       "Azimuth and elevation in degrees, and the eye's distance from the mesh's middle in diagonals of a cube around "
-      "it.";
+      "it. When left out, 30 and 20 degrees, as near as shows the whole mesh.";
+  camera.defaultText.clear();
   std::ranges::find(parameters, "target", &Parameter::name)->help =
       "The point in the picture's middle, which the camera circles; the mesh's middle when left out. With a small "
       "distance in camera, a close look at a defect.";
@@ -271,8 +288,8 @@ Command meshCommand(const Registry& registry) {
           "consistently: the way of most of what hangs together with them, and closed parts outwards, but for "
           "cavities. It closes no holes and cuts no folds, which --sign winding can do with.\n"
           "\n"
-          "--picture draws it: clay from outside, blue from behind, red where faces meet others, defects in colours "
-          "of their own, small ones in rings.\n"
+          "--picture draws it: clay from outside, blue from behind, pale red where faces meet others, defects in "
+          "colours of their own, small ones in rings, hidden ones dashed.\n"
           "\n"
           "--check-sign compares the sign with the winding number summed over all faces, at random places: half "
           "of them in and around the mesh's box, half close to its faces. Exit status 1 where one is wrong that is "

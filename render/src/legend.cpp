@@ -341,9 +341,9 @@ void addSwatches(Furniture& furniture, const Frame& frame, std::span<const std::
     furniture.boxes.push_back({left + 1, top + 1, left + side - 1, top + side - 1, swatch.color});
     addText(furniture, fittingTitle(swatch.names, small, column.right - text), small, text,
             top + (side + capHeight(small)) / 2, kSoftInk);
-    if (!swatch.count.empty())
-      addText(furniture, fitText(swatch.count, em, column.right - text), em, text, top + 1.35 * small + capHeight(em),
-              kInk);
+    const double size = advanceOf(swatch.count, em) <= column.right - text ? em : small;
+    addText(furniture, fitText(swatch.count, size, column.right - text), size, text, top + 1.35 * small + capHeight(em),
+            kInk);
     column.top += height;
   }
 }

@@ -2,7 +2,6 @@
 // What stands around a view: legend or colour bar to its right, caption below. Laid out first, as rectangles and texts,
 // so that tests can see that nothing is clipped and nothing overlaps; then painted.
 
-#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -79,7 +78,7 @@ void addFacts(Furniture& furniture, const Frame& frame, std::span<const std::str
 
 /// A colour, what it stands for and how often it is there, which may be left out.
 struct Swatch {
-  std::array<std::string, 2> names;  ///< the first that fits is taken
+  std::vector<std::string> names;  ///< the first that fits is taken
   std::string count;
   Color color;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace {
 
 constexpr Color kCasing = {24, 22, 34};
 constexpr float kCasingStrength = 0.7F;
-constexpr float kHidden = 0.3F;      // strength of what lies behind something
+constexpr float kHidden = 0.7F;      // strength of what lies behind something: in dashes, so that hues stay apart
+constexpr double kDash = 4;          // in thin lines, a dash and a gap each
 constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface may rise beside an edge of its own
 constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
 constexpr double kDotRadius = 2.6;
@@ -23,21 +25,20 @@ constexpr double kLeastRing = 9;       // pixels, its radius
 constexpr double kNearestMark = 1e-3;  // before the eye, of how far away an edge's other end is
 constexpr int kGroupCell = 8;          // pixels: what lies in neighbouring cells of this size is one group
 
-struct Style {
-  std::array<const char*, 2> names;
-  Color color;
-};
-constexpr std::array<Style, kDefectKinds> kStyles = {{{{"boundary edges", "boundary"}, {255, 208, 0}},
-                                                      {{"non-manifold edges", "non-manifold"}, {226, 0, 206}},
-                                                      {{"inconsistent edges", "inconsistent"}, {0, 176, 80}},
-                                                      {{"pinched vertices", "pinched"}, {255, 255, 255}},
-                                                      {{"pairs of faces that meet", "pairs meet"}, {232, 24, 24}}}};
+/// As of a panel that has them all.
+const Swatch& styleOf(DefectKind kind) {
+  static const std::array<Swatch, kDefectKinds> styles = {
+      {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
+       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {226, 0, 206}},
+       {{"inconsistent edges", "inconsistent", "opposed"}, "", {0, 176, 80}},
+       {{"pinched vertices", "pinched"}, "", {255, 255, 255}},
+       {{"pairs of faces that meet", "pairs meet"}, "", {232, 24, 24}}}};
+  return styles[static_cast<std::size_t>(kind)];
+}
 
-/// Calls visit(style, count) for each kind that there is.
-template <typename Visit>
-void forEachKind(const MeshDefects& defects, const Visit& visit) {
-  for (std::size_t kind = 0; kind < kDefectKinds; ++kind)
-    if (defects.counts[kind] > 0) visit(kStyles[kind], defects.counts[kind]);
+std::string countOf(const MeshDefects& defects, DefectKind kind) {
+  const bool all = kind != DefectKind::crossing || defects.allCrossings;
+  return (all ? "" : "≥") + formatCount(defects.count(kind));
 }
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
@@ -53,8 +54,8 @@ struct Stroke {
 
 class Painter {
  public:
-  Painter(Image& picture, const ViewBuffers& buffers, int samples)
-      : picture_(picture), buffers_(buffers), samples_(samples) {}
+  Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
+      : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
 
   /// Mixes a colour in where strokes, grown by `border`, cover pixels.
   void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
@@ -88,7 +89,9 @@ class Painter {
         const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
         const double covered = std::clamp(stroke.half + border + 0.5 - away, 0.0, 1.0);
         if (covered <= 0) continue;
-        const float strength = isHidden(stroke, t, x, y) ? kHidden : 1.0F;
+        const bool hidden = isHidden(stroke, t, x, y);
+        if (hidden && isGap(stroke, middle)) continue;
+        const float strength = hidden ? kHidden : 1.0F;
         Color& pixel = picture_.at(x, y);
         pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
       }
@@ -106,9 +109,21 @@ class Painter {
     return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
   }
 
+  /// By the place in the picture, not along the line: edges shorter than a dash have gaps too. A dot has none.
+  bool isGap(const Stroke& stroke, const Eigen::Vector2d& place) const {
+    const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
+    double way = across > down ? place.x() : place.y();
+    if (stroke.radius > 0)
+      way = stroke.radius * (std::numbers::pi + std::atan2(place.y() - stroke.from.y, place.x() - stroke.from.x));
+    else if (across == 0 && down == 0)
+      return false;
+    return std::fmod(way, 2 * dash_) >= dash_;
+  }
+
   Image& picture_;
   const ViewBuffers& buffers_;
   int samples_;
+  double dash_;  ///< pixels
 };
 
 /// What hangs together in the picture, of one kind: cells of some pixels that touch.
@@ -195,21 +210,23 @@ std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vec
 
 }  // namespace
 
-Color defectColor(DefectKind kind) { return kStyles[static_cast<std::size_t>(kind)].color; }
+Color defectColor(DefectKind kind) { return styleOf(kind).color; }
 
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects) {
   std::vector<Legend::Defects> legend;
-  forEachKind(defects, [&](const Style& style, std::size_t count) {
-    legend.push_back({style.names[0], count, style.color});
-  });
+  for (const Swatch& swatch : defectSwatches(defects))
+    legend.push_back({swatch.names.front(), swatch.count, swatch.color});
   return legend;
 }
 
 std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
   std::vector<Swatch> swatches;
-  forEachKind(defects, [&](const Style& style, std::size_t count) {
-    swatches.push_back({{style.names[0], style.names[1]}, formatCount(count), style.color});
-  });
+  for (std::size_t i = 0; i < kDefectKinds; ++i) {
+    const auto kind = DefectKind(i);
+    if (defects.count(kind) == 0) continue;
+    swatches.push_back(styleOf(kind));
+    swatches.back().count = countOf(defects, kind);
+  }
   return swatches;
 }
 
@@ -219,7 +236,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
   std::vector<Stroke> strokes;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
     Groups groups(width, height);
-    const Color color = kStyles[kind].color;
+    const Color color = defectColor(DefectKind(kind));
     for (const Defect& defect : defects.of(DefectKind(kind))) {
       const auto [from, to] = beforeEye(camera, defect.ends, width, height);
       if (!(from.depth > 0)) continue;
@@ -241,7 +258,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
     }
   }
   // all casings first, so that none covers a neighbour
-  Painter painter(picture, buffers, samples);
+  Painter painter(picture, buffers, samples, lineWidth);
   painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
   painter.paint(strokes, 0, nullptr, 1);
 }

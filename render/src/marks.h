@@ -24,7 +24,7 @@ std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);
 /// The same for a panel beside the view.
 std::vector<Swatch> defectSwatches(const MeshDefects& defects);
 
-/// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Faint where
+/// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Dashed where
 /// something in the buffers hides it. The view lies in the picture's upper left corner.
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
                   const MeshDefects& defects, double lineWidth);

@@ -488,7 +488,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (evidence.defects) {
     paintDefects(image, view.camera, buffers, samples, *evidence.defects, sampling.lineWidth);
     legend.defects = defectLegend(*evidence.defects);
-    for (const auto& [name, count, color] : legend.defects) details.push_back(name + ": " + formatCount(count));
+    for (const auto& [name, count, color] : legend.defects) details.push_back(name + ": " + count);
   }
   addArrows(image, frame, field, view, buffers, samples, picture.arrows);
   addBodyDetails(picture.bodies, details);

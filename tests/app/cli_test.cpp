@@ -341,6 +341,21 @@ TEST_F(Cli, meshIsDrawn) {
   expectRefused({{"mesh", at("bad.obj"), "--view", "front"}}, "view belongs to picture");
 }
 
+TEST_F(Cli, meshIsToldAndMendedWhateverItsPictureDoes) {
+  writeFile(at("bad.obj"), kBadTetrahedron);
+  for (const bool json : {false, true}) {
+    Call call{{"mesh", at("bad.obj"), "--picture", at("bad.png"), "--cpu", "--repair", at("mended.obj"), "--size",
+               "9000x9000"}};
+    if (json) call.words.push_back("--json");
+    const Outcome outcome = run(call);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, AllOf(StartsWith("hpsdf: error: "), HasSubstr("64 million")));
+    EXPECT_THAT(outcome.out, AllOf(HasSubstr("inconsistent"), HasSubstr("mended.obj"), Not(HasSubstr("picture"))));
+    EXPECT_TRUE(fs::remove(at("mended.obj")));
+    EXPECT_FALSE(fs::exists(at("bad.png")));
+  }
+}
+
 TEST_F(Cli, buildLeavesOutBuriedWalls) {
   const std::string box = "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 2 2 0\nv 0 0 2\nv 2 0 2\nv 0 2 2\nv 2 2 2\n";
   std::string text = box;

@@ -8,8 +8,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "expect_tidy.h"
 #include "hpsdf/build.h"
@@ -39,7 +41,7 @@ MeshPicture pictureFrom(double azimuth, double elevation) {
 }
 
 Image drawn(const TriangleMesh& mesh, const MeshPicture& picture) {
-  return drawMesh(*makeCpuBodyRenderer({mesh}), mesh, defectsOf(mesh), picture);
+  return drawMesh(makeCpuBodyRenderer, mesh, defectsOf(mesh), picture);
 }
 
 /// The pixel that shows a place.
@@ -81,18 +83,35 @@ int nearestTo(const Color& color, const Image& image, const TriangleMesh& mesh, 
   return least;
 }
 
-TEST(MeshPicture, DrawsEdgesInTheirColourAndFaintlyWhereHidden) {
+TEST(MeshPicture, DrawsEdgesInTheirColour) {
   const TriangleMesh open = openBox();
   const Color yellow = defectColor(DefectKind::boundaryEdge);
   const Vector3 onRim(0, -1, 1);  // in front
-  const MeshPicture above = pictureFrom(0, 30), below = pictureFrom(0, -30);
+  const MeshPicture above = pictureFrom(0, 30);
   EXPECT_LT(nearestTo(yellow, drawn(open, above), open, above, onRim), 150);
   EXPECT_GT(nearestTo(yellow, drawn(boxOfTwo(), above), boxOfTwo(), above, onRim), 200);
-  const Vector3 behind(0, 1, 1);  // from below, behind floor and front
-  const int hidden = nearestTo(yellow, drawn(open, below), open, below, behind);
-  const int plain = nearestTo(yellow, drawn(boxOfTwo(), below), boxOfTwo(), below, behind);
-  EXPECT_GT(hidden, 150);
-  EXPECT_LT(hidden, plain - 20) << "not seen at all";
+}
+
+TEST(MeshPicture, DashesWhatIsHiddenAndKeepsItsHue) {
+  MeshPicture below = pictureFrom(0, -30);
+  below.width = 1280;
+  below.height = 720;
+  const TriangleMesh box = boxOfTwo(), open = openBox();
+  TriangleMesh wrong = box;  // all around its upper side edges are inconsistent, where those of the open one are open
+  for (auto& triangle : wrong.triangles)
+    if (std::ranges::all_of(triangle, [&](std::uint32_t v) { return wrong.vertices[v].z() > 0; }))
+      std::swap(triangle[0], triangle[1]);
+  const Image plain = drawn(box, below), boundary = drawn(open, below), inconsistent = drawn(wrong, below);
+  int gaps = 0, dashes = 0;
+  constexpr int kPlaces = 200;
+  for (int i = 0; i < kPlaces; ++i) {
+    const Vector3 behind(1.8 * (i + 0.5) / kPlaces - 0.9, 1, 1);  // behind floor and front
+    const Color yellow = colorAt(boundary, box, below, behind), green = colorAt(inconsistent, box, below, behind);
+    gaps += yellow == colorAt(plain, box, below, behind) && green == yellow;
+    dashes += differenceOf(yellow, green) > 150;
+  }
+  EXPECT_GT(gaps, kPlaces / 3);
+  EXPECT_GT(dashes, kPlaces / 3);
 }
 
 TEST(MeshPicture, DrawsEdgesThatBeginBehindTheEye) {
@@ -139,6 +158,77 @@ TEST(MeshPicture, ReddensFacesThatMeet) {
   const Color meeting = colorAt(drawn(mesh, above), mesh, above, {-0.5, -0.7, 1});
   EXPECT_GT(meeting[0], meeting[1] + 60);
   EXPECT_LT(std::abs(meeting[1] - meeting[2]), 40);
+  EXPECT_GT(differenceOf(meeting, defectColor(DefectKind::crossing)), 150) << "rings on them do not show";
+}
+
+/// What pictures of two meshes do not share.
+Eigen::AlignedBox2i differenceBox(const Image& a, const Image& b) {
+  Eigen::AlignedBox2i box;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x)
+      if (a.at(x, y) != b.at(x, y)) box.extend(Eigen::Vector2i(x, y));
+  return box;
+}
+
+TEST(MeshPicture, ShowsTheWholeMeshWhateverItsShapeAndTheViews) {
+  for (const Vector3& sizes : {Vector3(1, 1, 1), Vector3(1, 9, 1), Vector3(9, 1, 1), Vector3(3, 1, 3)})
+    for (const auto& [width, height] : {std::pair(480, 300), std::pair(150, 400)})
+      for (const Projection projection : {Projection::perspective, Projection::orthographic})
+        for (const double elevation : {20.0, 90.0}) {
+          TriangleMesh mesh = boxOfTwo();
+          for (Vector3& vertex : mesh.vertices) vertex = vertex.cwiseProduct(sizes);
+          MeshPicture picture = pictureFrom(30, elevation);
+          picture.whole = true;
+          picture.width = width;
+          picture.height = height;
+          picture.camera.projection = projection;
+          MeshPicture away = picture;  // looks past it
+          away.whole = false;
+          away.camera.target = Vector3(1e4, 0, 0);
+          const Eigen::AlignedBox2i seen = differenceBox(drawn(mesh, picture), drawn(mesh, away));
+          const PixelRect view = frame(width, height).view;
+          SCOPED_TRACE(testing::Message() << sizes.transpose() << ", " << width << "x" << height << ", elevation "
+                                          << elevation << ", projection " << int(projection));
+          EXPECT_GT(seen.min().minCoeff(), 0);
+          EXPECT_LT(seen.max().x(), view.x1 - 1);
+          EXPECT_LT(seen.max().y(), view.y1 - 1);
+          const Eigen::Array2d share = seen.sizes().cast<double>().array() / Eigen::Array2d(view.x1, view.y1);
+          EXPECT_GT(share.maxCoeff(), 0.6) << "smaller than need be";
+        }
+}
+
+/// As GL does it, through llvmpipe.
+std::unique_ptr<BodyRenderer> makeGl(std::vector<TriangleMesh> meshes) {
+  return makeGlBodyRenderer(std::move(meshes), GlChoice::software);
+}
+
+std::size_t differentPixels(const Image& a, const Image& b, int limit) {
+  std::size_t different = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) different += differenceOf(a.at(x, y), b.at(x, y)) > limit;
+  return different;
+}
+
+TEST(MeshPicture, IsTheSameAtAnySizeAndPlace) {
+  HPSDF_REQUIRE_GL();
+  const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
+  for (const Projection projection : {Projection::perspective, Projection::orthographic})
+    for (const MakeBodyRenderer& make : {MakeBodyRenderer(makeCpuBodyRenderer), MakeBodyRenderer(makeGl)}) {
+      const auto drawnBy = [&](double scale, const Vector3& by) {
+        MeshPicture above = pictureFrom(20, 40);
+        above.camera.projection = projection;
+        above.camera.target = scale * Vector3(0.5, 0, 0) + by;
+        const TriangleMesh other = moved(mesh, by, scale);
+        return drawMesh(make, other, defectsOf(other), above);
+      };
+      const Image image = drawnBy(1, {0, 0, 0});
+      for (const int exponent : {-148, -100, 60, 126}) {
+        const double scale = std::ldexp(1.0, exponent);
+        EXPECT_EQ(differentPixels(image, drawnBy(scale, {0, 0, 0}), 0), 0u) << exponent;
+      }
+      const double far = std::ldexp(1.0, 60);  // coordinates 1024 apart there keep the mesh as it is
+      EXPECT_EQ(differentPixels(image, drawnBy(std::ldexp(1.0, 20), {far, -far, far}), 0), 0u);
+    }
 }
 
 TEST(MeshPicture, OpenGlAgrees) {
@@ -146,26 +236,41 @@ TEST(MeshPicture, OpenGlAgrees) {
   const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   const MeshPicture above = pictureFrom(20, 40);
   const Image cpu = drawn(mesh, above);
-  const Image gl = drawMesh(*makeGlBodyRenderer({mesh}, GlChoice::software), mesh, defectsOf(mesh), above);
-  std::size_t different = 0;
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) different += differenceOf(cpu.at(x, y), gl.at(x, y)) > 40;
-  EXPECT_LT(different, std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
+  const Image gl = drawMesh(makeGl, mesh, defectsOf(mesh), above);
+  EXPECT_LT(differentPixels(cpu, gl, 40), std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
 }
 
 TEST(MeshPicture, LegendIsTidyAtAnySize) {
   MeshDefects defects;
   defects.counts = {1234567, 89, 1, 12, 1000000};
+  defects.allCrossings = false;
   const std::array<std::string, 2> titles = {"Defects of the mesh", "Defects"};
-  for (const auto& [width, height] :
-       {std::pair(320, 240), std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
+  for (const auto& [width, height] : {std::pair(200, 140), std::pair(320, 240), std::pair(400, 800),
+                                      std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
     const Frame frame = render::frame(width, height);
     Furniture furniture;
     addSwatches(furniture, frame, titles, defectSwatches(defects));
     expectTidy(furniture, frame, std::to_string(width));
+    for (const TextItem& item : furniture.texts) EXPECT_FALSE(item.text.ends_with("…")) << width << ": " << item.text;
     if (width >= 640) {
       EXPECT_EQ(furniture.texts.size(), 11u) << width;
     }
+  }
+}
+
+TEST(MeshPicture, TellsWhereSomeCrossingsWereLeftOut) {
+  MeshDefects defects;
+  defects.counts = {12, 0, 0, 0, 1234};
+  for (const bool all : {true, false}) {
+    defects.allCrossings = all;
+    const std::vector<Swatch> swatches = defectSwatches(defects);
+    const std::vector<Legend::Defects> legend = defectLegend(defects);
+    ASSERT_EQ(swatches.size(), 2u);
+    ASSERT_EQ(legend.size(), 2u);
+    EXPECT_EQ(swatches[0].count, "12");
+    EXPECT_EQ(swatches[1].count, all ? "1,234" : "≥1,234");
+    EXPECT_EQ(legend[1].count, swatches[1].count);
+    EXPECT_EQ(legend[1].name, "pairs of faces that meet");
   }
 }
 

@@ -315,7 +315,7 @@ void drawDefectSwatches(const std::vector<render::Legend::Defects>& defects) {
     const ImVec2 from = cursor();
     list.AddRectFilled(from, {from.x + kSide, from.y + kSide}, IM_COL32(60, 64, 78, 255));
     list.AddRectFilled({from.x + 1, from.y + 1}, {from.x + kSide - 1, from.y + kSide - 1}, packed(color));
-    textAt(from.x + kSide + 8, from.y - 2, name + ": " + grouped(count), IM_COL32(32, 34, 44, 255));
+    textAt(from.x + kSide + 8, from.y - 2, name + ": " + count, IM_COL32(32, 34, 44, 255));
     ImGui::Dummy({widthLeft(), kRow});
   }
 }

@@ -156,8 +156,8 @@ struct Legend {
   std::vector<Color> bar = {};     ///< from its low end to its high end; of all others
   std::vector<Mark> marks = {};
   struct Defects {
-    std::string name;  ///< "boundary edges"
-    std::size_t count;
+    std::string name;   ///< "boundary edges"
+    std::string count;  ///< "1,234"; "≥1,234" where some were left out
     Color color;
   };
   std::vector<Defects> defects = {};  ///< of the mesh, where they are marked
