@@ -380,6 +380,33 @@ TEST(OutputFile, LeftoversOfKilledProcessesAreRemoved) {
   EXPECT_NO_THROW(OutputFile::removeAbandoned(folder / "none" / "out"));
 }
 
+/// A name may have 255 bytes, and leaves no room for more.
+TEST(OutputFile, LongNamesHaveShortTemporaryOnes) {
+  support::TemporaryDirectory folder;
+  std::string letters;
+  for (int i = 0; i < 127; ++i) letters += "\u00e4";  // two bytes each
+  for (const std::string& name : {std::string(255, 'n'), letters}) {
+    OutputFile whole(folder / name);
+    whole.write("whole");
+    whole.commit();
+    EXPECT_EQ(namesIn(folder.path()), std::set<std::string>{name});
+    if (const pid_t killed = fork(); killed == 0) {
+      OutputFile half(folder / name);
+      _exit(0);
+    } else {
+      waitpid(killed, nullptr, 0);
+    }
+    EXPECT_EQ(namesIn(folder.path()).size(), 2u);
+    for (const std::string& left : namesIn(folder.path()))
+      EXPECT_TRUE(left == name || left.find('\xa4', 60) == std::string::npos) << "whole letters only: " << left;
+    OutputFile::removeAbandoned(folder / (name.substr(0, name.size() - 2) + "oo"));
+    EXPECT_EQ(namesIn(folder.path()).size(), 2u) << "of another name that begins so";
+    OutputFile::removeAbandoned(folder / name);
+    EXPECT_EQ(namesIn(folder.path()), std::set<std::string>{name});
+    std::filesystem::remove(folder / name);
+  }
+}
+
 /// In a container the next process often has the number of the one that was killed.
 TEST(OutputFile, ATakenTemporaryNameIsNoObstacle) {
   support::TemporaryDirectory folder;

@@ -5,7 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -142,6 +145,67 @@ TEST(MeshRepair, CavitiesStay) {
   EXPECT_NEAR(nested.imported.report.volume, (27 - 8 + 1) * signedVolume(ball()), 1e-9);
 }
 
+/// A box of size 2 that reaches from one corner to the other.
+TriangleMesh boxBetween(const Vector3& low, const Vector3& high) {
+  TriangleMesh mesh = boxOfTwo();
+  for (Vector3& x : mesh.vertices) x = (low + high) / 2 + x.cwiseProduct(high - low) / 2;
+  return mesh;
+}
+
+void expectUnchanged(const TriangleMesh& mesh, const char* what) {
+  const RepairedMesh mended = repaired(cleaned(mesh));
+  EXPECT_EQ(mended.turnedPatches, 0u) << what;
+  EXPECT_EQ(mended.turnedFaces, 0u) << what;
+  EXPECT_EQ(mended.imported.mesh.triangles, cleaned(mesh).mesh.triangles) << what;
+}
+
+TEST(MeshRepair, CavitiesThatTouchStay) {
+  const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2), one = boxBetween({-1, -1, -1}, {0, 0, 1});
+  const TriangleMesh inAnEdge = joined(one, boxBetween({0, 0, -1}, {1, 1, 1}));
+  expectUnchanged(joined(outer, turned(inAnEdge)), "in an edge");
+  const TriangleMesh inAWall = joined(one, boxBetween({0, -1, -1}, {1, 0, 1}));
+  expectUnchanged(joined(outer, turned(inAWall)), "in a wall");
+  for (const TriangleMesh& pair : {inAnEdge, inAWall}) {
+    const RepairedMesh outside = repaired(cleaned(joined(outer, moved(turned(pair), {4, 0, 0}))));
+    EXPECT_GT(outside.turnedPatches, 1u);
+    EXPECT_EQ(outside.imported.mesh.triangles, cleaned(joined(outer, moved(pair, {4, 0, 0}))).mesh.triangles);
+  }
+}
+
+TEST(MeshRepair, CavitiesWithAHoleStay) {
+  const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2);
+  TriangleMesh lacking = boxOfTwo();
+  for (std::size_t lack = 0; lack < 2; ++lack) {  // a triangle, a side
+    lacking.triangles.pop_back();
+    expectUnchanged(joined(outer, turned(lacking)), "within a box");
+  }
+  expectUnchanged(joined(moved(openBox(), {0, 0, -2}, 2), turned(moved(openBox(), {0, 0, -1.5}, 1.5))),
+                  "the inner wall of a cup, up to its rim");
+}
+
+TEST(MeshRepair, WhatReachesOutOfAnotherIsNoCavity) {
+  const TriangleMesh outer = boxOfTwo(), through = boxBetween({0, -0.9, -0.9}, {1.6, 0.9, 0.9});
+  for (std::size_t largest = 0; largest < through.triangles.size(); ++largest) {
+    TriangleMesh given = through;
+    std::ranges::rotate(given.triangles, given.triangles.begin() + static_cast<std::ptrdiff_t>(largest));
+    const RepairedMesh mended = repaired(cleaned(joined(outer, turned(given))));
+    EXPECT_EQ(mended.turnedPatches, 1u) << largest;
+    EXPECT_EQ(mended.imported.mesh.triangles, joined(outer, given).triangles) << largest;
+  }
+  expectUnchanged(joined(outer, turned(boxBetween({-0.9, -0.9, -0.9}, {1.1, 0.9, 0.9}))), "but for a tenth within");
+}
+
+TEST(MeshRepair, OneSidedSurfacesStayWhateverTheirVolume) {
+  const TriangleMesh box = boxBetween({-9, -9, -9}, {-5, -5, -5}), strip = moebiusStrip(24);
+  const MeshReport report = inspect(strip);
+  ASSERT_GT(std::abs(report.volume), 0.01 * report.box.volume()) << "plain, were there two sides";
+  for (const TriangleMesh& given : {strip, turned(strip)}) {
+    const RepairedMesh mended = repaired(cleaned(joined(box, given)));
+    EXPECT_EQ(mended.turnedPatches, 0u);
+    EXPECT_EQ(mended.imported.mesh.triangles, joined(box, given).triangles);
+  }
+}
+
 TEST(MeshRepair, OpenBodiesTurnAndKeepTheirHole) {
   const TriangleMesh open = support::openAbove(ball(), 0.7);
   const RepairedMesh mended = repaired(cleaned(joined(ball({5, 0, 0}, 2), turned(open))));
@@ -179,6 +243,26 @@ TEST(MeshExport, ComesBackAsItWas) {
     EXPECT_EQ(again.report.box.min().y(), -4) << name;
     EXPECT_NEAR(again.report.box.max().z(), 1 + 1e-3, 1e-7) << name;
     EXPECT_NEAR(again.report.volume, 8, 1e-6);  // the reader's floats
+  }
+}
+
+/// assimp takes the byte of a line feed there for part of the header.
+TEST(MeshExport, WhateverByteThePlysDataBeginWith) {
+  const support::TemporaryDirectory folder;
+  const std::filesystem::path file = folder.path() / "box.ply";
+  for (std::uint64_t byte = 0; byte < 256; ++byte) {
+    TriangleMesh mesh = boxOfTwo();
+    double& first = mesh.vertices[0].x();
+    first = std::bit_cast<double>((std::bit_cast<std::uint64_t>(first) & ~std::uint64_t{255}) | byte);
+    saveMesh(mesh, file);
+    std::ifstream stream(file);
+    std::string line;
+    std::getline(stream, line);
+    std::getline(stream, line);
+    EXPECT_EQ(line, byte == '\n' ? "format ascii 1.0" : "format binary_little_endian 1.0") << byte;
+    const ImportedMesh again = importMesh(file);
+    EXPECT_EQ(again.mesh.vertices, boxOfTwo().vertices) << byte << " is lost in the reader's floats";
+    EXPECT_EQ(again.mesh.triangles, mesh.triangles) << byte;
   }
 }
 

@@ -388,6 +388,9 @@ TEST_F(MeshImport, OfAnySizeThatFloatsHold) {
   EXPECT_THAT(errorOf("t.obj", tetrahedronObj(1, 1e9)),
               AllOf(HasSubstr("no face with an area"),
                     HasSubstr("coordinates reach 1e+09, where the reader keeps them 64 apart")));
+  EXPECT_THAT(errorOf("t.off", "OFF\n1 2 0\n0.1 0.2 0.3\n3 0 0 0\n3 0 0 0\n"),
+              AllOf(HasSubstr("no face with an area (2 faces are degenerate)"), Not(HasSubstr("the reader keeps"))))
+      << "no other place would help";
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -437,6 +440,9 @@ TEST_F(MeshImport, TruncatedFiles) {
   EXPECT_THAT(errorOf("huge.off", "OFF # by hand\n# counts\n4000000000 1 0\n0 0 0\n"),
               HasSubstr("/huge.off: its header promises more"));
   EXPECT_THAT(errorOf("huge.off", "COFF 1 4000000000 0\n0 0 0\n"), HasSubstr("/huge.off: its header promises more"));
+  expectTetrahedron(
+      import("edges.off", "OFF\n4 4 600000\n5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
+      "edges.off");
   const std::string header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n";
   for (const char* end : {"", "end_", "#end_header\n", "end_headers\n"})
     EXPECT_THAT(errorOf("cut.ply", header + end), HasSubstr("/cut.ply: its header does not end")) << end;

@@ -9,16 +9,21 @@ namespace hpsdf {
 struct RepairedMesh {
   ImportedMesh imported;          ///< what cleaning did is in the report, too
   std::size_t turnedFaces = 0;    ///< looked another way than most of their patch
-  std::size_t turnedPatches = 0;  ///< turned as a whole: they looked inwards
+  std::size_t turnedPatches = 0;  ///< turned as a whole, with their bodies: they looked inwards
   std::size_t leftEdges = 0;      ///< of two faces that still run the same way: the surface has one side only
 };
 
 /// Turns triangles so that inside and outside are told consistently. Positions stay, no triangle is added or left out.
 ///
 /// Patches are what hangs together by edges of two triangles. Within each, all look the way of the greater part of its
-/// area; one that has one side only, as a Möbius strip, stays as it is. A closed patch that looks inwards is turned
-/// unless it is a cavity: one within an odd number of other closed ones. An open patch is turned when its volume is
-/// negative and plain, as of the whole mesh in `cleaned`.
+/// area; one that has one side only, as a Möbius strip, stays as it is.
+///
+/// Bodies are closed patches, patches that only together are closed (at every edge as many sides run one way as the
+/// other), and each other patch. A body that looks inwards is turned unless it is a cavity: within an odd number of
+/// other bodies, by their winding number, for three quarters of its area and more. Of open bodies only those look
+/// inwards, or have something within, whose volume is plain, as of the whole mesh in `cleaned`.
+///
+/// Throws `Error` for a mesh without triangles or of more than 2²⁸, of vertices that do not exist or are not finite.
 RepairedMesh repaired(ImportedMesh imported);
 
 }  // namespace hpsdf

@@ -1,5 +1,7 @@
 #include "hpsdf/mesh_repair.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "distance/hierarchy.h"
 #include "distance/inside.h"
 #include "distance/winding.h"
+#include "mesh/bodies.h"
 #include "mesh/looks_inward.h"
 #include "mesh/patches.h"
 #include "mesh/sides.h"
@@ -18,13 +21,12 @@
 namespace hpsdf {
 namespace {
 
-/// What is known of a patch.
-struct Patch {
-  double area = 0, areaAgainst = 0;  ///< of all its triangles; of those that look the other way
+/// Faces that are turned together.
+struct Body {
+  std::vector<std::uint32_t> faces;
+  double area = 0, volume = 0;
   Box box;
-  double volume = 0;
-  std::uint32_t greatest = 0;  ///< of its triangles
-  bool closed = true;
+  bool solid = false;  ///< its volume tells inside from outside
   bool turned = false;
 };
 
@@ -35,73 +37,123 @@ Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
 
 void turn(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
 
-std::vector<Patch> measured(const TriangleMesh& mesh, const Patches& patches, std::span<const Side> sides) {
-  std::vector<Patch> found(patches.count);
-  std::vector<double> greatest(patches.count, -1);
-  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    Patch& patch = found[patches.of[f]];
-    const double area = areaVector(mesh, f).norm();
-    patch.area += area;
-    if (patches.against[f]) patch.areaAgainst += area;
-    for (const std::uint32_t v : mesh.triangles[f]) patch.box.extend(mesh.vertices[v]);
-    if (area > greatest[patches.of[f]]) {
-      greatest[patches.of[f]] = area;
-      patch.greatest = f;
-    }
-  }
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    if (edge.size() == 2) return;
-    for (const Side& side : edge) found[patches.of[side.face]].closed = false;
-  });
-  return found;
-}
-
-/// Makes the triangles of each patch look one way, but for those that cannot; how many were turned.
-std::size_t agree(TriangleMesh& mesh, const Patches& patches, const std::vector<Patch>& found) {
+/// Makes the triangles of each patch look the way of the greater part of its area, but for those that cannot; how many
+/// were turned.
+std::size_t agree(TriangleMesh& mesh, const Patches& patches) {
+  std::vector<double> area(patches.count), against(patches.count);
+  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
+    (patches.against[f] ? against : area)[patches.of[f]] += areaVector(mesh, f).norm();
   std::size_t turned = 0;
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    const Patch& patch = found[patches.of[f]];
-    const char minority = patch.areaAgainst <= patch.area / 2 ? 1 : 0;
-    if (patches.oneSided[patches.of[f]] || patches.against[f] != minority) continue;
+    const std::uint32_t patch = patches.of[f];
+    const char minority = against[patch] <= area[patch] ? 1 : 0;
+    if (patches.oneSided[patch] || patches.against[f] != minority) continue;
     turn(mesh, f);
     ++turned;
   }
   return turned;
 }
 
-/// As of tetrahedra between the triangles and the middle of the patch's box.
-void addVolumes(const TriangleMesh& mesh, const Patches& patches, std::vector<Patch>& found) {
+/// By patch; those that belong to another's body have no faces. What has one side only is no solid. Volumes are as of
+/// tetrahedra between the triangles and the middle of the body's box.
+std::vector<Body> measured(const TriangleMesh& mesh, const Patches& patches, const Bodies& bodies) {
+  std::vector<Body> found(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    Patch& patch = found[patches.of[f]];
-    patch.volume += areaVector(mesh, f).dot(mesh.vertices[mesh.triangles[f][0]] - patch.box.center()) / 3;
+    Body& body = found[bodies.of[patches.of[f]]];
+    body.faces.push_back(f);
+    body.area += areaVector(mesh, f).norm();
+    for (const std::uint32_t v : mesh.triangles[f]) body.box.extend(mesh.vertices[v]);
   }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    Body& body = found[i];
+    if (body.faces.empty() || patches.oneSided[i]) continue;
+    for (const std::uint32_t f : body.faces)
+      body.volume += areaVector(mesh, f).dot(mesh.vertices[mesh.triangles[f][0]] - body.box.center()) / 3;
+    body.solid = isPlain(body.volume, body.area, body.box, bodies.closed[i] != 0);
+    body.turned = body.solid && body.volume < 0;
+  }
+  return found;
 }
 
-void turnPatches(TriangleMesh& mesh, const Patches& patches, const std::vector<Patch>& found) {
-  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
-    if (found[patches.of[f]].turned) turn(mesh, f);
+void turnBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
+  for (const Body& body : bodies)
+    if (body.turned)
+      for (const std::uint32_t f : body.faces) turn(mesh, f);
 }
 
-/// Puts back what is a cavity, of closed patches that were turned: what is within an odd number of others. `mesh`: as
-/// it is with all closed patches looking outwards.
-void spareCavities(const TriangleMesh& mesh, const Patches& patches, std::vector<Patch>& found) {
-  TriangleMesh closed{.vertices = mesh.vertices, .triangles = {}, .name = mesh.name};
-  std::size_t others = 0;
-  for (const Patch& patch : found) others += patch.closed;
-  if (others < 2 || std::ranges::none_of(found, [](const Patch& p) { return p.closed && p.turned; })) return;
-  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
-    if (found[patches.of[f]].closed) closed.triangles.push_back(mesh.triangles[f]);
-  const distance::Hierarchy hierarchy(closed, boundingBox(closed));
-  const distance::Winding winding(hierarchy);
-  const double aside = distance::besideSurface(boundingBox(closed));
-  for (Patch& patch : found) {
-    if (!patch.closed || !patch.turned) continue;
-    const auto& [a, b, c] = mesh.triangles[patch.greatest];
-    const Vector3 before = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3 +
-                           aside * areaVector(mesh, patch.greatest).stableNormalized();
-    const auto within = winding.within(before, 0.25, [](const auto&) { return false; });
-    patch.turned = std::lround(within.value) % 2 == 0;
+/// Winding numbers of some bodies.
+class Around {
+ public:
+  Around(const TriangleMesh& mesh, std::span<const Body> bodies)
+      : surface_(surfaceOf(mesh, bodies)), hierarchy_(surface_, boundingBox(surface_)), winding_(hierarchy_) {}
+  Around(const Around&) = delete;
+  Around& operator=(const Around&) = delete;
+
+  /// To a quarter.
+  double times(const Vector3& place) const {
+    return winding_.within(place, 0.25, [](const auto&) { return false; }).value;
   }
+
+ private:
+  /// With the corners of each face its own, so that a small part of a large mesh takes little.
+  static TriangleMesh surfaceOf(const TriangleMesh& mesh, std::span<const Body> bodies) {
+    TriangleMesh surface{.vertices = {}, .triangles = {}, .name = mesh.name};
+    for (const Body& body : bodies) {
+      if (!body.solid) continue;
+      for (const std::uint32_t f : body.faces) {
+        const auto first = static_cast<std::uint32_t>(surface.vertices.size());
+        surface.triangles.push_back({first, first + 1, first + 2});
+        for (const std::uint32_t v : mesh.triangles[f]) surface.vertices.push_back(mesh.vertices[v]);
+      }
+    }
+    return surface;
+  }
+
+  TriangleMesh surface_;
+  distance::Hierarchy hierarchy_;
+  distance::Winding winding_;
+};
+
+/// Places spread evenly over a body's area, so far before it.
+std::vector<Vector3> placesBefore(const TriangleMesh& mesh, const Body& body, double aside) {
+  constexpr int kPlaces = 32;
+  constexpr double kStepAlong = 0.7548776662466927, kStepAcross = 0.5698402909980532;  // Roberts' R2 sequence
+  std::vector<Vector3> places;
+  double passed = 0;
+  for (const std::uint32_t f : body.faces) {
+    const Vector3 area = areaVector(mesh, f);
+    passed += area.norm();
+    for (double n = 0.5 + static_cast<double>(places.size()); n * body.area <= passed * kPlaces; ++n) {
+      double along = n * kStepAlong - std::floor(n * kStepAlong),
+             across = n * kStepAcross - std::floor(n * kStepAcross);
+      if (along + across > 1) {
+        along = 1 - along;
+        across = 1 - across;
+      }
+      const auto& [a, b, c] = mesh.triangles[f];
+      places.push_back(mesh.vertices[a] + along * (mesh.vertices[b] - mesh.vertices[a]) +
+                       across * (mesh.vertices[c] - mesh.vertices[a]) + aside * area.stableNormalized());
+    }
+  }
+  return places;
+}
+
+/// Puts back what is a cavity, of the bodies that were turned: what is within an odd number of other solids, for three
+/// quarters of its area and more. (What merely reaches into another is a body.) `mesh`: as it is with all solids
+/// looking outwards.
+void spareCavities(const TriangleMesh& mesh, std::vector<Body>& bodies) {
+  if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::turned)) return;
+  const Around all(mesh, bodies);
+  const double aside = distance::besideSurface(boundingBox(mesh));
+  tbb::parallel_for(std::size_t{0}, bodies.size(), [&](std::size_t i) {
+    Body& body = bodies[i];
+    if (!body.turned) return;
+    const Around itself(mesh, {&body, 1});
+    const std::vector<Vector3> places = placesBefore(mesh, body, aside);
+    const auto within = std::ranges::count_if(
+        places, [&](const Vector3& x) { return std::lround(all.times(x) - itself.times(x)) % 2 != 0; });
+    body.turned = 4 * within < 3 * std::ssize(places);
+  });
 }
 
 }  // namespace
@@ -109,18 +161,17 @@ void spareCavities(const TriangleMesh& mesh, const Patches& patches, std::vector
 RepairedMesh repaired(ImportedMesh imported) {
   TriangleMesh& mesh = imported.mesh;
   distance::requireSurface(mesh);
-  const std::vector<Side> sides = sidesByEdge(mesh.triangles);
-  const Patches patches = patchesOf(mesh.triangles.size(), sides);
-  std::vector<Patch> found = measured(mesh, patches, sides);
+  const Patches patches = patchesOf(mesh.triangles.size(), sidesByEdge(mesh.triangles));
   RepairedMesh result;
-  result.turnedFaces = agree(mesh, patches, found);
-  addVolumes(mesh, patches, found);
-  for (Patch& patch : found) patch.turned = looksInward(patch.volume, patch.area, patch.box, patch.closed);
+  result.turnedFaces = agree(mesh, patches);
+  const Bodies bodies = bodiesOf(patches, sidesByEdge(mesh.triangles));
+  std::vector<Body> found = measured(mesh, patches, bodies);
   TriangleMesh outward = mesh;
-  turnPatches(outward, patches, found);
-  spareCavities(outward, patches, found);
-  turnPatches(mesh, patches, found);
-  result.turnedPatches = static_cast<std::size_t>(std::ranges::count_if(found, &Patch::turned));
+  turnBodies(outward, found);
+  spareCavities(outward, found);
+  turnBodies(mesh, found);
+  result.turnedPatches = static_cast<std::size_t>(
+      std::ranges::count_if(bodies.of, [&](std::uint32_t body) { return found[body].turned; }));
 
   const MeshReport now = inspect(mesh);
   imported.report.inconsistentEdges = now.inconsistentEdges;  // nothing else depends on which way faces look

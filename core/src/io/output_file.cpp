@@ -2,12 +2,14 @@
 
 #include <signal.h>
 #include <unistd.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -24,11 +26,26 @@ std::string reason(int error) { return std::generic_category().message(error); }
 
 constexpr std::string_view kTemporary = ".part-";  // a process and a number follow
 
+/// What the names of a file's temporary files begin with, without their path. Of a long name, which leaves no room for
+/// more, its beginning (of whole characters in UTF-8) and a hash of it all.
+std::string beginningOfTemporaries(const std::filesystem::path& file) {
+  constexpr std::size_t kLongest = 100, kKept = 60;
+  std::string name = file.filename();
+  if (name.size() > kLongest) {
+    const std::uint64_t hash = XXH3_64bits(name.data(), name.size());
+    std::size_t kept = kKept;
+    while (kept > 0 && (static_cast<unsigned char>(name[kept]) & 0xc0) == 0x80) --kept;
+    name.resize(kept);
+    name += '~' + std::to_string(hash);
+  }
+  return name + std::string(kTemporary);
+}
+
 /// Two writers of the same file, in one process or in two, must not share a temporary name.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
-  name += std::string(kTemporary) + std::to_string(getpid()) + "-" + std::to_string(counter++);
+  name.replace_filename(beginningOfTemporaries(file) + std::to_string(getpid()) + "-" + std::to_string(counter++));
   return name;
 }
 
@@ -85,7 +102,7 @@ bool isOurs(const std::filesystem::path& name) {
 
 /// The process in the name of a temporary file of `file`; nothing for other files.
 std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
-  const std::string text = name.filename(), before = file.filename().string() + std::string(kTemporary);
+  const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;
   pid_t process = 0;
   const auto [end, error] = std::from_chars(text.data() + before.size(), text.data() + text.size(), process);

@@ -8,7 +8,7 @@
 
 namespace hpsdf {
 
-/// Disjoint sets of faces (union-find with path halving); each face alone at first.
+/// Disjoint sets of faces, or of whatever is numbered (union-find with path halving); each alone at first.
 class FaceSets {
  public:
   explicit FaceSets(std::size_t faces) : parent_(faces), sets_(faces) {

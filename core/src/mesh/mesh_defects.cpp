@@ -62,10 +62,7 @@ void addPinched(const TriangleMesh& mesh, std::span<const Side> sides, std::vect
 /// How many are of triangles of one part, but for walls.
 std::size_t foldsAmong(const TriangleMesh& mesh, std::span<const Side> sides, const Crossings& crossings) {
   if (crossings.found.empty()) return 0;
-  FaceSets parts(mesh.triangles.size());
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    for (const Side& side : edge) parts.join(edge.front().face, side.face);
-  });
+  FaceSets parts = partsOf(mesh.triangles.size(), sides);
   return static_cast<std::size_t>(std::ranges::count_if(crossings.found, [&](const Crossing& crossing) {
     const auto [one, other] = crossing.triangles;
     return parts.first(one) == parts.first(other) && !areTwins(mesh.triangles[one], mesh.triangles[other]);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hpsdf/error.h"
@@ -27,7 +28,13 @@ void append(std::string& text, double number) {
   text.append(digits.data(), end);
 }
 
-void writeObj(const TriangleMesh& mesh, OutputFile& out) {
+/// How a format writes a mesh as text.
+struct TextForm {
+  std::string_view beforeVertex, beforeFace;
+  std::uint64_t firstVertex;  ///< its number
+};
+
+void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) {
   std::string text;
   const auto writeIf = [&](bool full) {
     if (!full) return;
@@ -35,26 +42,37 @@ void writeObj(const TriangleMesh& mesh, OutputFile& out) {
     text.clear();
   };
   for (const Vector3& v : mesh.vertices) {
-    text += 'v';
-    for (const double x : v) append(text += ' ', x);
+    text += form.beforeVertex;
+    append(text, v.x());
+    append(text += ' ', v.y());
+    append(text += ' ', v.z());
     text += '\n';
     writeIf(text.size() >= kPiece);
   }
   for (const auto& triangle : mesh.triangles) {
-    text += 'f';
-    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(std::uint64_t{v} + 1);
+    text += form.beforeFace;
+    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(form.firstVertex + v);
     text += '\n';
     writeIf(text.size() >= kPiece);
   }
   writeIf(!text.empty());
 }
 
+void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
+
+/// assimp takes a line feed there for part of the header, and all numbers a byte too late.
+bool beginsWithLineFeed(std::span<const std::byte> data) { return !data.empty() && data.front() == std::byte{'\n'}; }
+
 void writePly(const TriangleMesh& mesh, OutputFile& out) {
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
+  const auto vertices = std::as_bytes(std::span(mesh.vertices));
+  const bool asText = beginsWithLineFeed(vertices);
+  out.write(std::string("ply\nformat ") + (asText ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
+            std::to_string(mesh.vertices.size()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
             std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n");
-  out.write(std::as_bytes(std::span(mesh.vertices)));
+  if (asText) return writeText(mesh, {"", "3", 0}, out);
+  out.write(vertices);
   std::vector<std::byte> faces;
   for (const auto& triangle : mesh.triangles) {
     const auto corners = std::as_bytes(std::span(triangle));

@@ -54,7 +54,8 @@ void requireReadable(const fs::path& file) {
     throw Error(name + ": cannot be read; check its permissions");
 }
 
-/// The largest count that the header of a PLY or an OFF file promises, 0 where there is none.
+/// The largest count that the header of a PLY or an OFF file promises, 0 where there is none. OFF's third one, of
+/// edges, promises nothing: many programs make it up, and no reader asks.
 double promisedElements(const fs::path& file) {
   const std::string extension = extensionOf(file);
   double most = 0;
@@ -72,7 +73,9 @@ double promisedElements(const fs::path& file) {
       line = line.substr(0, line.find('#'));
       if (const std::size_t keyword = line.find("OFF"); keyword != std::string::npos) line.erase(0, keyword + 3);
       std::istringstream words(line);
-      for (double count = 0; words >> count;) most = std::max(most, count);
+      double count = 0;
+      for (int verticesThenFaces = 0; verticesThenFaces < 2 && words >> count; ++verticesThenFaces)
+        most = std::max(most, count);
     }
   }
   return most;
@@ -261,12 +264,19 @@ std::string spacingHint(const fs::path& file, const Box& box) {
   return hint.str();
 }
 
+/// Whether a face names three vertices: rounding may have left nothing of one, but not of a face that names fewer.
+bool namesThreeCorners(const TriangleMesh& mesh) {
+  return std::ranges::any_of(mesh.triangles,
+                             [](const auto& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; });
+}
+
 ImportedMesh cleaned(TriangleMesh mesh, const fs::path& file) {
   const Box box = boundingBox(mesh);
+  const bool mayBeRounded = namesThreeCorners(mesh);
   try {
     return hpsdf::cleaned(std::move(mesh));  // its messages name the file as it was given
   } catch (const Error& error) {
-    throw Error(error.what() + (box.isEmpty() ? "" : spacingHint(file, box)));
+    throw Error(error.what() + (mayBeRounded ? spacingHint(file, box) : ""));
   }
 }
 

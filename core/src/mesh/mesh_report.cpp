@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/face_sets.h"
+#include "mesh/patches.h"
 #include "mesh/sides.h"
 
 namespace hpsdf {
@@ -30,9 +30,8 @@ MeshReport inspect(const TriangleMesh& mesh) {
   report.box = boundingBox(mesh);
 
   const std::vector<Side> sides = sidesByEdge(mesh.triangles);
-  FaceSets parts(mesh.triangles.size());
+  report.parts = partsOf(mesh.triangles.size(), sides).count();
   forEachEdge(sides, [&](std::span<const Side> edge) {
-    for (const Side& side : edge) parts.join(edge.front().face, side.face);
     if (2 * std::ranges::count(edge, true, &Side::rising) != std::ssize(edge)) ++report.unbalancedEdges;
     switch (edge.size()) {
       case 1:
@@ -45,7 +44,6 @@ MeshReport inspect(const TriangleMesh& mesh) {
         ++report.nonManifoldEdges;
     }
   });
-  report.parts = parts.count();
   return report;
 }
 

@@ -19,6 +19,14 @@ struct Neighbours {
 
 }  // namespace
 
+FaceSets partsOf(std::size_t faces, std::span<const Side> sides) {
+  FaceSets parts(faces);
+  forEachEdge(sides, [&](std::span<const Side> edge) {
+    for (const Side& side : edge) parts.join(edge.front().face, side.face);
+  });
+  return parts;
+}
+
 Patches patchesOf(std::size_t faces, std::span<const Side> sides) {
   std::vector<Neighbours> neighbours(faces);
   forEachEdge(sides, [&](std::span<const Side> edge) {

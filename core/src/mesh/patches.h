@@ -5,9 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "mesh/face_sets.h"
 #include "mesh/sides.h"
 
 namespace hpsdf {
+
+/// The parts of a surface: what hangs together by edges of however many faces. `sides`: by edge, of so many faces.
+FaceSets partsOf(std::size_t faces, std::span<const Side> sides);
 
 /// The patches of a surface: what hangs together by edges of exactly two faces. Within one, faces can be turned until
 /// all look the same way, unless it is one-sided, as a Möbius strip is.
