@@ -5,11 +5,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -19,6 +20,7 @@
 #include "batch_list.h"
 #include "building.h"
 #include "claims.h"
+#include "error_text.h"
 #include "failed.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/output_file.h"
@@ -99,7 +101,12 @@ Json optionsJson(const Arguments& arguments) {
 /// An empty file that is there while a process builds a field, and after its death.
 class Mark {
  public:
-  explicit Mark(fs::path file) : file_(std::move(file)) { std::ofstream{file_}; }
+  /// Throws `Error` where it cannot be written: a death would leave no trace.
+  explicit Mark(fs::path file) : file_(std::move(file)) {
+    if (!std::ofstream(file_))
+      throw Error(fmt::format("{}: cannot be written ({}); check the folder's permissions", file_.string(),
+                              std::strerror(errno)));
+  }
   ~Mark() {
     std::error_code ignored;
     fs::remove(file_, ignored);
@@ -188,17 +195,14 @@ class Batch {
     try {
       sweep(mesh);
       std::optional<CurrentField> field = finished(mesh);
-      const Status status = !field ? Status::built : again ? Status::elsewhere : Status::skipped;
-      if (!field) field = built(mesh);
+      Made made = field ? Made{again ? Status::elsewhere : Status::skipped, std::move(field)} : built(mesh);
       std::error_code ignored;
       fs::remove(checkpointOf(outputOf(mesh)), ignored);  // of other options too: later it would stop a construction
-      return {status, std::move(field)};
+      return made;
     } catch (const Cancelled&) {
       throw;
-    } catch (const std::bad_alloc&) {
-      return {Status::failed, {}, "not enough memory; a larger target error or a smaller grid needs less"};
     } catch (const std::exception& error) {
-      return {Status::failed, {}, error.what()};
+      return {Status::failed, {}, errorText(error)};
     }
   }
 
@@ -226,16 +230,29 @@ class Batch {
     fs::remove(markOf(mesh));
   }
 
-  CurrentField built(const BatchMesh& mesh) const {
+  Made built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
+    checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
     const Mark mark(markOf(mesh));
     // before the mesh is read: if it changes in between, the next run sees that
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
-    save(field, output);
+    try {
+      write(mesh, field, content);
+    } catch (const Error&) {
+      // Where locks are lost, another process may have taken us for dead and swept away what we had half-written. It
+      // may be done with the mesh itself; if not, it sweeps no more.
+      if (std::optional<CurrentField> theirs = finished(mesh)) return {Status::elsewhere, std::move(theirs)};
+      write(mesh, field, content);
+    }
+    return {Status::built, CurrentField{std::move(field), output.string(), fs::file_size(output)}};
+  }
+
+  /// The field, then what it was made of.
+  void write(const BatchMesh& mesh, const Field& field, const std::string& content) const {
+    save(field, outputOf(mesh));
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
-    return {std::move(field), output.string(), fs::file_size(output)};
   }
 
   /// What the field that lies in the folder is made of, if the options are the ones of now: kept beside it, and
@@ -296,7 +313,7 @@ class Batch {
 
 std::vector<BatchMesh> readList(const Console& console, const std::string& list) {
   const bool typed = list == "-";
-  std::string text = typed ? std::string(std::istreambuf_iterator<char>(console.in), {}) : readTextFile(list);
+  const std::string text = typed ? readText(console.in, "standard input") : readTextFile(list);
   try {
     std::vector<BatchMesh> meshes = parseBatchList(text);
     if (meshes.empty()) throw Error("names no mesh; write one a line");

@@ -181,7 +181,7 @@ Json acceptOne(const Candidate& taken, const fs::path& folder, const fs::path& f
   if (arguments.given("budget")) facts.budget = arguments.number("budget");
   if (arguments.given("bound")) facts.bound = arguments.number("bound");
   fs::create_directories(baseline.parent_path());
-  writeTextFile(baseline, readTextFile(actual.string()));
+  writeTextFile(baseline, readWholeFile(actual.string()));
   saveFacts(facts, baseline);
   return {{"name", taken.name},
           {"baseline", baseline.string()},

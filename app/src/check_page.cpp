@@ -57,7 +57,7 @@ constexpr std::string_view kSlider =
 
 std::string figureOf(const std::string& title, const fs::path& file) {
   return fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
-                     htmlPng(readTextFile(file.string())), htmlEscaped(title));
+                     htmlPng(readWholeFile(file.string())), htmlEscaped(title));
 }
 
 bool isPicture(const fs::path& file) { return lowerExtension(file) == ".png" && fs::exists(file); }

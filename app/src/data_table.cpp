@@ -89,7 +89,7 @@ bool isDataFile(const std::filesystem::path& file) {
 }
 
 DataTable loadData(const std::filesystem::path& file) {
-  const std::string text = readTextFile(file.string());
+  const std::string text = readWholeFile(file.string());
   return lowerExtension(file) == ".pfm" ? readPfm(file.string(), text) : readCsv(file.string(), text);
 }
 

@@ -26,7 +26,7 @@ bool isFrameName(std::string_view name) {
   return std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readTextFile(from.string())); }
+void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readWholeFile(from.string())); }
 
 fs::path requireFfmpeg(const std::string& output) {
   if (const auto found = findProgram("ffmpeg")) return *found;

@@ -160,10 +160,6 @@ std::string checkText(const SignCheck& check) {
                                              vectorText(check.worst), shortNumber(check.depth)));
 }
 
-std::string countOf(std::size_t count, std::string_view one, std::string_view many) {
-  return fmt::format("{} {}", grouped(count), count == 1 ? one : many);
-}
-
 std::string repairText(const RepairedMesh& mended, const std::string& file) {
   const MeshReport& report = mended.imported.report;
   std::string done;

@@ -28,6 +28,7 @@
 #include "hpsdf/memory.h"
 #include "hpsdf/threads.h"
 #include "mesh_reply.h"
+#include "printable.h"
 #include "registry.h"
 #include "summaries.h"
 
@@ -187,15 +188,18 @@ class Reading {
       : file_(file),
         limits_(limits),
         progress_(progress),
-        task_("Reading " + file.filename().string()),
+        task_("Reading " + printable(file.filename().string())),
         process_(program, file, limits) {}
 
   MeshReply reply() {
     receive();
     if (expected_ == 0 || bytes_.size() < expected_) throw died();
-    return parseReply(bytes_);
+    MeshReply reply = parseReply(bytes_);
+    if (reply.kind == MeshReply::Kind::outOfMemory) throw tooLarge();
+    return reply;
   }
 
+ private:
   Error tooLarge() const {
     return Error(
         fmt::format("{}: reading it takes more than {} of memory; check or export the file again, or set {} "
@@ -203,7 +207,6 @@ class Reading {
                     file_.string(), bytesText(double(limits_.bytes)), kBytesVariable, limits_.bytes));
   }
 
- private:
   void receive() {
     std::array<std::byte, 65536> buffer;
     for (;;) {
@@ -217,10 +220,10 @@ class Reading {
     }
   }
 
-  /// The reader has the mesh in its memory, which its limit holds for.
+  /// The limit holds for us, too: a small mesh takes less in its reader than what that had when the limit was set.
   void expectWhole() {
     expected_ = replyBytes(bytes_);
-    if (expected_ > limits_.bytes) throw DamagedReply("its counts are too large");
+    if (expected_ > limits_.bytes) throw tooLarge();
     bytes_.reserve(expected_);
   }
 
@@ -312,10 +315,8 @@ fs::path ownProgram() {
 ImportedMesh importApart(const fs::path& program, const fs::path& file, const ReadingLimits& limits,
                          const Progress& progress) {
   try {
-    Reading reading(program, file, limits, progress);
-    MeshReply reply = reading.reply();
+    MeshReply reply = Reading(program, file, limits, progress).reply();
     if (reply.kind == MeshReply::Kind::refusal) throw Error(reply.refusal);
-    if (reply.kind == MeshReply::Kind::outOfMemory) throw reading.tooLarge();
     reply.imported.mesh.name = file.filename().string();
     return std::move(reply.imported);
   } catch (const DamagedReply& damage) {
@@ -338,6 +339,8 @@ int readForOtherProcess(std::span<const std::string> words) {
     writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
   } catch (const Error& error) {
     writeRefusal(error.what(), toStandardOutput);
+  } catch (const std::bad_alloc&) {  // of who asks malloc, as Eigen does, past `onMemoryOut`
+    writeOutOfMemory(toStandardOutput);
   } catch (const std::exception& error) {
     writeRefusal(fmt::format("{}: {} (this is a fault of the program)", words[1], error.what()), toStandardOutput);
   }

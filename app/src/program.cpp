@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <new>
+#include <exception>
 #include <ostream>
 
 #include "commands.h"
+#include "error_text.h"
 #include "help.h"
 #include "hpsdf/error.h"
 #include "printable.h"
@@ -67,17 +67,8 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     return kExitCancelled;
   } catch (const Failed& failed) {
     return fail(console, failed.what(), failed.status());
-  } catch (const Error& error) {
-    return fail(console, error.what(), kExitBadInput);
-  } catch (const std::filesystem::filesystem_error& error) {  // such as a file that was removed while it was in use
-    return fail(console,
-                fmt::format("{}: {}; check that it is there, and its permissions", error.path1().string(),
-                            error.code().message()),
-                kExitBadInput);
-  } catch (const std::bad_alloc&) {
-    return fail(console, "not enough memory; a larger target error or a smaller grid needs less", kExitBadInput);
   } catch (const std::exception& error) {
-    return fail(console, fmt::format("{} (this is a fault of the program)", error.what()), kExitBadInput);
+    return fail(console, errorText(error), kExitBadInput);
   }
 }
 

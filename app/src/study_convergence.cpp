@@ -272,7 +272,7 @@ std::string plotOf(const fs::path& gnuplot, const Convergence& convergence) {
   if (status != 0 || !fs::exists(picture))
     throw Error(fmt::format("study convergence: gnuplot failed with status {} ({}); give --no-plot", status,
                             lastLine(readTextFile(log.string()))));
-  return readTextFile(picture.string());
+  return readWholeFile(picture.string());
 }
 
 void runConvergence(Session& session, const Arguments& arguments) {

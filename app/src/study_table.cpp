@@ -90,7 +90,7 @@ Thumbnail thumbnailOf(render::Renderer& renderer, const TableRow& row, render::C
   const render::Drawn drawn = render::drawSlice(renderer, row.field, picture);
   const TemporaryFolder folder;
   savePng(drawn.image, folder.path() / "slice.png");
-  Thumbnail thumbnail{readTextFile((folder.path() / "slice.png").string()), {}};
+  Thumbnail thumbnail{readWholeFile((folder.path() / "slice.png").string()), {}};
   for (const render::Legend::Level& level : drawn.legend.levels) thumbnail.colors[level.level] = level.color;
   return thumbnail;
 }

@@ -73,6 +73,10 @@ std::string grouped(std::uint64_t number) {
   return text;
 }
 
+std::string countOf(std::size_t count, std::string_view one, std::string_view many) {
+  return fmt::format("{} {}", grouped(count), count == 1 ? one : many);
+}
+
 std::string shortNumber(double number) {
   if (!std::isfinite(number)) return fmt::format("{}", number);  // strangers' files hold such
   const double size = std::abs(number);
@@ -184,17 +188,18 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
   text += summaryRow("box", boxText(report.box));
   if (report.weldedVertices > 0)
-    text += summaryRow("welded",
-                       grouped(report.weldedVertices) + " vertices (most readers give each corner of a face its own)");
+    text += summaryRow("welded", countOf(report.weldedVertices, "vertex", "vertices") +
+                                     " (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
-    text += summaryRow("unused", grouped(report.unreferencedVertices) + " vertices dropped");
+    text += summaryRow("unused", countOf(report.unreferencedVertices, "vertex", "vertices") + " dropped");
   const auto dropped = [&](const char* kind, std::size_t faces, const Vector3& place) {
-    if (faces > 0) text += summaryRow(kind, grouped(faces) + " faces dropped, as at " + vectorText(place, report.box));
+    if (faces > 0)
+      text += summaryRow(kind, countOf(faces, "face", "faces") + " dropped, as at " + vectorText(place, report.box));
   };
   dropped("degenerate", report.degenerateFaces, report.degeneratePlace);
   if (report.flippedFaces > 0)
-    text +=
-        summaryRow("flipped", grouped(report.flippedFaces) + " edges of faces without area that hold their neighbours");
+    text += summaryRow("flipped", countOf(report.flippedFaces, "edge of a face without area that holds its neighbours",
+                                          "edges of faces without area that hold their neighbours"));
   dropped("duplicate", report.duplicateFaces, report.duplicatePlace);
   if (report.turned) text += summaryRow("turned", "the whole mesh: its faces looked inward");
   return text;

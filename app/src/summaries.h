@@ -39,6 +39,9 @@ std::string fieldLine(const Field& field);
 /// 1234567 → "1,234,567"
 std::string grouped(std::uint64_t number);
 
+/// "1 face", "1,234 faces"
+std::string countOf(std::size_t count, std::string_view one, std::string_view many);
+
 /// Three digits, and a short exponent where it saves zeros: 1e-6, 3.06e-4, 0.125
 std::string shortNumber(double number);
 
@@ -62,7 +65,6 @@ std::string shellWord(const std::string& word);
 /// An indented line of a summary.
 std::string summaryRow(std::string_view label, const std::string& value);
 
-std::string signName(Sign sign);  ///< as --sign has it; "unknown" where it is not known
 std::string strategyName(Strategy strategy);
 std::string nearnessName(NearnessKind kind);
 std::string estimatorName(Estimator estimator);

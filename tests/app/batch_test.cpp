@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +23,7 @@
 #include "batch_list.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "script.h"
 #include "started_program.h"
 #include "support/temporary_directory.h"
 
@@ -364,6 +366,35 @@ TEST_F(Batches, mistakesAreRefusedBeforeWork) {
   expectRefused(call, "fields: cannot make this folder (");
 }
 
+TEST_F(Batches, listsThatAreNoTextAreRefused) {
+  expectRefused({{"build", "--batch", "/dev/zero", "-o", at("fields")}}, "/dev/zero: is a device");
+  const Call call = batch("builtin:box\n");
+  fs::resize_file(folder_ / "list", kMostTextBytes + 1);
+  expectRefused(call, "list: is longer than 67108864 bytes");
+}
+
+/// Before the mesh is read, which would take its time and fail, too.
+TEST_F(Batches, whatCannotBeWrittenIsNotBuilt) {
+  const auto errorOf = [&](const char* surface) {
+    const Outcome outcome = run(batch(surface, kCoarse));
+    EXPECT_EQ(outcome.status, 3);
+    EXPECT_THAT(statusesOf(outcome), ElementsAre("failed"));
+    return outcome.status == 3 ? linesOf(outcome)[0].at("error").get<std::string>() : outcome.err;
+  };
+  fs::create_directories(fieldOf("none.obj"));
+  EXPECT_THAT(errorOf("none.obj"), EndsWith(".hpsdf: is a folder; give a file name"));
+  // in place of the mark, which is to be removed, or to be written
+  const fs::path mark = fields() / ".batch" / (nameOf("analytic:box") + ".begun");
+  fs::create_directories(mark / "full");
+  EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
+                                         ": Directory not empty; check that it is there, and its permissions");
+  fs::remove_all(mark);
+  fs::create_symlink("none/mark", mark);
+  EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
+                                         ": cannot be written (No such file or directory); check the folder's "
+                                         "permissions");
+}
+
 TEST_F(Batches, aReaderThatGoesEndsTheWork) {
   Call call = batch("builtin:box\nbuiltin:gear\n", kCoarse);
   call.stdoutClosed = true;
@@ -436,6 +467,46 @@ TEST_F(TwoProcesses, theOneWaitsForTheOther) {
   EXPECT_THAT(statusesOf(outcome), ElementsAre("elsewhere"));
   EXPECT_THAT(statusesOf(first_->finish()), ElementsAre("built"));
   EXPECT_TRUE(fs::exists(fieldOf(kShape)));
+}
+
+/// The one is made to stand still in the middle of its work, without the lock on it.
+class LostLocks : public Batches {
+ protected:
+  /// Takes some tenths of a second.
+  const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
+  const std::string kShape = "builtin:gear";
+
+  void SetUp() override {
+    process_ = std::make_unique<Process>(batch(kShape, kOptions));
+    const fs::path mark = fields() / ".batch" / (nameOf(kShape) + ".begun");
+    ASSERT_TRUE(process_->sendWhen([&] { return fs::exists(mark); }, SIGSTOP));
+    fs::remove(fields() / ".batch" / "claims");
+  }
+
+  /// What becomes of it when it goes on.
+  void expectGoesOn(const char* status) {
+    process_->send(SIGCONT);
+    const Outcome outcome = process_->finish();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(statusesOf(outcome), ElementsAre(status));
+    EXPECT_TRUE(readFile(fieldOf(kShape)) == loneBytes(kShape, kOptions));
+  }
+
+  std::unique_ptr<Process> process_;
+};
+
+TEST_F(LostLocks, whatTheOtherHasBuiltIsTaken) {
+  EXPECT_THAT(statusesOf(run(batch(kShape, kOptions))), ElementsAre("built"));
+  const rlimit none = {16, 16};  // bytes of a file: writing fails
+  ASSERT_EQ(prlimit(process_->id(), RLIMIT_FSIZE, &none, nullptr), 0);
+  expectGoesOn("elsewhere");
+}
+
+TEST_F(LostLocks, whatWasSweptAwayIsWrittenAgain) {
+  // the first 100 names that it takes for a half-written field are those of others: the first writing fails
+  for (int n = 0; n <= 100; ++n)
+    writeFile(fmt::format("{}.part-{}-{}", fieldOf(kShape).string(), process_->id(), n), "");
+  expectGoesOn("built");
 }
 
 TEST_F(TwoProcesses, whoWaitsCanBeInterrupted) {

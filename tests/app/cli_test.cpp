@@ -320,6 +320,7 @@ TEST_F(Cli, meshIsMended) {
   EXPECT_EQ(before.at("defects").at("inconsistent_edges").at("count"), 3);
   EXPECT_EQ(before.at("defects").at("inconsistent_edges").at("places")[0].at("edge").size(), 2u);
   EXPECT_EQ(before.at("duplicate_faces"), 1);
+  EXPECT_THAT(run({{"mesh", at("bad.obj")}}).out, HasSubstr(" 1 face dropped, as at "));
   const Outcome mended = run({{"mesh", at("bad.obj"), "--repair", at("mended.ply")}});
   EXPECT_EQ(mended.status, 0) << mended.err;
   EXPECT_THAT(mended.out, AllOf(HasSubstr("dropped 1 face; turned 1 face"), HasSubstr("mended.ply: closed")));

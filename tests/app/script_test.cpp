@@ -227,6 +227,26 @@ TEST_F(IncludeTest, manyCommandsFromFewLinesAreRefused) {
   EXPECT_EQ(complaintNamed(at("a.hps"), "include d2.hps"), "no complaint");
 }
 
+/// Cut short, a script or a list would be taken for a whole one.
+TEST_F(IncludeTest, filesAreReadToTheirEnd) {
+  write("long", "");
+  std::filesystem::resize_file(at("long"), kMostTextBytes + 1);
+  const auto complaintOf = [](const std::string& file) {
+    try {
+      readTextFile(file);
+      return std::string("no complaint");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_EQ(complaintOf(at("long")), at("long") + ": is longer than 67108864 bytes; check that it is the right one");
+  std::filesystem::resize_file(at("long"), kMostTextBytes);
+  EXPECT_EQ(complaintOf(at("long")), "no complaint");
+  EXPECT_EQ(complaintOf("/dev/zero"), "/dev/zero: is a device; give a file");
+  // nothing of a process lies at address 0
+  EXPECT_EQ(complaintOf("/proc/self/mem"), "/proc/self/mem: cannot be read to its end; check where it lies");
+}
+
 TEST_F(IncludeTest, devicesAreNotRead) {
   EXPECT_THAT(complaintNamed(at("a.hps"), "include /dev/zero"), HasSubstr("/dev/zero: is not a regular file"));
 }

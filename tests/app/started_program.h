@@ -131,6 +131,8 @@ class Process {
     in_ = -1;
   }
 
+  pid_t id() const { return id_; }
+
   void send(int signal) { kill(id_, signal); }
 
   bool hasEnded() const {

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "error_text.h"
 #include "explorer/explorer.h"
 #include "explorer/live_work.h"
 #include "explorer/recording.h"
@@ -304,10 +305,8 @@ class Window {
       action();
     } catch (const Cancelled&) {
       tell("cancelled: all is as it was");
-    } catch (const Error& error) {
-      tell(error.what());
-    } catch (const std::bad_alloc&) {
-      tell("not enough memory; a larger target error or a smaller grid needs less");
+    } catch (const std::exception& error) {
+      tell(errorText(error));
     }
   }
 
