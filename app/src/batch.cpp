@@ -168,9 +168,8 @@ class Batch {
       for (const BatchMesh* mesh : left)
         if (!attempt(*mesh, again)) busy.push_back(mesh);
       if (!again && !busy.empty())
-        console_.err << fmt::format("hpsdf: note: waiting for {} of {} meshes, which other processes are at work on",
-                                    busy.size(), meshes_.size())
-                     << std::endl;
+        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are at work on", busy.size(),
+                                   meshes_.size()));
       if (again && busy.size() == left.size()) std::this_thread::sleep_for(kTick);
       left = std::move(busy);
     }
@@ -215,7 +214,7 @@ class Batch {
     try {
       return CurrentField{load(output), output.string(), fs::file_size(output)};
     } catch (const Error& error) {
-      console_.err << "hpsdf: note: " << error.what() << "; building it anew" << std::endl;
+      note(console_, std::string(error.what()) + "; building it anew");
       return std::nullopt;
     }
   }

@@ -70,17 +70,16 @@ Box domainOf(const Arguments& arguments, const Box& surface) {
 /// A field that misses part of its surface is seldom meant.
 void warnOfCutSurface(const Console& console, const Box& surface, const Box& domain) {
   if (!surface.isEmpty() && !domain.contains(surface))
-    console.err << "hpsdf: warning: the domain leaves out "
-                << (domain.intersects(surface) ? "part of the surface" : "the whole surface") << std::endl;
+    warn(console, fmt::format("the domain leaves out {}",
+                              domain.intersects(surface) ? "part of the surface" : "the whole surface"));
 }
 
 void warnOfErrorLeft(const Console& console, const FieldMetadata& made) {
   if (made.measuredError > made.maxError)
-    console.err << fmt::format(
-                       "hpsdf: warning: errors of {} are left, above the maximum error {}: allow a higher degree, a "
-                       "greater depth, more steps or bytes",
-                       shortNumber(made.measuredError), shortNumber(made.maxError))
-                << std::endl;
+    warn(console,
+         fmt::format("errors of {} are left, above the maximum error {}: allow a higher degree, a greater depth, "
+                     "more steps or bytes",
+                     shortNumber(made.measuredError), shortNumber(made.maxError)));
 }
 
 /// Not worth a word: a millionth of the mesh is below what scans and fields are good for.
@@ -90,12 +89,10 @@ void warnOfSpacing(const Console& console, const std::string& surface, const Tri
   const Box box = boundingBox(mesh);
   const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
   if (!(spacing > kSpacingUnsaid * size)) return;
-  console.err << fmt::format(
-                     "hpsdf: warning: {}: coordinates reach {}, where the reader keeps them {} apart ({} of the mesh's "
-                     "longest side): move the mesh nearer to the origin before it is exported",
-                     surface, shortNumber(std::max(-box.min().minCoeff(), box.max().maxCoeff())), shortNumber(spacing),
-                     shortNumber(spacing / size))
-              << std::endl;
+  warn(console, fmt::format("{}: coordinates reach {}, where the reader keeps them {} apart ({} of the mesh's longest "
+                            "side): move the mesh nearer to the origin before it is exported",
+                            surface, shortNumber(std::max(-box.min().minCoeff(), box.max().maxCoeff())),
+                            shortNumber(spacing), shortNumber(spacing / size)));
 }
 
 ImportedMesh readFile(const Console& console, const std::string& file) {
@@ -176,14 +173,13 @@ void tellSign(const Console& console, const std::string& surface, const MeshRepo
   if (!choice.reason.empty() && choice.sign != Sign::pseudonormal)
     console.err << fmt::format("hpsdf: {}: sign by winding number: {}", surface, choice.reason) << std::endl;
   if (choice.reason.empty() && choice.sign == Sign::pseudonormal && !report.closed())
-    console.err << "hpsdf: warning: " << unsureSigns(surface, report) << std::endl;
+    warn(console, unsureSigns(surface, report));
 }
 
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
-  requireMemory("the exact distance of " + grouped(prepared.mesh.triangles.size()) + " faces",
-                kBytesAFace * double(prepared.mesh.triangles.size()), "simplify the mesh first");
+  requireDistanceMemory(prepared.mesh);
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
   tellSign(console, printable(surface), *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
@@ -210,14 +206,12 @@ Checkpoint checkpointAt(const Console& console, const std::filesystem::path& fil
   Checkpoint checkpoint{.file = file, .seconds = arguments.number("checkpoint-seconds")};
   checkpoint.about = decidingArguments(arguments);
   checkpoint.resumed = [&console, file](std::uint64_t steps) {
-    console.err << fmt::format("hpsdf: note: going on from {}, after {} steps", file.string(), grouped(steps))
-                << std::endl;
+    note(console, fmt::format("going on from {}, after {} steps", file.string(), grouped(steps)));
   };
   checkpoint.failed = [&console, warned = false](const Error& error) mutable {
     if (std::exchange(warned, true)) return;
-    console.err << fmt::format("{}hpsdf: warning: {}; the construction goes on without",
-                               console.redrawsProgress ? kEraseLine : "", error.what())
-                << std::endl;
+    if (console.redrawsProgress) console.err << kEraseLine;
+    warn(console, fmt::format("{}; the construction goes on without", error.what()));
   };
   return checkpoint;
 }
@@ -499,7 +493,8 @@ std::vector<Parameter> checkpointParameters() {
        .help =
            "Keep the state of the construction from time to time, as OUTPUT.checkpoint. Where that is there already, "
            "because the program was killed, go on from it: the field is the same, to the byte, as in one go. Another "
-           "mesh's, one of other options but threads, and a damaged one are refused; once the field is written it is "
+           "mesh's, one of other options but threads and memory-limit, and a damaged one are refused; once the field "
+           "is written it is "
            "removed.",
        .defaultText = "false"},
       {.name = "checkpoint-seconds",
@@ -576,6 +571,11 @@ void requireOwner(const Arguments& arguments, const char* name, const char* owne
     throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
 }
 
+void requireDistanceMemory(const TriangleMesh& mesh) {
+  requireMemory("the exact distance of " + grouped(mesh.triangles.size()) + " faces",
+                kBytesAFace * double(mesh.triangles.size()), "simplify the mesh first");
+}
+
 void requireConsistent(const Arguments& arguments) {
   const Box any(Vector3::Constant(-1), Vector3::Constant(1));
   distanceOptions(arguments);
@@ -601,6 +601,9 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
   try {
     const BuildOptions options = buildOptions(arguments);  // mistakes, before long work
     const DistanceOptions ofMesh = distanceOptions(arguments);
+    if (surface.starts_with(kAnalytic))
+      for (const char* name : {"sign", "thickness", "hull"})
+        if (arguments.given(name)) throw Error(std::string(name) + ": an analytic shape has a sign of its own");
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
     const auto start = std::chrono::steady_clock::now();
     BuildInput input{distanceTo(console, surface, prepared, ofMesh), prepared.report, {}, options};
@@ -638,20 +641,21 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
 
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {
   if (mesh && !mesh->closed())
-    console.err << "hpsdf: warning: bounds hold for closed surfaces alone: beside this mesh's holes they do not"
-                << std::endl;
+    warn(console, "bounds hold for closed surfaces alone: beside this mesh's holes they do not");
 }
 
 bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
+
+void warnOfForeign(const Console& console, const std::string& surface, const Source& source) {
+  warn(console, fmt::format("{} is not what the field was made from ({})", surface, nameOf(source)));
+}
 
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
   try {
     const PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
     auto exact = distanceTo(console, surface, prepared, distanceOptions(source));
-    if (!isMadeFrom(exact->source(), source))
-      console.err << "hpsdf: warning: " << surface << " is not what the field was made from (" << nameOf(source) << ")"
-                  << std::endl;
+    if (!isMadeFrom(exact->source(), source)) warnOfForeign(console, surface, source);
     return exact;
   } catch (const Error& error) {
     rethrowNaming(surface, error);
@@ -672,6 +676,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
         return differenceQuotient(*distance, x);
       };
     } else {
+      requireDistanceMemory(prepared.mesh);
       const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, distanceOptions(source));
       reference.distance = distanceOf(exact, prepared.normalization);
       reference.mesh = source.sign == Sign::hull ? hull(prepared.mesh) : std::move(prepared.mesh);
@@ -698,6 +703,9 @@ MeshDefects meshDefects(const Console& console, const std::string& surface, cons
   try {
     const PreparedSurface prepared = prepare(console, surface, !source.normalization.isIdentity());
     if (prepared.analytic) throw Error(surface + ": an analytic shape has no mesh, and so no defects");
+    requireDistanceMemory(prepared.mesh);
+    if (!isMadeFrom({.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source))
+      warnOfForeign(console, surface, source);
     return findDefects(prepared.mesh, findCrossings(prepared.mesh));
   } catch (const Error& error) {
     rethrowNaming(surface, error);
@@ -708,11 +716,11 @@ std::string surfaceFor(const Session& session, const Arguments& arguments) {
   return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(session.current());
 }
 
-std::string surfaceOf(const CurrentField& current) {
+std::string surfaceOf(const CurrentField& current, const char* asked) {
   const std::string& source = current.field.metadata().source.name;
   if (!current.surface.empty()) return current.surface;
   if (isShape(source)) return source;
-  throw Error(fmt::format("{}: this needs the mesh that it was made from; give MESH{}", current.name,
+  throw Error(fmt::format("{}: this needs the mesh that it was made from; give {}{}", current.name, asked,
                           source.empty() ? "" : ", " + source));
 }
 

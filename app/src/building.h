@@ -38,6 +38,9 @@ BuildOptions buildOptions(const Arguments& arguments);
 /// Throws `Error` for arguments of `buildParameters` that no surface could be built with.
 void requireConsistent(const Arguments& arguments);
 
+/// Throws `Error` where the exact distance of such a mesh does not fit in memory.
+void requireDistanceMemory(const TriangleMesh& mesh);
+
 /// An option that says nothing without another is a mistake. `owner` names that other, `given` tells whether it is
 /// there. Throws `Error`.
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool given);
@@ -107,7 +110,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
 
 /// The surface that a field was made from; throws `Error` where it does not say.
-std::string surfaceOf(const CurrentField& current);
+std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
 /// The surface that the argument `mesh` names, or the one that the current field itself names; throws `Error` where
 /// neither does.

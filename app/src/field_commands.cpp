@@ -6,6 +6,7 @@
 #include "batch.h"
 #include "building.h"
 #include "commands.h"
+#include "failed.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/memory.h"
@@ -69,8 +70,7 @@ void checkBuildArguments(const Arguments& arguments) {
     throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
   const bool keeps = arguments.flag("checkpoint");
   if (keeps && !arguments.has("output")) throw Error("checkpoint: it is kept beside the output; give output");
-  if (arguments.given("checkpoint-seconds") && !keeps)
-    throw Error("checkpoint-seconds belongs to checkpoint: give that too, or leave it out");
+  requireOwner(arguments, "checkpoint-seconds", "checkpoint", keeps);
 }
 
 BuiltField buildAndKeep(const Console& console, const std::string& surface, const Arguments& arguments,
@@ -79,9 +79,8 @@ BuiltField buildAndKeep(const Console& console, const std::string& surface, cons
     return buildField(console, surface, arguments, checkpoint);
   } catch (const Cancelled&) {
     if (!checkpoint.empty() && std::filesystem::exists(checkpoint))
-      console.err << fmt::format("hpsdf: note: {} keeps what was done: the same command goes on from it",
-                                 checkpoint.string())
-                  << std::endl;
+      throw CancelledPartway(
+          fmt::format("{} keeps what was done; the same command goes on from it", checkpoint.string()));
     throw;
   }
 }

@@ -19,8 +19,11 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_alw
 void onInterrupt(int signal) {
   if (guards > 0 && !flag.exchange(true)) return;
   OutputFile::removeUnfinished();
-  constexpr std::string_view kMessage = "hpsdf: cancelled; nothing was written\n";
-  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
+  // in the middle of work, earlier parts of that may stay: a batch's fields, a script's pictures
+  constexpr std::string_view kNothing = "hpsdf: cancelled; nothing was written\n";
+  constexpr std::string_view kNothingHalf = "hpsdf: cancelled; nothing is half-written\n";
+  const std::string_view message = guards > 0 ? kNothingHalf : kNothing;
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, message.data(), message.size());
   _exit(128 + signal);
 }
 

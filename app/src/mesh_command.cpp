@@ -30,7 +30,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::size_t kPlacesInText = 3;
+constexpr std::size_t kPlacesInText = 3, kPlacesInJson = 100;
 
 struct KindNames {
   const char *text, *json;
@@ -51,6 +51,7 @@ struct Inspected {
 Inspected inspected(Session& session, const Arguments& arguments) {
   Inspected found{.imported = importSurface(session.console(), arguments.text("mesh"))};
   const TriangleMesh& mesh = found.imported.mesh;
+  requireDistanceMemory(mesh);
   const ExactDistance distance(mesh);
   found.defects = findDefects(mesh, distance.crossings());
   found.choice = distance.signChoice();
@@ -60,6 +61,10 @@ Inspected inspected(Session& session, const Arguments& arguments) {
                        static_cast<std::uint64_t>(arguments.number("seed")), progress);
     });
   return found;
+}
+
+std::size_t placesWanted(const Arguments& arguments, std::size_t unsaid) {
+  return arguments.given("places") ? static_cast<std::size_t>(arguments.number("places")) : unsaid;
 }
 
 bool isPlace(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
@@ -127,7 +132,7 @@ std::string placeText(const Defect& defect, const Box& mesh) {
 }
 
 /// A row for each kind that there is, with its first places.
-std::string defectsText(const MeshDefects& defects, const Box& mesh) {
+std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t limit) {
   std::string text;
   for (std::size_t i = 0; i < kDefectKinds; ++i) {
     if (defects.counts[i] == 0) continue;
@@ -136,7 +141,7 @@ std::string defectsText(const MeshDefects& defects, const Box& mesh) {
       row =
           (defects.allCrossings ? "" : "at least ") + row + (defects.counts[i] == 1 ? " pair" : " pairs") + " of faces";
     std::string places;
-    for (const Defect& defect : firstOf(defects, DefectKind(i), kPlacesInText))
+    for (const Defect& defect : firstOf(defects, DefectKind(i), limit))
       places += (places.empty() ? ", as at " : "; ") + placeText(defect, mesh);
     text += summaryRow(kKinds[i].text, row + places);
   }
@@ -232,7 +237,7 @@ void runMesh(Session& session, const Arguments& arguments) {
     Json json = meshJson(surface, report);
     json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
     json["verdict"] = verdictJson(report, found.defects);
-    json["defects"] = defectsJson(found.defects, static_cast<std::size_t>(arguments.number("places")));
+    json["defects"] = defectsJson(found.defects, placesWanted(arguments, kPlacesInJson));
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
     if (found.check) json["sign_check"] = checkJson(*found.check);
     if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
@@ -240,7 +245,7 @@ void runMesh(Session& session, const Arguments& arguments) {
     printJson(session.console().out, json);
   } else {
     session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
-                          << defectsText(found.defects, report.box)
+                          << defectsText(found.defects, report.box, placesWanted(arguments, kPlacesInText))
                           << summaryRow("verdict", verdictText(report, found.defects))
                           << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
                           << (found.check ? checkText(*found.check) : "")
@@ -309,8 +314,7 @@ Command meshCommand(const Registry& registry) {
                       .valueName = "FILE.png"},
                      {.name = "places",
                       .type = ParameterType::wholeNumber,
-                      .help = "Of json: so many places at most of each kind of defect.",
-                      .defaultText = "100",
+                      .help = "So many places at most of each kind of defect; when left out, 3, or 100 with json.",
                       .minimum = 0,
                       .maximum = 1e6},
                      {.name = "check-sign",

@@ -76,8 +76,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
   Film film(arguments.text("output"));
   useField(session, arguments);
   const InterruptGuard guard;  // until all is in its place
-  const render::Evidence evidence =
-      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
@@ -140,8 +139,7 @@ render::Drawn drawLook(Session& session, const Call& look, const std::optional<r
   const Arguments& arguments = look.arguments;
   const auto drawn = [&](auto picture, auto draw) {
     if (scale) picture.scale = *scale;
-    const render::Evidence evidence =
-        session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+    const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
     return draw(session.renderer(backend(arguments)), session.current().field, picture, evidence);
   };
   const Box& domain = session.current().field.domain();

@@ -113,14 +113,20 @@ void runSlice(Session& session, const Arguments& arguments) {
 
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {
   if (!seen)
-    console.err << "hpsdf: note: "
-                << (picture.surface ? "no surface in view: move the camera, or give an offset nearer to 0"
-                                    : "nothing of the field in view: move the camera, or choose a plane or cells")
-                << std::endl;
+    note(console, picture.surface ? "no surface in view: move the camera, or give an offset nearer to 0"
+                                  : "nothing of the field in view: move the camera, or choose a plane or cells");
   if (picture.surface && render::meetsWalls(field, picture.offset))
-    console.err << "hpsdf: note: the surface meets the walls of the domain and is cut off there: "
-                << (picture.offset == 0 ? "build" : "give an offset nearer to 0, or build")
-                << " a field with a larger margin" << std::endl;
+    note(console,
+         fmt::format("the surface meets the walls of the domain and is cut off there: {} a field with a larger "
+                     "margin",
+                     picture.offset == 0 ? "build" : "give an offset nearer to 0, or build"));
+}
+
+render::Evidence evidenceOf(Session& session, const Arguments& arguments, render::ColorBy color) {
+  render::Evidence evidence = session.evidence(color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  const std::string defects = arguments.textOr("defects", "");
+  if (!defects.empty()) evidence.defects = &session.defects(defects);
+  return evidence;
 }
 
 namespace {
@@ -132,9 +138,7 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  render::Evidence evidence =
-      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
-  if (arguments.given("defects")) evidence.defects = &session.defects(arguments.text("defects"));
+  const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());

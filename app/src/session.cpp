@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include <algorithm>
+#include <ostream>
 #include <utility>
 
 #include "building.h"
@@ -8,6 +9,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "long_work.h"
+#include "printable.h"
 
 namespace hpsdf::app {
 namespace {
@@ -17,6 +19,14 @@ std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend
 }
 
 }  // namespace
+
+void note(const Console& console, std::string_view text) {
+  console.err << "hpsdf: note: " << printable(text) << std::endl;
+}
+
+void warn(const Console& console, std::string_view text) {
+  console.err << "hpsdf: warning: " << printable(text) << std::endl;
+}
 
 Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
 Session::~Session() = default;
@@ -94,8 +104,9 @@ render::Evidence Session::evidence(render::ColorBy color, const std::string& sur
 
 const MeshDefects& Session::defects(const std::string& surface) {
   if (!defects_ || surface != defectsOf_) {
+    const bool own = surface == "own";
     defects_ =
-        meshDefects(console_, surface == "own" ? surfaceOf(current()) : surface, current().field.metadata().source);
+        meshDefects(console_, own ? surfaceOf(current(), "defects=MESH") : surface, current().field.metadata().source);
     defectsOf_ = surface;
   }
   return *defects_;

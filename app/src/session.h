@@ -50,6 +50,10 @@ struct Backend {
   bool operator==(const Backend&) const = default;
 };
 
+/// A line for the user, on any terminal, whatever a stranger's file or name holds.
+void note(const Console& console, std::string_view text);
+void warn(const Console& console, std::string_view text);
+
 class Explorer;
 
 /// What lives from command to command: the current field, its renderer, and what the explorer shows.

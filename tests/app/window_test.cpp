@@ -320,6 +320,8 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
 TEST_F(WindowTest, anotherSizeIsRecorded) {
   ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
   desktop({"windowsize", id_, "700", "500"});
+  desktop({"key", "F12"});  // closed before its first frame, it has no last one
+  ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
   ASSERT_EQ(close(), 0) << window_->err();
   EXPECT_THAT(contents(file("session.hps")), HasSubstr("show size=960x640 gl=software\nshow size=700x500\n"));
   const render::Image last = render::loadPng(file("last.png"));

@@ -96,8 +96,7 @@ TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fil
     throw Error(name + ": " + error.what());
   }
   if (!inspect(mesh).closed())
-    console.err << "hpsdf: warning: " << name << " is not closed: beside its holes bodies may pass, or be pushed inside"
-                << std::endl;
+    warn(console, name + " is not closed: beside its holes bodies may pass, or be pushed inside");
   const bool turns = fileIsYUp && !isShape(name);
   if (turns)
     for (Vector3& x : mesh.vertices) x = Vector3(x.x(), -x.z(), x.y());

@@ -18,7 +18,7 @@ struct Checkpoint {
   /// The part of the time that may go into keeping the state, above 0 up to 1: where writing takes long, it is done
   /// less often. 1: no such limit.
   double share = 0.02;
-  /// What decides about Φ beside its `Source`, such as how signs are found; one made with another is refused.
+  /// What decides about Φ beside its `Source`; one made with another is refused.
   std::string about = {};
   /// Called when a state was found, with the steps that it had taken.
   std::function<void(std::uint64_t steps)> resumed = {};
@@ -32,8 +32,8 @@ struct Checkpoint {
 /// what is done to it at the end is done again. The file stays: remove it when the field is where it shall be.
 ///
 /// Throws as `build` does; `Error`, before anything is built, for a file that was begun with another Φ, domain or
-/// options (`threads` may differ), or by another version of the program, for a damaged one, and for one that cannot be
-/// written. A Φ without a fingerprint in its source is told from others by its values at 4096 places.
+/// options (`threads` and `memoryLimit` may differ), or by another version of the program, for a damaged one, and for
+/// one that cannot be written. One Φ is told from another by its source and its values at 4096 places.
 Field buildResumably(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                      const Checkpoint& checkpoint, const Progress& progress = {});
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // to be raised whenever a construction would go on otherwise from the same state, or the state is kept otherwise
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr FileKind kKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
@@ -56,6 +56,8 @@ std::uint64_t digestOf(const Source& source) {
   digest.add(source.box);
   digest.add(source.normalization.center);
   digest.add(source.normalization.scale);
+  digest.add(source.sign);
+  digest.add(source.thickness);
   return digest.value();
 }
 

@@ -134,8 +134,12 @@ void OutputFile::removeUnfinished() noexcept {
 
 OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)) {
   if (file_.empty()) throw Error("the output file's name is empty; give a file name");
-  std::error_code ignored;
-  const auto status = std::filesystem::status(file_, ignored);
+  std::error_code error;
+  const auto status = std::filesystem::status(file_, error);
+  const auto refuse = [&](int why) {
+    throw Error(file.string() + ": cannot be written (" + reason(why) + "); check the folder");
+  };
+  if (error == std::errc::filename_too_long) refuse(error.value());  // that of the temporary file is not
   if (std::filesystem::is_directory(status)) throw Error(file.string() + ": is a folder; give a file name");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw Error(file.string() + ": is not a regular file; give another name");
@@ -143,7 +147,7 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   Opened opened = openTemporary(file_);
   temporary_ = std::move(opened.name);
   stream_ = opened.stream;
-  if (stream_ == nullptr) throw Error(file.string() + ": cannot be written (" + reason(errno) + "); check the folder");
+  if (stream_ == nullptr) refuse(errno);
   remember(temporary_.c_str());
 }
 
