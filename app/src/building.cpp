@@ -28,7 +28,8 @@ namespace {
 
 constexpr std::uint64_t kMemoryUnlessTold = 100'000'000;  // of the construction, where nothing says how fine to be
 
-constexpr double kBytesAFace = 520;  // of a mesh, while its exact distance is made
+/// Of a mesh, while its exact distance is made, and while that to its hull is, beside what is cut (1e6 pieces at most).
+constexpr double kBytesAFace = 520, kBytesAHullsFace = 800;
 
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
@@ -179,7 +180,7 @@ void tellSign(const Console& console, const std::string& surface, const MeshRepo
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
-  requireDistanceMemory(prepared.mesh);
+  requireDistanceMemory(prepared.mesh, options.sign);
   const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
   tellSign(console, printable(surface), *prepared.report, exact->signChoice());
   return distanceOf(exact, prepared.normalization);
@@ -571,9 +572,10 @@ void requireOwner(const Arguments& arguments, const char* name, const char* owne
     throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
 }
 
-void requireDistanceMemory(const TriangleMesh& mesh) {
+void requireDistanceMemory(const TriangleMesh& mesh, Sign sign) {
   requireMemory("the exact distance of " + grouped(mesh.triangles.size()) + " faces",
-                kBytesAFace * double(mesh.triangles.size()), "simplify the mesh first");
+                (sign == Sign::hull ? kBytesAHullsFace : kBytesAFace) * double(mesh.triangles.size()),
+                "simplify the mesh first");
 }
 
 void requireConsistent(const Arguments& arguments) {
@@ -676,7 +678,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
         return differenceQuotient(*distance, x);
       };
     } else {
-      requireDistanceMemory(prepared.mesh);
+      requireDistanceMemory(prepared.mesh, source.sign);
       const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, distanceOptions(source));
       reference.distance = distanceOf(exact, prepared.normalization);
       reference.mesh = source.sign == Sign::hull ? hull(prepared.mesh) : std::move(prepared.mesh);

@@ -39,7 +39,7 @@ BuildOptions buildOptions(const Arguments& arguments);
 void requireConsistent(const Arguments& arguments);
 
 /// Throws `Error` where the exact distance of such a mesh does not fit in memory.
-void requireDistanceMemory(const TriangleMesh& mesh);
+void requireDistanceMemory(const TriangleMesh& mesh, Sign sign = Sign::automatic);
 
 /// An option that says nothing without another is a mistake. `owner` names that other, `given` tells whether it is
 /// there. Throws `Error`.

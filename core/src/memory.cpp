@@ -27,7 +27,7 @@ void requireMemory(const std::string& what, double bytes, std::string_view advic
   const double most = allowedMemory();
   if (bytes <= most) return;
   throw Error(what + " would take some " + bytesText(bytes) + " of memory, more than the " + bytesText(most) +
-              " that are three quarters of the machine's: " + std::string(advice));
+              " that are three quarters of what the machine or its control group has: " + std::string(advice));
 }
 
 }  // namespace hpsdf

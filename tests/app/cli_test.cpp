@@ -285,6 +285,37 @@ TEST_F(Cli, coordinatesFarFromTheOriginAreWarnedOf) {
 }
 
 /// Two tetrahedra, one of which reaches into the other.
+TEST_F(Cli, nothingThatIsGivenGoesUnheeded) {
+  for (const char* option : {"--hull", "--sign=winding"})
+    expectRefused({{"build", "analytic:sphere", "-o", at("x.hpsdf"), option}},
+                  "an analytic shape has a sign of its own");
+  expectRefused({{"turntable", field(), "-o", at("turn"), "--frames", "2", "--defects", at("none.obj")}},
+                "none.obj: no such file");
+  writeFile(at("flap.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n");
+  const auto places = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"mesh", at("flap.obj")};
+    words.insert(words.end(), more.begin(), more.end());
+    const std::string out = run({words}).out;
+    return std::ranges::count(out.substr(out.find("boundary edges  ")), ';');
+  };
+  EXPECT_GT(places({"--places", "5"}), places({}));
+  EXPECT_GT(places({}), places({"--places", "1"}));
+  const Outcome foreign = run({{"render", field(), "--defects", at("flap.obj"), "-o", at("x.png"), "--cpu"}});
+  EXPECT_EQ(foreign.status, 0);
+  EXPECT_THAT(foreign.err, HasSubstr("flap.obj is not what the field was made from"));
+}
+
+TEST_F(Cli, namesThatAreMeantForTheTerminalDoNotReachIt) {
+  const std::string name = at("red\x1b[31m.obj");
+  writeFile(name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+  for (const Call& call : {Call{{"build", name, "-o", at("x.hpsdf"), "--sign", "pseudonormal", "--max-steps", "3"}},
+                           Call{{"render", field(), "--defects", name, "-o", at("x.png"), "--cpu"}},
+                           Call{{"slice", field(), "--color", "error", "--mesh", name, "-o", at("y.png"), "--cpu"}}}) {
+    const Outcome outcome = run(call);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("warning"), HasSubstr("red"), Not(HasSubstr("\x1b"))));
+  }
+}
+
 TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
   std::string text;
   for (const double x : {0.0, 0.2}) text += fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 1 0\nv {0} 0 1\n", x, x + 1);

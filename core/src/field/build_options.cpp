@@ -50,8 +50,10 @@ void checkGridFitsMemory(const BuildOptions& options) {
        << " cells ";
   if (byNumbers < byMemory)
     refuse(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)), " an axis");
-  refuse(grid.str(), "and would need ", bytesText(cells * bytesPerCell), ", more than the ", bytesText(allowed),
-         " allowed: take at most ", std::floor(std::cbrt(byMemory)), " an axis, or allow more memory");
+  grid << "and would need " << bytesText(cells * bytesPerCell) << ", more than the " << bytesText(allowed)
+       << " allowed: ";
+  if (byMemory < 1) refuse(grid.str(), "allow more memory");
+  refuse(grid.str(), "take at most ", std::floor(std::cbrt(byMemory)), " an axis, or allow more memory");
 }
 
 /// τ in the field's own units^5.
