@@ -139,7 +139,9 @@ render::Drawn drawLook(Session& session, const Call& look, const std::optional<r
   const Arguments& arguments = look.arguments;
   const auto drawn = [&](auto picture, auto draw) {
     if (scale) picture.scale = *scale;
-    const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
+    const render::Evidence evidence =
+        isSlice(look) ? session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""))
+                      : evidenceOf(session, arguments, picture.color);
     return draw(session.renderer(backend(arguments)), session.current().field, picture, evidence);
   };
   const Box& domain = session.current().field.domain();

@@ -66,7 +66,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& dom
 /// Tells what explains an empty picture, or an open shell.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// What a picture of the session's field draws besides, by a command's arguments.
+/// What a picture of the session's field in space draws besides, by a command's arguments.
 render::Evidence evidenceOf(Session& session, const Arguments& arguments, render::ColorBy color);
 
 /// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.

@@ -1704,7 +1704,7 @@ TEST_F(Checkpoints, othersAreRefused) {
   ASSERT_TRUE(process.sendWhen(newState(), SIGINT));
   const Outcome outcome = process.finish();
   EXPECT_EQ(outcome.status, 130);
-  EXPECT_THAT(outcome.err, HasSubstr("note: " + state() + " keeps what was done"));
+  EXPECT_THAT(outcome.err, HasSubstr("cancelled; " + state() + " keeps what was done"));
   ASSERT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf.checkpoint"));
   const std::string kept = readFile(state());
   const auto refused = [&](const Call& call, const std::string& message) {
