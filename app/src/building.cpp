@@ -332,7 +332,8 @@ std::vector<Parameter> buildParameters() {
        .type = ParameterType::wholeNumber,
        .help =
            "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it "
-           "stops as soon as that is plain, and says how much. Left out: 1e8 besides that distance, some 240,000 "
+           "stops as soon as that is plain, and says how much. Weak continuity's solver comes on top, some 50 bytes a "
+           "coefficient, and a hull's pieces, some 300 MB at most. Left out: 1e8 besides that distance, some 240,000 "
            "cells, where target error, grid and max-steps are left out too; most meshes take less than 100,000 then. "
            "Else three quarters of the machine's memory, or of what its control group allows.",
        .unit = "bytes",

@@ -77,7 +77,8 @@ struct BuildOptions {
   CoefficientType coefficients = CoefficientType::automatic;
   /// Bytes that the growing octree and Φ (`DistanceFunction::bytes`) may take, by a generous estimate; nothing:
   /// `allowedMemory`, which is also the most. `build` throws when more are needed, and before, where the way in which
-  /// the error falls says that half as much again will be.
+  /// the error falls says that half as much again will be. Weak continuity's solver comes on top, some 50 bytes a
+  /// coefficient.
   std::optional<std::uint64_t> memoryLimit = {};
   int threads = 0;  ///< at most; 0: all that the machine offers. The result does not depend on it.
 };
