@@ -28,7 +28,8 @@ namespace {
 
 constexpr std::uint64_t kMemoryUnlessTold = 100'000'000;  // of the construction, where nothing says how fine to be
 
-/// Of a mesh, while its exact distance is made, and while that to its hull is, beside what is cut (1e6 pieces at most).
+/// Of a mesh, while its exact distance is made, and while that to its hull is, beside what is cut (250,000 pieces at
+/// most).
 constexpr double kBytesAFace = 520, kBytesAHullsFace = 800;
 
 constexpr std::string_view kBuiltin = "builtin:";
@@ -333,7 +334,7 @@ std::vector<Parameter> buildParameters() {
        .help =
            "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it "
            "stops as soon as that is plain, and says how much. Weak continuity's solver comes on top, some 50 bytes a "
-           "coefficient, and a hull's pieces, some 300 MB at most. Left out: 1e8 besides that distance, some 240,000 "
+           "coefficient, and a hull's pieces, some 80 MB at most. Left out: 1e8 besides that distance, some 240,000 "
            "cells, where target error, grid and max-steps are left out too; most meshes take less than 100,000 then. "
            "Else three quarters of the machine's memory, or of what its control group allows.",
        .unit = "bytes",

@@ -19,11 +19,8 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_alw
 void onInterrupt(int signal) {
   if (guards > 0 && !flag.exchange(true)) return;
   OutputFile::removeUnfinished();
-  // in the middle of work, earlier parts of that may stay: a batch's fields, a script's pictures
-  constexpr std::string_view kNothing = "hpsdf: cancelled; nothing was written\n";
-  constexpr std::string_view kNothingHalf = "hpsdf: cancelled; nothing is half-written\n";
-  const std::string_view message = guards > 0 ? kNothingHalf : kNothing;
-  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, message.data(), message.size());
+  constexpr std::string_view kMessage = "hpsdf: cancelled; nothing is half-written\n";
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
   _exit(128 + signal);
 }
 

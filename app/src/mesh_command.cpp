@@ -202,7 +202,7 @@ void drawPicture(Session& session, const Arguments& arguments, const Inspected& 
 std::exception_ptr tryPicture(Session& session, const Arguments& arguments, const Inspected& found) {
   try {
     if (arguments.given("picture")) drawPicture(session, arguments, found);
-  } catch (const Error&) {
+  } catch (const std::exception&) {
     return std::current_exception();
   }
   return nullptr;

@@ -63,7 +63,7 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     console.err << "hpsdf: cancelled; " << cancelled.kept() << std::endl;
     return kExitCancelled;
   } catch (const Cancelled&) {
-    console.err << "hpsdf: cancelled; nothing was written" << std::endl;
+    console.err << "hpsdf: cancelled; nothing is half-written" << std::endl;
     return kExitCancelled;
   } catch (const Failed& failed) {
     return fail(console, failed.what(), failed.status());

@@ -155,7 +155,7 @@ TEST_F(Accuracy, CancelledBoundsLeaveWhatWasThere) {
   const std::vector<std::string> words = {"bounds", at("f.hpsdf"), "-o", at("old.hpsdf")};
   EXPECT_EQ(runProgram(words, Console{in, out, err, false, &canceller}), kExitCancelled);
   EXPECT_THAT(out.str(), IsEmpty());
-  EXPECT_THAT(err.str(), HasSubstr("nothing was written"));
+  EXPECT_THAT(err.str(), HasSubstr("nothing is half-written"));
   EXPECT_EQ(readTextFile(at("old.hpsdf")), "old");
   EXPECT_FALSE(fs::exists(at("old.hpsdf.tmp")));
 }

@@ -1763,7 +1763,7 @@ TEST_F(Cli, interruptStopsTheConstruction) {
     const Outcome outcome = process.finish();
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     EXPECT_EQ(outcome.status, 130) << outcome.err;
-    EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing was written\n"));
+    EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
     EXPECT_THAT(outcome.out, IsEmpty());
     EXPECT_LT(seconds, 5) << "the promise is one second; this machine may be busy";
     EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
@@ -1789,7 +1789,7 @@ TEST_F(Cli, theImporterEndsWithTheProgram) {
     process.send(signal);
     const Outcome outcome = process.finish();
     EXPECT_EQ(outcome.status, status);
-    EXPECT_THAT(outcome.err, EndsWith(signal == SIGINT ? "hpsdf: cancelled; nothing was written\n" : ""));
+    EXPECT_THAT(outcome.err, EndsWith(signal == SIGINT ? "hpsdf: cancelled; nothing is half-written\n" : ""));
     for (int i = 0; i < 500 && readers() > 0; ++i) usleep(10000);
     EXPECT_EQ(readers(), 0u);
   }
@@ -1848,7 +1848,7 @@ TEST_F(Cli, anInterruptOutsideOfAConstructionLeavesNothingEither) {
   process.send(SIGTERM);
   const Outcome outcome = process.finish();
   EXPECT_EQ(outcome.status, 143);
-  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing was written\n"));
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
   EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
 }
 

@@ -303,7 +303,7 @@ TEST(Simulate, WhatIsCancelledLeavesNothing) {
                                             "--points", "50",    "--target-error", "1e-5", "--cache",   cache};
     EXPECT_EQ(runProgram(words, Console{in, out, err, false, &listener}), 130) << task;
     EXPECT_EQ(out.str(), "");
-    EXPECT_THAT(err.str(), testing::EndsWith("hpsdf: cancelled; nothing was written\n"));
+    EXPECT_THAT(err.str(), testing::EndsWith("hpsdf: cancelled; nothing is half-written\n"));
     const auto kept = std::distance(std::filesystem::directory_iterator(cache), {});
     EXPECT_EQ(kept, task == "refining" ? 0 : 2) << "fields that are whole are kept";
   }

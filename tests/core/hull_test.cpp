@@ -95,6 +95,21 @@ TEST(Hull, LeavesOutWallsThatBodiesHaveInCommon) {
   EXPECT_EQ(plain(Vector3(1, 0.5, 0.2)), 0) << "else this tells nothing";
 }
 
+/// Where three walls meet, or one ends on another, pieces of them are cut to the last: all around is inside.
+TEST(Hull, LeavesNothingOfWallsThatMeet) {
+  const auto box = [](const Vector3& size, const Vector3& corner) {
+    TriangleMesh mesh = moved(boxOfTwo(), {1, 1, 1}, 1);
+    for (Vector3& x : mesh.vertices) x = 0.5 * x.cwiseProduct(size) + corner;
+    return mesh;
+  };
+  const TriangleMesh mesh =
+      joined(joined(box({1, 2, 2}, {0, 0, 0}), box({1, 2, 2}, {1, 0, 0})), box({2, 2, 2}, {0, 0, 2}));
+  const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(box({2, 2, 4}, {0, 0, 0})), plain(mesh, kWinding);
+  EXPECT_EQ(plain(Vector3(1, 1, 2)), 0) << "else this tells nothing";
+  for (const Vector3& x : placesIn(boundingBox(mesh), 1000, 3)) EXPECT_NEAR(hull(x), whole(x), 0.02);
+  EXPECT_NEAR(hull(Vector3(1, 1, 2)), -1, 0.02);
+}
+
 TEST(Hull, KeepsOneTriangleThatIsPartlyOutside) {
   // the long faces of the bar pass through the box
   const TriangleMesh bar = shapes::mesh("box,width=6,height=0.5,depth=0.5");

@@ -228,6 +228,11 @@ TEST(MeshCleanup, OfASurfaceGivenWithBothSidesTheFirstStays) {
   EXPECT_TRUE(report.closed());
 }
 
+TEST(MeshCleanup, OneOfTwoBodiesThatTouchMayBeGivenTwice) {
+  const TriangleMesh both = joined(cube(), cube(1, {2, 0, 0}));
+  EXPECT_EQ(cleaned(joined(both, cube())).mesh.triangles, cleaned(both).mesh.triangles);
+}
+
 TEST(MeshCleanup, OfUnequalNumbersEitherWayMostWin) {
   EXPECT_EQ(cleaned(joined(joined(turned(cube()), cube()), cube())).mesh.triangles, cube().triangles);
   EXPECT_FALSE(cleaned(joined(joined(turned(cube()), cube()), cube())).report.turned);

@@ -183,6 +183,14 @@ TEST(MeshRepair, CavitiesWithAHoleStay) {
                   "the inner wall of a cup, up to its rim");
 }
 
+TEST(MeshRepair, CavitiesThatReachIntoEachOtherStay) {
+  const TriangleMesh hollow = joined(joined(moved(boxOfTwo(), {0, 0, 0}, 5), turned(moved(boxOfTwo(), {0, 0, 0}, 2))),
+                                     turned(moved(boxOfTwo(), {2.5, 2.5, 2.5}, 2)));
+  const RepairedMesh mended = repaired(cleaned(hollow));
+  EXPECT_EQ(mended.turnedPatches, 0u);
+  EXPECT_EQ(mended.imported.mesh.triangles, cleaned(hollow).mesh.triangles);
+}
+
 TEST(MeshRepair, WhatReachesOutOfAnotherIsNoCavity) {
   const TriangleMesh outer = boxOfTwo(), through = boxBetween({0, -0.9, -0.9}, {1.6, 0.9, 0.9});
   for (std::size_t largest = 0; largest < through.triangles.size(); ++largest) {

@@ -62,7 +62,7 @@ class ExactDistance {
  public:
   /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, for a
   /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in more than
-  /// two million pairs of triangles, or would be cut into more than a million pieces.
+  /// two million pairs of triangles, or would be cut into more than 250,000 pieces of a thirty-second of its size.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;

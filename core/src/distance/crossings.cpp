@@ -312,7 +312,7 @@ Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double ma
   for (std::uint32_t begin = 0; begin < count && crossings.all;) {
     const std::uint32_t end = begin + std::min(count - begin, size);
     const std::size_t left = limit - crossings.found.size();
-    if (const auto found = finder.findFewer(begin, end, left)) {
+    if (const auto found = finder.findFewer(begin, end, left + 1)) {
       add(*found);
       begin = end;
       size = halving ? (size + 1) / 2 : 2 * size;
@@ -320,7 +320,7 @@ Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double ma
       halving = true;
       size = (end - begin + 1) / 2;
     } else {
-      add(finder.findFirst(begin, left));
+      if (left > 0) add(finder.findFirst(begin, left));
       crossings.all = false;
     }
   }

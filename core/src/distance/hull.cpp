@@ -24,17 +24,18 @@ using Corners = std::array<Vector3, 3>;
 /// Of the mesh's longest side: pieces are not cut further, unless they are too many; then twice as large ones, and so
 /// on.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
+constexpr double kCoarserBesideHoles = 8;  // times: what only holes leave unsure is not worth as many pieces
 constexpr std::size_t kMostPairs = 2'000'000;
-constexpr std::size_t kMostPieces = 1'000'000;  // besides whole triangles
+constexpr std::size_t kMostPieces = 250'000;  // besides whole triangles
 
-/// Whether both sides of a triangle, or of a part of it, are the inside.
-enum class Kind : char { surface, buried, unsure };
+/// Whether both sides of a triangle, or of a part of it, are the inside; `cut`: others cut it still.
+enum class Kind : char { surface, buried, unsure, cut };
 
 struct Piece {
   Corners corners;
   std::uint32_t triangle;  ///< of which it is a part
   bool isWhole;
-  Kind kind = Kind::surface;
+  Kind kind = Kind::cut;
 };
 
 /// One of the triangles that a triangle meets.
@@ -73,17 +74,17 @@ class Cutter {
  public:
   Cutter(std::size_t most, double finest) : most_(most), finest_(finest) {}
 
-  /// Adds the pieces of a triangle: surface where others cut them still, unsure where not.
+  /// Adds the pieces of a triangle: cut, or unsure where others cut them no more.
   void add(const Corners& corners, std::uint32_t triangle, const std::vector<Crosser>& crossers) {
     add({corners, triangle, true}, crossers);
   }
 
-  /// Adds a quarter of each that is unsure in place of it, while these are not too small.
+  /// Adds the quarters of one that is unsure.
   void refine(const Piece& piece) {
     for (const Corners& quarter : quarters(piece.corners)) keep({quarter, piece.triangle, false, Kind::unsure});
   }
 
-  bool canCut(const Corners& corners) const { return longestSide(corners) > finest_; }
+  bool canCut(const Corners& corners, double times = 1) const { return longestSide(corners) > times * finest_; }
 
   std::vector<Piece> pieces;
 
@@ -179,14 +180,33 @@ Kind kindOf(const Corners& corners, const Inside& inside, double scale, double a
   return inside.isSameWithin(before, reach) && inside.isSameWithin(behind, reach) ? Kind::buried : Kind::unsure;
 }
 
+/// Whether all is inside around a small piece that others cut, in fourteen directions, as far as it is long: then it is
+/// no more than what is left of a wall.
+bool isSurrounded(const Corners& corners, const Inside& inside, double scale) {
+  const auto& [a, b, c] = corners;
+  const Vector3 middle = (a + b + c) / (3 * scale);
+  const double far = longestSide(corners) / scale;
+  const auto isInside = [&](const Vector3& direction) {
+    return inside.contains(middle + far * direction.normalized());
+  };
+  for (const double sign : {-1.0, 1.0})
+    for (int axis = 0; axis < 3; ++axis)
+      if (!isInside(sign * Vector3::Unit(axis))) return false;
+  for (int n = 0; n < 8; ++n)
+    if (!isInside(Vector3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1))) return false;
+  return true;
+}
+
 void setKinds(std::vector<Piece>& pieces, std::size_t first, const Inside& inside, double scale, double aside) {
   tbb::parallel_for(first, pieces.size(), [&](std::size_t i) {
-    if (pieces[i].kind == Kind::unsure) pieces[i].kind = kindOf(pieces[i].corners, inside, scale, aside);
+    Piece& piece = pieces[i];
+    if (piece.kind == Kind::unsure) piece.kind = kindOf(piece.corners, inside, scale, aside);
+    if (piece.kind == Kind::cut) piece.kind = isSurrounded(piece.corners, inside, scale) ? Kind::buried : Kind::surface;
   });
 }
 
-/// Pieces that are buried or not; those that are too small to be cut further are none. Coordinates are scaled to order
-/// 1. Nothing if they are too many.
+/// Pieces that are buried, or surface; beside holes some that are too small to be cut further are unsure. Coordinates
+/// are scaled to order 1. Nothing if they are too many.
 std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
                                            const Inside& inside, double finest) {
   const Box box = boundingBox(mesh);
@@ -198,7 +218,8 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
     // Beside holes the winding number changes along a piece.
     for (std::size_t first = 0, end = cutter.pieces.size(); first < end; first = end, end = cutter.pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
-        if (const Piece piece = cutter.pieces[i]; piece.kind == Kind::unsure && cutter.canCut(piece.corners)) {
+        if (const Piece piece = cutter.pieces[i];
+            piece.kind == Kind::unsure && cutter.canCut(piece.corners, kCoarserBesideHoles)) {
           cutter.refine(piece);
           cutter.pieces[i].kind = Kind::buried;  // its quarters are there instead
         }

@@ -139,20 +139,25 @@ std::vector<Vector3> placesBefore(const TriangleMesh& mesh, const Body& body, do
 }
 
 /// Puts back what is a cavity, of the bodies that were turned: what is within an odd number of other solids, for three
-/// quarters of its area and more. (What merely reaches into another is a body.) `mesh`: as it is with all solids
-/// looking outwards.
-void spareCavities(const TriangleMesh& mesh, std::vector<Body>& bodies) {
+/// quarters of its area and more, or has as much the outside before it and the inside behind it as it was given. (What
+/// merely reaches into another is a body; cavities may reach a little into each other.) `outward`: as it is with all
+/// solids looking outwards.
+void spareCavities(const TriangleMesh& given, const TriangleMesh& outward, std::vector<Body>& bodies) {
   if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::turned)) return;
-  const Around all(mesh, bodies);
-  const double aside = distance::besideSurface(boundingBox(mesh));
+  const Around all(outward, bodies), asGiven(given, bodies);
+  const double aside = distance::besideSurface(boundingBox(given));
   tbb::parallel_for(std::size_t{0}, bodies.size(), [&](std::size_t i) {
     Body& body = bodies[i];
     if (!body.turned) return;
-    const Around itself(mesh, {&body, 1});
-    const std::vector<Vector3> places = placesBefore(mesh, body, aside);
-    const auto within = std::ranges::count_if(
-        places, [&](const Vector3& x) { return std::lround(all.times(x) - itself.times(x)) % 2 != 0; });
-    body.turned = 4 * within < 3 * std::ssize(places);
+    const Around itself(outward, {&body, 1});
+    const std::vector<Vector3> places = placesBefore(outward, body, aside);
+    const std::vector<Vector3> before = placesBefore(given, body, aside), behind = placesBefore(given, body, -aside);
+    std::ptrdiff_t within = 0, bounding = 0;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+      within += std::lround(all.times(places[n]) - itself.times(places[n])) % 2 != 0;
+      bounding += asGiven.times(before[n]) < 0.5 && asGiven.times(behind[n]) > 0.5;
+    }
+    body.turned = 4 * std::max(within, bounding) < 3 * std::ssize(places);
   });
 }
 
@@ -168,7 +173,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   std::vector<Body> found = measured(mesh, patches, bodies);
   TriangleMesh outward = mesh;
   turnBodies(outward, found);
-  spareCavities(outward, found);
+  spareCavities(mesh, outward, found);
   turnBodies(mesh, found);
   result.turnedPatches = static_cast<std::size_t>(
       std::ranges::count_if(bodies.of, [&](std::uint32_t body) { return found[body].turned; }));

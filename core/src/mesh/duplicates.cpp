@@ -26,7 +26,7 @@ struct Group {
   int balance;             ///< so many more look as the first does than the other way
 
   std::uint32_t kept() const { return balance < 0 ? opposite : first; }
-  bool looksBothWays() const { return balance == 0; }
+  bool looksBothWays() const { return opposite != first; }
 };
 
 std::vector<Group> groupsOf(std::span<const Triangle> triangles) {

@@ -12,11 +12,11 @@ bool areTwins(const std::array<std::uint32_t, 3>& one, const std::array<std::uin
 
 /// Which of the faces over the same corners are too many, of each 1.
 ///
-/// One stays of those that look the same way, and, looking the way of most, of those that do not. Where as many look
-/// one way as the other, they are
+/// One stays of those that look the same way. Where they look both ways, they are
 /// - the wall between two bodies that touch, where the faces around them hold each other's edges without them: one each
 ///   way stays, so that each body is closed;
-/// - otherwise a surface given with both its sides, as programs for drawing do: the first stays.
+/// - otherwise a surface given with both its sides, as programs for drawing do: one stays that looks the way of most,
+///   the first where these are as many.
 /// What hangs together by edges is one or the other.
 std::vector<char> superfluousFaces(std::span<const std::array<std::uint32_t, 3>> triangles);
 
