@@ -6,17 +6,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <vector>
 
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_export.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/mesh_repair.h"
+#include "hpsdf/sign_check.h"
 #include "support/made_meshes.h"
 #include "support/temporary_directory.h"
 
@@ -170,6 +173,40 @@ TEST(MeshRepair, CavitiesThatTouchStay) {
     EXPECT_GT(outside.turnedPatches, 1u);
     EXPECT_EQ(outside.imported.mesh.triangles, cleaned(joined(outer, moved(pair, {4, 0, 0}))).mesh.triangles);
   }
+}
+
+/// Its side at x = high is cut along the other diagonal.
+TriangleMesh boxCutOtherwise(const Vector3& low, const Vector3& high) {
+  TriangleMesh mesh = boxBetween(low, high);
+  std::vector<std::array<std::uint32_t, 3>*> side;
+  for (auto& triangle : mesh.triangles)
+    if (std::ranges::all_of(triangle, [&](std::uint32_t v) { return mesh.vertices[v].x() == high.x(); }))
+      side.push_back(&triangle);
+  auto &one = *side.at(0), &other = *side.at(1);
+  while (std::ranges::count(other, one[0]) > 0) std::ranges::rotate(one, one.begin() + 1);
+  while (std::ranges::count(one, other[0]) > 0) std::ranges::rotate(other, other.begin() + 1);
+  one[2] = other[0];
+  other[2] = one[0];
+  return mesh;
+}
+
+TEST(MeshRepair, BodiesThatShareAWallCutOtherwiseAreTurnedEachByItself) {
+  const TriangleMesh left = boxCutOtherwise({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {3, 1, 1});
+  ASSERT_NEAR(signedVolume(left), 4, 1e-12);
+  const auto welded = [](const TriangleMesh& one, const TriangleMesh& other) {
+    return cleaned(joined(joined(one, other), boxBetween({5, 0, 0}, {9, 4, 4})));  // so that most looks outwards
+  };
+  ASSERT_EQ(inspect(welded(left, right).mesh).nonManifoldEdges, 4u);
+  for (const bool leftTurned : {false, true})
+    for (const bool rightTurned : {false, true}) {
+      const RepairedMesh mended =
+          repaired(welded(leftTurned ? turned(left) : left, rightTurned ? turned(right) : right));
+      EXPECT_EQ(mended.turnedPatches, 2u * leftTurned + 2u * rightTurned);
+      for (const Vector3& x : {Vector3(-0.1, 0.3, 0.2), Vector3(0.1, 0.3, 0.2), Vector3(2, 0, 0)})
+        EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 1, 1e-9) << leftTurned << rightTurned << x.transpose();
+      for (const Vector3& x : {Vector3(-0.1, 1.1, 0.2), Vector3(3.1, 0.3, 0.2)})
+        EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 0, 1e-9) << leftTurned << rightTurned << x.transpose();
+    }
 }
 
 TEST(MeshRepair, CavitiesWithAHoleStay) {

@@ -19,7 +19,7 @@ struct RepairedMesh {
 /// area; one that has one side only, as a Möbius strip, stays as it is.
 ///
 /// Bodies are closed patches, patches that only together are closed (at every edge as many sides run one way as the
-/// other), and each other patch. A body that looks inwards is turned unless it is a cavity: within an odd number of
+/// other, with a solid between them), and each other patch. A body that looks inwards is turned unless it is a cavity: within an odd number of
 /// other bodies, by their winding number, for three quarters of its area and more. Of open bodies only those look
 /// inwards, or have something within, whose volume is plain, as of the whole mesh in `cleaned`.
 ///

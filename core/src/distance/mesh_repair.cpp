@@ -150,14 +150,13 @@ void spareCavities(const TriangleMesh& given, const TriangleMesh& outward, std::
     Body& body = bodies[i];
     if (!body.turned) return;
     const Around itself(outward, {&body, 1});
-    const std::vector<Vector3> places = placesBefore(outward, body, aside);
     const std::vector<Vector3> before = placesBefore(given, body, aside), behind = placesBefore(given, body, -aside);
     std::ptrdiff_t within = 0, bounding = 0;
-    for (std::size_t n = 0; n < places.size(); ++n) {
-      within += std::lround(all.times(places[n]) - itself.times(places[n])) % 2 != 0;
+    for (std::size_t n = 0; n < behind.size(); ++n) {  // behind it as given is before it as it looks outwards
+      within += std::lround(all.times(behind[n]) - itself.times(behind[n])) % 2 != 0;
       bounding += asGiven.times(before[n]) < 0.5 && asGiven.times(behind[n]) > 0.5;
     }
-    body.turned = 4 * std::max(within, bounding) < 3 * std::ssize(places);
+    body.turned = 4 * std::max(within, bounding) < 3 * std::ssize(behind);
   });
 }
 
@@ -169,7 +168,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   const Patches patches = patchesOf(mesh.triangles.size(), sidesByEdge(mesh.triangles));
   RepairedMesh result;
   result.turnedFaces = agree(mesh, patches);
-  const Bodies bodies = bodiesOf(patches, sidesByEdge(mesh.triangles));
+  const Bodies bodies = bodiesOf(mesh, patches, sidesByEdge(mesh.triangles));
   std::vector<Body> found = measured(mesh, patches, bodies);
   TriangleMesh outward = mesh;
   turnBodies(outward, found);
