@@ -13,7 +13,6 @@
 #include "hpsdf/checkpoint.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
-#include "hpsdf/hull.h"
 #include "hpsdf/memory.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/shapes.h"
@@ -117,6 +116,8 @@ struct PreparedSurface {
   TriangleMesh mesh;
   std::optional<MeshReport> report;
   Normalization normalization;
+
+  Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
 };
 
 PreparedSurface prepare(const Console& console, const std::string& surface, bool toNormalize) {
@@ -131,6 +132,13 @@ PreparedSurface prepare(const Console& console, const std::string& surface, bool
   if (toNormalize) prepared.normalization = normalizing(boundingBox(imported.mesh));
   prepared.mesh = toNormalize ? normalized(imported.mesh) : std::move(imported.mesh);
   return prepared;
+}
+
+/// Throws `Error` where the exact distance of such a mesh does not fit in memory.
+void requireDistanceMemory(const TriangleMesh& mesh, Sign sign = Sign::automatic) {
+  requireMemory("the exact distance of " + grouped(mesh.triangles.size()) + " faces",
+                (sign == Sign::hull ? kBytesAHullsFace : kBytesAFace) * double(mesh.triangles.size()),
+                "simplify the mesh first");
 }
 
 struct SharedDistance {
@@ -170,10 +178,12 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
 /// Those of a field that was made from `source`.
 DistanceOptions distanceOptions(const Source& source) { return {.sign = source.sign, .thickness = source.thickness}; }
 
-/// Of a closed mesh without folds all expect the sign that it gets.
-void tellSign(const Console& console, const std::string& surface, const MeshReport& report, const SignChoice& choice) {
+/// Of a closed mesh without folds all expect the sign that it gets. `choice`: of the mesh after `normalization`.
+void tellSign(const Console& console, const std::string& surface, const MeshReport& report, SignChoice choice,
+              const Normalization& normalization) {
+  if (choice.place) choice.place = *choice.place / normalization.scale + normalization.center;
   if (!choice.reason.empty() && choice.sign != Sign::pseudonormal)
-    console.err << fmt::format("hpsdf: {}: sign by winding number: {}", surface, choice.reason) << std::endl;
+    note(console, fmt::format("{}: sign by winding number: {}", surface, reasonText(choice, report.box)));
   if (choice.reason.empty() && choice.sign == Sign::pseudonormal && !report.closed())
     warn(console, unsureSigns(surface, report));
 }
@@ -181,9 +191,8 @@ void tellSign(const Console& console, const std::string& surface, const MeshRepo
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
-  requireDistanceMemory(prepared.mesh, options.sign);
-  const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, options);
-  tellSign(console, printable(surface), *prepared.report, exact->signChoice());
+  const auto exact = distanceTo(console, prepared.mesh, options);
+  tellSign(console, surface, *prepared.report, exact->signChoice(), prepared.normalization);
   return distanceOf(exact, prepared.normalization);
 }
 
@@ -574,10 +583,12 @@ void requireOwner(const Arguments& arguments, const char* name, const char* owne
     throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
 }
 
-void requireDistanceMemory(const TriangleMesh& mesh, Sign sign) {
-  requireMemory("the exact distance of " + grouped(mesh.triangles.size()) + " faces",
-                (sign == Sign::hull ? kBytesAHullsFace : kBytesAFace) * double(mesh.triangles.size()),
-                "simplify the mesh first");
+std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
+                                                const DistanceOptions& options) {
+  requireDistanceMemory(mesh, options.sign);
+  return withProgress(console, [&](const Progress& progress) {
+    return std::make_shared<const ExactDistance>(mesh, options, progress);
+  });
 }
 
 void requireConsistent(const Arguments& arguments) {
@@ -609,12 +620,12 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
       for (const char* name : {"sign", "thickness", "hull"})
         if (arguments.given(name)) throw Error(std::string(name) + ": an analytic shape has a sign of its own");
     const PreparedSurface prepared = prepare(console, surface, wantsNormalized(arguments));
+    const Box box = prepared.box(), domain = domainOf(arguments, box);
+    checkBuild(domain, options);
+    warnOfCutSurface(console, box, domain);
     const auto start = std::chrono::steady_clock::now();
-    BuildInput input{distanceTo(console, surface, prepared, ofMesh), prepared.report, {}, options};
+    BuildInput input{distanceTo(console, surface, prepared, ofMesh), prepared.report, domain, options};
     input.setUpSeconds = secondsSince(start);
-    const Box& box = input.exact->source().box;
-    input.domain = domainOf(arguments, box);
-    warnOfCutSurface(console, box, input.domain);
     // where nobody named a limit, it is for what grows
     if (input.options.memoryLimit && !arguments.given("memory-limit"))
       *input.options.memoryLimit += input.exact->bytes();
@@ -680,10 +691,9 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
         return differenceQuotient(*distance, x);
       };
     } else {
-      requireDistanceMemory(prepared.mesh, source.sign);
-      const auto exact = std::make_shared<const ExactDistance>(prepared.mesh, distanceOptions(source));
+      const auto exact = distanceTo(console, prepared.mesh, distanceOptions(source));
       reference.distance = distanceOf(exact, prepared.normalization);
-      reference.mesh = source.sign == Sign::hull ? hull(prepared.mesh) : std::move(prepared.mesh);
+      reference.mesh = source.sign == Sign::hull ? exact->surface() : std::move(prepared.mesh);
       // nearer than this, rounding decides the direction
       const double least = 1e-9 * exact->source().box.sizes().maxCoeff();
       reference.normal = [exact, least](const Vector3& x, double signedDistance) {
@@ -710,7 +720,9 @@ MeshDefects meshDefects(const Console& console, const std::string& surface, cons
     requireDistanceMemory(prepared.mesh);
     if (!isMadeFrom({.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source))
       warnOfForeign(console, surface, source);
-    return findDefects(prepared.mesh, findCrossings(prepared.mesh));
+    return findDefects(prepared.mesh, withProgress(console, [&](const Progress& progress) {
+                         return findCrossings(prepared.mesh, kMostCrossings, progress);
+                       }));
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }

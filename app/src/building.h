@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_defects.h"
 #include "hpsdf/mesh_import.h"
 #include "session.h"
@@ -38,8 +39,10 @@ BuildOptions buildOptions(const Arguments& arguments);
 /// Throws `Error` for arguments of `buildParameters` that no surface could be built with.
 void requireConsistent(const Arguments& arguments);
 
-/// Throws `Error` where the exact distance of such a mesh does not fit in memory.
-void requireDistanceMemory(const TriangleMesh& mesh, Sign sign = Sign::automatic);
+/// Throws `Error`, also where it would not fit in memory, and `Cancelled` after Ctrl-C. Progress goes to the console's
+/// `err`.
+std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
+                                                const DistanceOptions& options = {});
 
 /// An option that says nothing without another is a mistake. `owner` names that other, `given` tells whether it is
 /// there. Throws `Error`.

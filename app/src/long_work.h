@@ -35,7 +35,7 @@ auto withProgress(const Console& console, const Work& work) {
           [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
   };
   auto result = work(progress);
-  if (progress.cancelled()) throw Cancelled();  // asked for in the very last moment
+  progress.pause();  // asked for in the very last moment
   return result;
 }
 

@@ -51,13 +51,14 @@ struct Inspected {
 Inspected inspected(Session& session, const Arguments& arguments) {
   Inspected found{.imported = importSurface(session.console(), arguments.text("mesh"))};
   const TriangleMesh& mesh = found.imported.mesh;
-  requireDistanceMemory(mesh);
-  const ExactDistance distance(mesh);
-  found.defects = findDefects(mesh, distance.crossings());
-  found.choice = distance.signChoice();
+  const auto distance = distanceTo(session.console(), mesh);
+  found.defects = findDefects(mesh, withProgress(session.console(), [&](const Progress& progress) {
+                                return distance->crossings(kMostCrossings, progress);
+                              }));
+  found.choice = distance->signChoice();
   if (arguments.given("check-sign"))
     found.check = withProgress(session.console(), [&](const Progress& progress) {
-      return checkSign(mesh, distance, static_cast<std::size_t>(arguments.number("check-sign")),
+      return checkSign(mesh, *distance, static_cast<std::size_t>(arguments.number("check-sign")),
                        static_cast<std::uint64_t>(arguments.number("seed")), progress);
     });
   return found;
@@ -239,6 +240,7 @@ void runMesh(Session& session, const Arguments& arguments) {
     json["verdict"] = verdictJson(report, found.defects);
     json["defects"] = defectsJson(found.defects, placesWanted(arguments, kPlacesInJson));
     json["sign"] = {{"by", signName(found.choice.sign)}, {"because", found.choice.reason}};
+    if (found.choice.place) json["sign"]["at"] = vectorJson(*found.choice.place);
     if (found.check) json["sign_check"] = checkJson(*found.check);
     if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
     if (drawn) json["picture"] = arguments.text("picture");
@@ -247,7 +249,8 @@ void runMesh(Session& session, const Arguments& arguments) {
     session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
                           << defectsText(found.defects, report.box, placesWanted(arguments, kPlacesInText))
                           << summaryRow("verdict", verdictText(report, found.defects))
-                          << summaryRow("sign", signName(found.choice.sign) + ": " + found.choice.reason)
+                          << summaryRow("sign",
+                                        signName(found.choice.sign) + ": " + reasonText(found.choice, report.box))
                           << (found.check ? checkText(*found.check) : "")
                           << (mended ? repairText(*mended, arguments.text("repair")) : "")
                           << (drawn ? summaryRow("picture", printable(arguments.text("picture"))) : "");

@@ -229,7 +229,7 @@ class Reading {
 
   /// Between two pieces of work.
   void pause() const {
-    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
+    progress_.pause();
     const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
     if (elapsed > limits_.seconds)
       throw Error(fmt::format("{}: reading it takes more than {} s; check or export the file again, or set {} above {}",

@@ -55,8 +55,7 @@ void append(std::vector<Parameter>& parameters, std::vector<Parameter> more) {
 }
 
 void step(const Progress& progress, std::size_t done, std::size_t all) {
-  if (progress.cancelled()) throw Cancelled();
-  progress.report("drawing frames", double(done) / double(all));
+  progress.at("drawing frames", double(done) / double(all));
 }
 
 /// What the commands report, and a folder's frames.json holds; a frame a row of `rows`.
@@ -76,7 +75,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
   Film film(arguments.text("output"));
   useField(session, arguments);
   const InterruptGuard guard;  // until all is in its place
-  const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
+  const render::Evidence evidence = evidenceOf(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
@@ -139,9 +138,7 @@ render::Drawn drawLook(Session& session, const Call& look, const std::optional<r
   const Arguments& arguments = look.arguments;
   const auto drawn = [&](auto picture, auto draw) {
     if (scale) picture.scale = *scale;
-    const render::Evidence evidence =
-        isSlice(look) ? session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""))
-                      : evidenceOf(session, arguments, picture.color);
+    const render::Evidence evidence = evidenceOf(session, arguments, picture);
     return draw(session.renderer(backend(arguments)), session.current().field, picture, evidence);
   };
   const Box& domain = session.current().field.domain();

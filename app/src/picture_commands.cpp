@@ -82,11 +82,11 @@ void runSlice(Session& session, const Arguments& arguments) {
     throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
   if (format != SliceFormat::png && picture.arrows != 0)
     throw Error(fmt::format("{}: raw values have no arrows; leave out arrows", file));
+  if (format == SliceFormat::png) render::checkPictureSize(picture.width, picture.height, picture.samples);
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence =
-      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  const render::Evidence evidence = evidenceOf(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = slicePicture(arguments, field.domain());
@@ -122,8 +122,13 @@ void noteOddSurface(const Console& console, const Field& field, const render::Su
                      picture.offset == 0 ? "build" : "give an offset nearer to 0, or build"));
 }
 
-render::Evidence evidenceOf(Session& session, const Arguments& arguments, render::ColorBy color) {
-  render::Evidence evidence = session.evidence(color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+render::Evidence evidenceOf(Session& session, const Arguments& arguments, const render::SlicePicture& picture) {
+  return session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+}
+
+render::Evidence evidenceOf(Session& session, const Arguments& arguments, const render::SurfacePicture& picture) {
+  render::Evidence evidence =
+      session.evidence(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
   const std::string defects = arguments.textOr("defects", "");
   if (!defects.empty()) evidence.defects = &session.defects(defects);
   return evidence;
@@ -138,7 +143,7 @@ void runRender(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   useField(session, arguments);
-  const render::Evidence evidence = evidenceOf(session, arguments, picture.color);
+  const render::Evidence evidence = evidenceOf(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
@@ -482,6 +487,7 @@ render::SurfacePicture cameraPicture(const Arguments& arguments) {
   picture.width = arguments.size("size")[0];
   picture.height = arguments.size("size")[1];
   picture.samples = arguments.whole("samples");
+  render::checkPictureSize(picture.width, picture.height, picture.samples);
   return picture;
 }
 

@@ -55,7 +55,7 @@ std::vector<Parameter> lookParameters(const Registry& registry);
 std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend);
 
 /// What any picture before a camera takes: camera, view, target, projection, size and samples. Throws `Error` for a
-/// camera out of range.
+/// camera or a size out of range.
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
 /// Throws `Error` for a camera out of range, or options that exclude or need each other. Its plane is the one asked
@@ -66,8 +66,9 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& dom
 /// Tells what explains an empty picture, or an open shell.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// What a picture of the session's field in space draws besides, by a command's arguments.
-render::Evidence evidenceOf(Session& session, const Arguments& arguments, render::ColorBy color);
+/// What a picture of the session's field draws besides, by a command's arguments.
+render::Evidence evidenceOf(Session& session, const Arguments& arguments, const render::SlicePicture& picture);
+render::Evidence evidenceOf(Session& session, const Arguments& arguments, const render::SurfacePicture& picture);
 
 /// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.
 double defaultOffset(const Box& domain, int axis);

@@ -12,7 +12,8 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr double kRedrawSeconds = 0.1;
 constexpr double kQuietSeconds = 10;
-constexpr double kQuickSeconds = 0.3;  // work that ends sooner needs no words
+// Work that ends sooner needs no words; fewer where they stay.
+constexpr double kQuickSeconds = 0.3, kQuickSecondsInALog = 2;
 constexpr int kBarCells = 24;
 
 }  // namespace
@@ -32,7 +33,7 @@ ProgressLine::~ProgressLine() {
 }
 
 bool ProgressLine::due(double fraction, Clock::time_point now) const {
-  if (!drawn_) return Seconds(now - start_).count() >= kQuickSeconds;
+  if (!drawn_) return Seconds(now - start_).count() >= (redraws_ ? kQuickSeconds : kQuickSecondsInALog);
   const double quiet = Seconds(now - lastDrawn_).count();
   if (redraws_) return quiet >= kRedrawSeconds;
   return quiet >= kQuietSeconds || static_cast<int>(fraction * 4) > lastQuarter_;

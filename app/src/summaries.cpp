@@ -205,6 +205,10 @@ std::string meshText(const std::string& name, const MeshReport& report) {
   return text;
 }
 
+std::string reasonText(const SignChoice& choice, const Box& mesh) {
+  return choice.place ? choice.reason + ", as at " + vectorText(*choice.place, mesh) : choice.reason;
+}
+
 std::string unsureSigns(const std::string& name, const MeshReport& report) {
   return fmt::format(
       "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "current_field.h"
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_report.h"
 
 namespace hpsdf::app {
@@ -23,6 +24,9 @@ std::string closednessText(const MeshReport& report);
 
 /// As `--sign` has them; "unknown" for `automatic`.
 std::string signName(Sign sign);
+
+/// "the mesh meets itself, as at (0, 1, 2)"; `mesh`: its box.
+std::string reasonText(const SignChoice& choice, const Box& mesh);
 
 /// One line for a mesh that is not closed and yet is to have its sign by pseudonormals.
 std::string unsureSigns(const std::string& name, const MeshReport& report);

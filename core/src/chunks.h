@@ -8,7 +8,6 @@
 #include <mutex>
 #include <string_view>
 
-#include "hpsdf/error.h"
 #include "hpsdf/progress.h"
 
 namespace hpsdf {
@@ -19,9 +18,7 @@ class Parts {
   Parts(const Progress& progress, std::string_view task, std::size_t count)
       : progress_(progress), task_(task), count_(count) {}
 
-  void begin() const {
-    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-  }
+  void begin() const { progress_.pause(); }
   void end() {
     if (!progress_.report) return;
     const std::lock_guard lock(reporting_);

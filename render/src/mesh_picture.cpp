@@ -11,6 +11,7 @@
 #include "body_meshes.h"
 #include "color_view.h"
 #include "hpsdf/build.h"
+#include "hpsdf/error.h"
 #include "legend.h"
 #include "marks.h"
 #include "picture_parts.h"
@@ -19,7 +20,8 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kBorder = 0.04;  // left free around a whole mesh, of the view's width and height
+constexpr double kFarthest = 1e15;  // for a camera's target, in about the mesh's size
+constexpr double kBorder = 0.04;    // left free around a whole mesh, of the view's width and height
 
 enum Look : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
@@ -114,6 +116,8 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   const auto renderer = make({nearMesh});
   OrbitCamera orbit = picture.camera;
   if (orbit.target) orbit.target = nearOne(*orbit.target);
+  if (orbit.target && !(orbit.target->cwiseAbs().maxCoeff() <= kFarthest))
+    throw Error("the camera's target is too far from the mesh: give a place nearer to it");
   const Box box = renderer->bounds({&body, 1}), domain = domainAround(box);
   if (picture.whole) orbit = nearestForWhole(nearMesh.vertices, orbit, domain, width, height);
   const Camera camera = startingBefore(box, cameraOf(orbit, domain, width, height));

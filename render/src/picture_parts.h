@@ -6,10 +6,6 @@
 
 namespace hpsdf::render {
 
-/// Throws `Error` for a size or sample count out of range: 16 to 16384 pixels, 1 to 8, no more than 64 Mi samples in
-/// all.
-void checkPictureSize(int width, int height, int samples);
-
 /// Of thin lines, pixels.
 double lineWidthOf(const Frame& frame);
 

@@ -335,7 +335,12 @@ TEST_F(Cli, meshTellsWhereItMeetsItselfAndHowItsInsideIsTold) {
   EXPECT_TRUE(json.at("verdict").at("parts_overlap"));
   EXPECT_FALSE(json.at("verdict").at("self_folding"));
   EXPECT_EQ(json.at("sign").at("by"), "winding");
+  EXPECT_EQ(json.at("sign").at("at").size(), 3u);
   EXPECT_EQ(json.at("sign_check").at("wrong"), 0);
+  const std::string place = told.out.substr(told.out.rfind(", as at ("), std::string(", as at (0.5, 0.5, 0.5").size());
+  EXPECT_THAT(run({{"build", at("two.obj"), "-o", at("t.hpsdf"), "--normalize", "--target-error", "1"}}).err,
+              HasSubstr("the mesh meets itself, so that normals may mislead" + place))
+      << "in the file's units";
   EXPECT_THAT(run({{"mesh", "builtin:gear"}}).out,
               AllOf(HasSubstr("closed, orientable, does not meet itself"),
                     HasSubstr("pseudonormal: the mesh has no holes"), Not(HasSubstr("as at"))));
@@ -371,17 +376,18 @@ TEST_F(Cli, meshIsDrawn) {
   EXPECT_GT(fs::file_size(at("bad.png")), 1000u);
   expectRefused({{"mesh", at("bad.obj"), "--picture", at("bad.jpg")}}, "written as .png");
   expectRefused({{"mesh", at("bad.obj"), "--view", "front"}}, "view belongs to picture");
+  expectRefused({{"mesh", at("none.obj"), "--picture", at("bad.png"), "--size", "9000x9000"}}, "64 million");
 }
 
 TEST_F(Cli, meshIsToldAndMendedWhateverItsPictureDoes) {
   writeFile(at("bad.obj"), kBadTetrahedron);
   for (const bool json : {false, true}) {
-    Call call{{"mesh", at("bad.obj"), "--picture", at("bad.png"), "--cpu", "--repair", at("mended.obj"), "--size",
-               "9000x9000"}};
+    Call call{{"mesh", at("bad.obj"), "--picture", at("bad.png"), "--cpu", "--repair", at("mended.obj"), "--target",
+               "1e300,0,0"}};
     if (json) call.words.push_back("--json");
     const Outcome outcome = run(call);
     EXPECT_EQ(outcome.status, 2);
-    EXPECT_THAT(outcome.err, AllOf(StartsWith("hpsdf: error: "), HasSubstr("64 million")));
+    EXPECT_THAT(outcome.err, AllOf(StartsWith("hpsdf: error: "), HasSubstr("too far from the mesh")));
     EXPECT_THAT(outcome.out, AllOf(HasSubstr("inconsistent"), HasSubstr("mended.obj"), Not(HasSubstr("picture"))));
     EXPECT_TRUE(fs::remove(at("mended.obj")));
     EXPECT_FALSE(fs::exists(at("bad.png")));
@@ -1885,8 +1891,8 @@ TEST(Progress, aPipeGetsALineAQuarterAndEveryTenSeconds) {
   };
   {
     ProgressLine line(out, false, start);
-    line.report("refining", 0, after(0.2));
-    line.report("refining", 0, after(0.4));
+    line.report("refining", 0, after(1.9));
+    line.report("refining", 0, after(2.1));
     line.report("refining", 0.1, after(5));
     line.report("refining", 0.26, after(6));
     line.report("refining", 0.3, after(7));
@@ -1894,7 +1900,7 @@ TEST(Progress, aPipeGetsALineAQuarterAndEveryTenSeconds) {
     line.report("refining", 1, after(18));
   }
   EXPECT_EQ(out.str(),
-            "refining   0 %, 0 s\n"
+            "refining   0 %, 2 s\n"
             "refining  26 %, 6 s, about 17 s left\n"
             "refining  31 %, 17 s, about 38 s left\n"
             "refining 100 %, 18 s\n");
@@ -1918,7 +1924,8 @@ TEST(Progress, quickWorkNeedsNoWords) {
     const Clock::time_point start{};
     {
       ProgressLine line(out, redraws, start);
-      for (int i = 0; i <= 4; ++i) line.report("measuring", i / 4.0, start + std::chrono::milliseconds(50 * i));
+      const auto step = std::chrono::milliseconds(redraws ? 50 : 450);
+      for (int i = 0; i <= 4; ++i) line.report("measuring", i / 4.0, start + i * step);
     }
     EXPECT_EQ(out.str(), "");
   }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -223,6 +224,11 @@ TEST(Crossings, OfTheSameTriangleTwiceIsOne) {
 
 TEST(Crossings, OfATriangleAloneAreNone) {
   EXPECT_TRUE(findCrossings({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, "one"}).found.empty());
+}
+
+TEST(Crossings, CanBeCancelled) {
+  std::atomic<int> left = 100;
+  EXPECT_THROW(findCrossings(lens(), kMostCrossings, {{}, [&] { return --left < 0; }}), Cancelled);
 }
 
 TEST(Crossings, NeedASurface) { EXPECT_THROW(findCrossings({}), Error); }

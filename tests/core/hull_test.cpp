@@ -1,16 +1,20 @@
 // Distances to the hull: walls within bodies that overlap are no surface.
 
-#include "distance/hull.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numbers>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_import.h"
 #include "hpsdf/sign_check.h"
@@ -172,13 +176,35 @@ TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
 
 TEST(Hull, PiecesAreThatSmallAlongTheSeamOnly) {
   const TriangleMesh mesh = twoBalls();
-  const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const distance::Inside inside(hierarchy, mesh, distance::HoleRims(hierarchy));
-  const distance::Hull hull = distance::hullOf(hierarchy, mesh, inside);
-  EXPECT_LT(hull.triangles.size(), 4 * mesh.triangles.size());
+  const TriangleMesh surface = ExactDistance(mesh, kHull).surface();
+  EXPECT_LT(surface.triangles.size(), 4 * mesh.triangles.size());
   const double area = 2 * (2 * std::numbers::pi * 1.5);  // of the two caps, each 1.5 high
-  EXPECT_NEAR(surfaceArea(hull.mesh), area, 0.02 * area);
+  EXPECT_NEAR(surfaceArea(surface), area, 0.02 * area);
   EXPECT_GT(surfaceArea(mesh), 1.3 * area);
+  EXPECT_NEAR(surfaceArea(ExactDistance(mesh).surface()), surfaceArea(mesh), 1e-9) << "all, unless of a hull";
+}
+
+/// Wherever it is cancelled: a hull of a mesh with holes asks thousands of times, before, while and after faces are
+/// cut.
+TEST(Hull, ReportsProgressAndCanBeCancelled) {
+  TriangleMesh mesh = twoBalls();
+  mesh.triangles.pop_back();  // so that pieces are cut further
+  std::map<std::string, double, std::less<>> tasks;
+  std::atomic<int> asked = 0;
+  const Progress telling{.report =
+                             [&](std::string_view task, double fraction) {
+                               EXPECT_GE(fraction, 0);
+                               EXPECT_LE(fraction, 1);
+                               tasks[std::string(task)] = fraction;
+                             },
+                         .cancelled = [&] { return ++asked < 0; }};
+  const ExactDistance whole(mesh, kHull, telling);
+  EXPECT_THAT(tasks, testing::Contains(testing::Pair("looking where faces meet", testing::Gt(0.9))));
+  EXPECT_THAT(tasks, testing::Contains(testing::Pair("leaving out walls within, pieces of 1/512", 1)));
+  for (const double part : {0.0, 0.3, 0.6, 0.9}) {
+    std::atomic<int> left = int(part * asked);
+    EXPECT_THROW(ExactDistance(mesh, kHull, {{}, [&] { return --left < 0; }}), Cancelled) << part;
+  }
 }
 
 }  // namespace

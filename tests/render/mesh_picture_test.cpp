@@ -2,6 +2,7 @@
 
 #include "hpsdf/render/mesh_picture.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -274,11 +275,16 @@ TEST(MeshPicture, TellsWhereSomeCrossingsWereLeftOut) {
   }
 }
 
-TEST(MeshPicture, RefusesSizesOutOfRange) {
-  const TriangleMesh mesh = boxOfTwo();
+TEST(MeshPicture, RefusesSizesAndTargetsOutOfRange) {
+  TriangleMesh mesh = boxOfTwo();
   MeshPicture picture = pictureFrom(0, 0);
   picture.width = 8;
   EXPECT_THROW(drawn(mesh, picture), Error);
+  for (Vector3& x : mesh.vertices) x *= 1e-30;
+  picture = pictureFrom(0, 0);
+  picture.camera.target = Vector3(1e300, 0, 0);
+  EXPECT_THAT([&] { drawn(mesh, picture); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("too far from the mesh")));
 }
 
 }  // namespace

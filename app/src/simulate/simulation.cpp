@@ -71,8 +71,7 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
   SimulationFigures figures;
   Photographer photographer(scene, name, camera, rate);
   for (std::uint64_t step = 0; step < steps; ++step) {
-    if (progress.cancelled()) throw Cancelled();
-    progress.report("simulating", double(step) / double(steps));
+    progress.at("simulating", double(step) / double(steps));
     scene.admit();
     photographer.after(step, false);
     scene.world().step();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "hpsdf/progress.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
 
@@ -27,7 +28,8 @@ constexpr std::size_t kMostCrossings = 1'000'000;  ///< unless asked for others
 /// Where a mesh meets itself, decided without rounding (Shewchuk 1997). Corners are the same where their indices are:
 /// weld them first. Triangles whose corners lie on one line are passed over, as their neighbours hold their sides.
 ///
-/// `limit` of them at most, the same ones for any number of threads. Throws `Error` as `ExactDistance` does.
-Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit = kMostCrossings);
+/// `limit` of them at most, the same ones for any number of threads. Throws `Error` as `ExactDistance` does,
+/// `Cancelled`.
+Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit = kMostCrossings, const Progress& progress = {});
 
 }  // namespace hpsdf

@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "hpsdf/crossings.h"
 #include "hpsdf/distance_function.h"
+#include "hpsdf/progress.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
 
@@ -32,8 +34,9 @@ struct DistanceOptions {
 
 /// Which sign distances have, and why.
 struct SignChoice {
-  Sign sign = Sign::pseudonormal;  ///< never automatic
-  std::string reason = {};         ///< half a sentence, such as "the mesh has no holes and does not meet itself"
+  Sign sign = Sign::pseudonormal;     ///< never automatic
+  std::string reason = {};            ///< half a sentence, such as "the mesh has no holes and does not meet itself"
+  std::optional<Vector3> place = {};  ///< where that is seen, if it is at a place
 };
 
 /// Exact signed distance to a triangle mesh in double precision.
@@ -63,7 +66,8 @@ class ExactDistance {
   /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, for a
   /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in more than
   /// two million pairs of triangles, or would be cut into more than 250,000 pieces of a thirty-second of its size.
-  explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {});
+  /// Throws `Cancelled`.
+  explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {}, const Progress& progress = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
   ExactDistance& operator=(ExactDistance&&) noexcept;
@@ -79,8 +83,11 @@ class ExactDistance {
 
   const SignChoice& signChoice() const;
 
+  /// The triangles that distances go to. Of a hull, what is left of a triangle that was cut has vertices of its own.
+  TriangleMesh surface() const;
+
   /// `findCrossings` of the mesh.
-  Crossings crossings(std::size_t limit = kMostCrossings) const;
+  Crossings crossings(std::size_t limit = kMostCrossings, const Progress& progress = {}) const;
 
   /// Name, fingerprint, counts, box and sign of the mesh.
   const Source& source() const;

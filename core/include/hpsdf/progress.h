@@ -3,6 +3,8 @@
 #include <functional>
 #include <string_view>
 
+#include "hpsdf/error.h"
+
 namespace hpsdf {
 
 /// The link between a long operation and its caller. Both callables may be empty.
@@ -12,6 +14,19 @@ struct Progress {
 
   /// Asked often and from any thread; once it answers true the operation throws `Cancelled`.
   std::function<bool()> cancelled;
+
+  // What operations call.
+
+  /// Throws `Cancelled` where that is wanted.
+  void pause() const {
+    if (cancelled && cancelled()) throw Cancelled();
+  }
+
+  /// The same, and reports.
+  void at(std::string_view task, double fraction) const {
+    pause();
+    if (report) report(task, fraction);
+  }
 };
 
 }  // namespace hpsdf

@@ -172,10 +172,12 @@ class Finder {
 
   /// Those of triangles of the slots [begin, end) with those of later ones, by the former's slots; nothing if there are
   /// so many or more.
-  std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most) const {
+  std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most,
+                                                 const Progress& progress) const {
     std::vector<std::vector<Crossing>> ofSlot(end - begin);
     std::atomic<std::size_t> count = 0;
     tbb::parallel_for(begin, end, [&](std::uint32_t slot) {
+      progress.pause();
       find(slot, [&](const Crossing& crossing) {
         ofSlot[slot - begin].push_back(crossing);
         return ++count < most;
@@ -298,24 +300,28 @@ double scaleToOne(std::span<const Vector3> vertices) {
   return greatest > 0 ? std::ldexp(1.0, -std::ilogb(greatest)) : 1;
 }
 
-Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin) {
+Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress) {
   const Finder finder(hierarchy, margin);
   const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
   Crossings crossings;
   const auto add = [&](const std::vector<Crossing>& found) {
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
   };
-  // In parts that grow. One with too many is given up as soon as that shows, and halved until it is clear at which slot
-  // the limit is reached: a heap of triangles that all meet is neither searched to its end nor kept.
-  std::uint32_t size = 64;
+  // In parts that grow, to a fiftieth of all. One with too many is given up as soon as that shows, and halved until it
+  // is clear at which slot the limit is reached: a heap of triangles that all meet is neither searched to its end nor
+  // kept.
+  constexpr std::uint32_t kLeast = 64;
+  const std::uint32_t largest = std::max(kLeast, count / 50);
+  std::uint32_t size = kLeast;
   bool halving = false;
   for (std::uint32_t begin = 0; begin < count && crossings.all;) {
+    progress.at("looking where faces meet", double(begin) / count);
     const std::uint32_t end = begin + std::min(count - begin, size);
     const std::size_t left = limit - crossings.found.size();
-    if (const auto found = finder.findFewer(begin, end, left + 1)) {
+    if (const auto found = finder.findFewer(begin, end, left + 1, progress)) {
       add(*found);
       begin = end;
-      size = halving ? (size + 1) / 2 : 2 * size;
+      size = halving ? (size + 1) / 2 : std::min(2 * size, largest);
     } else if (end - begin > 1) {
       halving = true;
       size = (end - begin + 1) / 2;
@@ -330,10 +336,10 @@ Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double ma
 
 }  // namespace distance
 
-Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit) {
+Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit, const Progress& progress) {
   distance::requireSurface(mesh);
   const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
-  return distance::findCrossings(hierarchy, limit, 0);
+  return distance::findCrossings(hierarchy, limit, 0, progress);
 }
 
 }  // namespace hpsdf

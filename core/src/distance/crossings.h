@@ -25,6 +25,6 @@ double scaleToOne(std::span<const Vector3> vertices);
 
 /// `hpsdf::findCrossings` of a hierarchy's triangles, by their indices in the mesh. With a margin, of coordinates of
 /// order 1, also those that come as near each other, to rounding.
-Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin);
+Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress);
 
 }  // namespace hpsdf::distance

@@ -38,7 +38,7 @@ void check(const DistanceOptions& options) {
 }  // namespace
 
 struct ExactDistance::Data {
-  Data(const TriangleMesh& mesh, const DistanceOptions& options)
+  Data(const TriangleMesh& mesh, const DistanceOptions& options, const Progress& progress)
       : source{.name = mesh.name,
                .vertices = mesh.vertices.size(),
                .faces = mesh.triangles.size(),
@@ -48,7 +48,7 @@ struct ExactDistance::Data {
                          [&] { hierarchy = distance::Hierarchy(mesh, source.box); });
     choice.sign = options.sign;
     if (options.sign == Sign::automatic) {
-      distance::ChosenSign chosen = distance::chooseSign(hierarchy, mesh);
+      distance::ChosenSign chosen = distance::chooseSign(hierarchy, mesh, progress);
       choice = std::move(chosen.choice);
       inside = std::move(chosen.inside);
       normals = std::move(chosen.normals);
@@ -57,15 +57,15 @@ struct ExactDistance::Data {
     } else if (options.sign == Sign::winding) {
       inside = distance::Inside(hierarchy, mesh, distance::HoleRims(hierarchy));
     } else if (options.sign == Sign::hull) {
-      leaveOutBuried(mesh);
+      leaveOutBuried(mesh, progress);
     }
     source.sign = choice.sign;
   }
 
-  void leaveOutBuried(const TriangleMesh& mesh) {
+  void leaveOutBuried(const TriangleMesh& mesh, const Progress& progress) {
     whole = std::move(hierarchy);
     inside = distance::Inside(whole, mesh, distance::HoleRims(whole));
-    distance::Hull hull = distance::hullOf(whole, mesh, inside);
+    distance::Hull hull = distance::hullOf(whole, mesh, inside, progress);
     hierarchy = distance::Hierarchy(hull.mesh, source.box);
     parts = std::move(hull.triangles);
   }
@@ -149,10 +149,10 @@ struct ExactDistance::Data {
   }
 };
 
-ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options) {
+ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options, const Progress& progress) {
   distance::requireSurface(mesh);
   check(options);
-  data_ = withThreads(options.threads, [&] { return std::make_unique<const Data>(mesh, options); });
+  data_ = withThreads(options.threads, [&] { return std::make_unique<const Data>(mesh, options, progress); });
 }
 
 ExactDistance::~ExactDistance() = default;
@@ -176,8 +176,14 @@ ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
 
 const SignChoice& ExactDistance::signChoice() const { return data_->choice; }
 
-Crossings ExactDistance::crossings(std::size_t limit) const {
-  return distance::findCrossings(data_->parts.empty() ? data_->hierarchy : data_->whole, limit, 0);
+TriangleMesh ExactDistance::surface() const {
+  const auto vertices = data_->hierarchy.vertices();
+  const auto triangles = data_->hierarchy.triangles();
+  return {{vertices.begin(), vertices.end()}, {triangles.begin(), triangles.end()}, data_->source.name};
+}
+
+Crossings ExactDistance::crossings(std::size_t limit, const Progress& progress) const {
+  return distance::findCrossings(data_->parts.empty() ? data_->hierarchy : data_->whole, limit, 0, progress);
 }
 
 std::string_view instructionSet() { return distance::instructionSet(); }

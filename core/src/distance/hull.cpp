@@ -1,18 +1,19 @@
 #include "distance/hull.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
+#include "chunks.h"
 #include "distance/crossings.h"
 #include "hpsdf/error.h"
-#include "hpsdf/hull.h"
 #include "mesh/duplicates.h"
 #include "mesh/message_prefix.h"
 
@@ -110,8 +111,8 @@ class Cutter {
 using Pair = std::array<std::uint32_t, 2>;
 
 /// Each pair of triangles that meet, both ways, sorted.
-std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
-  const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0);
+std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
+  const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0, progress);
   if (!crossings.all) refuse(mesh);
   std::vector<Pair> pairs;
   for (const Crossing& crossing : crossings.found) {
@@ -146,7 +147,8 @@ void leaveOutInnerSides(const TriangleMesh& mesh, const std::vector<Pair>& pairs
 }
 
 /// Pieces of all triangles. Coordinates are scaled to order 1.
-void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter) {
+void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter,
+                  const Progress& progress) {
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
@@ -154,6 +156,7 @@ void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair
   auto next = pairs.begin();
   std::vector<Crosser> crossers;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    progress.pause();
     const Corners corners = cornersOf(t);
     crossers.clear();
     for (; next != pairs.end() && (*next)[0] == t; ++next) {
@@ -197,24 +200,28 @@ bool isSurrounded(const Corners& corners, const Inside& inside, double scale) {
   return true;
 }
 
-void setKinds(std::vector<Piece>& pieces, std::size_t first, const Inside& inside, double scale, double aside) {
-  tbb::parallel_for(first, pieces.size(), [&](std::size_t i) {
-    Piece& piece = pieces[i];
-    if (piece.kind == Kind::unsure) piece.kind = kindOf(piece.corners, inside, scale, aside);
-    if (piece.kind == Kind::cut) piece.kind = isSurrounded(piece.corners, inside, scale) ? Kind::buried : Kind::surface;
+void setKinds(std::span<Piece> pieces, const Inside& inside, double scale, double aside, const Progress& progress,
+              std::string_view task) {
+  forEachChunk(pieces.size(), 64, progress, task, [&](std::size_t, std::size_t first, std::size_t count) {
+    for (Piece& piece : pieces.subspan(first, count)) {
+      if (piece.kind == Kind::unsure) piece.kind = kindOf(piece.corners, inside, scale, aside);
+      if (piece.kind == Kind::cut)
+        piece.kind = isSurrounded(piece.corners, inside, scale) ? Kind::buried : Kind::surface;
+    }
   });
 }
 
 /// Pieces that are buried, or surface; beside holes some that are too small to be cut further are unsure. Coordinates
 /// are scaled to order 1. Nothing if they are too many.
 std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
-                                           const Inside& inside, double finest) {
+                                           const Inside& inside, double finest, const Progress& progress) {
   const Box box = boundingBox(mesh);
   const double aside = besideSurface(box);
+  const std::string task = "leaving out walls within, pieces of 1/" + std::to_string(std::lround(1 / finest));
   Cutter cutter(mesh.triangles.size() + kMostPieces, scale * finest * box.sizes().maxCoeff());
   try {
-    cutTriangles(mesh, scale, pairs, cutter);
-    setKinds(cutter.pieces, 0, inside, scale, aside);
+    cutTriangles(mesh, scale, pairs, cutter, progress);
+    setKinds(cutter.pieces, inside, scale, aside, progress, task);
     // Beside holes the winding number changes along a piece.
     for (std::size_t first = 0, end = cutter.pieces.size(); first < end; first = end, end = cutter.pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
@@ -223,7 +230,7 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
           cutter.refine(piece);
           cutter.pieces[i].kind = Kind::buried;  // its quarters are there instead
         }
-      setKinds(cutter.pieces, end, inside, scale, aside);
+      setKinds(std::span(cutter.pieces).subspan(end), inside, scale, aside, progress, task);
     }
   } catch (const TooManyPieces&) {
     return std::nullopt;
@@ -233,12 +240,12 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
 
 }  // namespace
 
-Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside) {
+Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside, const Progress& progress) {
   const double scale = scaleToOne(hierarchy.vertices());
-  const std::vector<Pair> pairs = pairsThatMeet(hierarchy, mesh);
+  const std::vector<Pair> pairs = pairsThatMeet(hierarchy, mesh, progress);
   std::optional<std::vector<Piece>> pieces;
   for (double finest = kFinest; !pieces && finest <= kCoarsest; finest *= 2)
-    pieces = piecesOf(mesh, scale, pairs, inside, finest);
+    pieces = piecesOf(mesh, scale, pairs, inside, finest, progress);
   if (!pieces) refuse(mesh);
   Hull hull{.mesh = {.vertices = mesh.vertices, .triangles = {}, .name = mesh.name}, .triangles = {}};
   for (const Piece& piece : *pieces) {
@@ -257,14 +264,3 @@ Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& 
 }
 
 }  // namespace hpsdf::distance
-
-namespace hpsdf {
-
-TriangleMesh hull(const TriangleMesh& mesh) {
-  distance::requireSurface(mesh);
-  const distance::Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const distance::Inside inside(hierarchy, mesh, distance::HoleRims(hierarchy));
-  return distance::hullOf(hierarchy, mesh, inside).mesh;
-}
-
-}  // namespace hpsdf

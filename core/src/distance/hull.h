@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "distance/inside.h"
+#include "hpsdf/progress.h"
 #include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::distance {
@@ -22,7 +23,7 @@ struct Hull {
 };
 
 /// `hierarchy`: of the mesh; `inside`: made of that. Throws `Error`, naming the mesh, where it meets itself in too many
-/// places, and where nothing is left.
-Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside);
+/// places, and where nothing is left; `Cancelled`.
+Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside, const Progress& progress);
 
 }  // namespace hpsdf::distance

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,16 +24,6 @@ constexpr double kTooNear = 0x1p-44;
 /// Of the sum of an edge's unit normals, the angle between its faces: above a face, beside such an edge, the product
 /// that decides is half its square, which is to be far above what rounds.
 constexpr double kSharp = 1e-6;
-
-/// With so many digits that places of the mesh are told apart, far from the origin, too.
-std::string textOf(const Vector3& x, const Box& mesh) {
-  const double largest = std::max(mesh.min().cwiseAbs().maxCoeff(), mesh.max().cwiseAbs().maxCoeff());
-  const double size = mesh.sizes().maxCoeff();
-  std::ostringstream text;
-  text.precision(size > 0 ? std::clamp(4 + int(std::log10(largest / size)), 4, 17) : 4);
-  text << "(" << x.x() << ", " << x.y() << ", " << x.z() << ")";
-  return text.str();
-}
 
 /// Whether an open mesh has an inside at any place of a lattice, which reaches beyond it, for it may be flat.
 bool surroundsAny(const Inside& inside, const Box& mesh) {
@@ -94,42 +83,39 @@ std::optional<Vector3> tooSharp(const Hierarchy& hierarchy, const Pseudonormals&
 
 }  // namespace
 
-ChosenSign chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh) {
-  const auto byWinding = [](std::string reason, Inside inside) {
-    return ChosenSign{.choice = {Sign::winding, std::move(reason)}, .inside = std::move(inside)};
+ChosenSign chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
+  const auto byWinding = [](std::string reason, std::optional<Vector3> place, Inside inside) {
+    return ChosenSign{.choice = {Sign::winding, std::move(reason), place}, .inside = std::move(inside)};
   };
-  const Box box = boundingBox(mesh);
   const std::vector<Side> sides = sidesByEdge(hierarchy.triangles());
   HoleRims rims(hierarchy, sides);
   if (const std::size_t open = rims.size(); open > 0) {
     Inside inside(hierarchy, mesh, std::move(rims));
     std::string reason = std::to_string(open) + (open == 1 ? " edge has" : " edges have");
     reason += " a side without a neighbour, and ";
-    reason += surroundsAny(inside, box)
+    reason += surroundsAny(inside, boundingBox(mesh))
                   ? "holes are closed where the winding number is 1/2"
                   : "the faces surround nothing that was found: a shell would give them a thickness";
-    return byWinding(std::move(reason), std::move(inside));
+    return byWinding(std::move(reason), std::nullopt, std::move(inside));
   }
   // All that follows is about what rounds: normals would then speak of another surface.
   const auto thin = std::ranges::find_if_not(hierarchy.frames(), hasArea);
   if (thin != hierarchy.frames().end())
-    return byWinding("a face is thinner than what coordinates round, as at " + textOf(thin->origin, box),
+    return byWinding("a face is thinner than what coordinates round", thin->origin,
                      Inside(hierarchy, mesh, std::move(rims)));
-  if (const Crossings crossings = findCrossings(hierarchy, 1, kTooNear); !crossings.found.empty())
-    return byWinding(
-        "the mesh meets itself, so that normals may mislead, as at " + textOf(crossings.found[0].place, box),
-        Inside(hierarchy, mesh, std::move(rims)));
+  const Crossings crossings = findCrossings(hierarchy, 1, kTooNear, progress);
+  if (!crossings.found.empty())
+    return byWinding("the mesh meets itself, so that normals may mislead", crossings.found[0].place,
+                     Inside(hierarchy, mesh, std::move(rims)));
   const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
   if (pieces.size() > 1) {
     Inside inside(hierarchy, mesh, std::move(rims));
     if (const auto place = misplaced(hierarchy, pieces, inside))
-      return byWinding("a part looks the wrong way, or lies within another, as at " + textOf(*place, box),
-                       std::move(inside));
+      return byWinding("a part looks the wrong way, or lies within another", place, std::move(inside));
   }
   Pseudonormals normals(hierarchy);
   if (const auto place = tooSharp(hierarchy, normals))
-    return byWinding("an edge or corner is too sharp for normals, as at " + textOf(*place, box),
-                     Inside(hierarchy, mesh, std::move(rims)));
+    return byWinding("an edge or corner is too sharp for normals", place, Inside(hierarchy, mesh, std::move(rims)));
   return {.choice = {Sign::pseudonormal, "the mesh has no holes and does not meet itself"},
           .normals = std::move(normals)};
 }

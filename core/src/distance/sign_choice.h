@@ -20,6 +20,8 @@ struct ChosenSign {
 /// that distances round to the same, if every piece of its surface has the outside before it and the inside behind it,
 /// and no edge or corner is so sharp that its pseudonormal is rounding. Pieces are what hangs together by edges of two
 /// faces: along one of them neither changes.
-ChosenSign chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh);
+///
+/// Throws `Cancelled`.
+ChosenSign chooseSign(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress);
 
 }  // namespace hpsdf::distance

@@ -325,10 +325,7 @@ std::vector<int> deepestAround(const FieldData& field, const std::vector<Leaf>& 
 
 constexpr std::size_t kChunk = 4096;
 
-void report(const Progress& progress, double fraction) {
-  if (progress.cancelled && progress.cancelled()) throw Cancelled();
-  if (progress.report) progress.report("finding bounds", fraction);
-}
+void report(const Progress& progress, double fraction) { progress.at("finding bounds", fraction); }
 
 /// In a blended leaf all that touch it have a say: f = f₀ + Σ vₙ (fₙ − f₀), f₀ being its own polynomial and vₙ weights
 /// whose sum is 1 at most. Its error grows by how far the others are from f₀ where they have a say; its gradient by how

@@ -155,7 +155,7 @@ class Construction {
       if (node.firstChild == 0) coefficients += coefficientCount(raised(node));
     requireRoom(tree.nodes.size(), coefficients);
     for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
-      report("raising every degree", double(begin) / double(tree.nodes.size()));
+      progress_.at("raising every degree", double(begin) / double(tree.nodes.size()));
       tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
         BuildNode& node = tree.nodes[n];
         if (node.firstChild != 0 || node.fit.degree >= raised(node)) return;
@@ -276,7 +276,7 @@ class Construction {
     if (tree_.nodes.empty()) tree_.addBaseCells();
     const int degree = startDegree(options_);
     while (fitted_ < count) {
-      report("fitting base cells", double(fitted_) / double(count));
+      progress_.at("fitting base cells", double(fitted_) / double(count));
       const std::size_t end = std::min<std::size_t>(fitted_ + kChunk, count);
       tbb::parallel_for(std::size_t(fitted_), end,
                         [&](std::size_t n) { tree_.nodes[n].fit = fitter_.fit(tree_.boxOf(tree_.nodes[n]), degree); });
@@ -422,7 +422,7 @@ class Construction {
   }
 
   void refineRound(const std::function<void(std::uint64_t)>& afterStep) {
-    report("refining", fractionDone());
+    progress_.at("refining", fractionDone());
     requireRoom(tree_.nodes.size(), coefficientsInMemory(), leastGrowth());
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
@@ -520,7 +520,7 @@ class Construction {
     }
     while (passed_ < waiting_.size()) {
       requireRoom(tree_.nodes.size(), coefficientsInMemory());
-      report("looking for the maximum error", double(passed_) / double(waiting_.size()));
+      progress_.at("looking for the maximum error", double(passed_) / double(waiting_.size()));
       const std::size_t count = std::min<std::size_t>(kLookRound, waiting_.size() - passed_);
       std::vector<Looked> looked(count);
       tbb::parallel_for(std::size_t{0}, count,
@@ -587,11 +587,6 @@ class Construction {
   void sumTotals() {
     totals_ = sumOfErrors(tree_);
     lastSum_ = totals_.weighted;
-  }
-
-  void report(std::string_view task, double fraction) const {
-    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
-    if (progress_.report) progress_.report(task, fraction);
   }
 
   const DistanceFunction& distance_;

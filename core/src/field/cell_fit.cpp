@@ -103,7 +103,7 @@ std::vector<double> CellFitter::sample(std::span<const Box> cells, const Project
   std::array<Vector3, kBatch> points;
   std::array<double, kBatch> values;
   for (std::size_t first = 0; first < samples.size(); first += kBatch) {
-    if (progress_.cancelled && progress_.cancelled()) throw Cancelled();
+    progress_.pause();
     const std::size_t count = std::min(kBatch, samples.size() - first);
     const auto sampleAt = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
     for (std::size_t i = 0; i < count; ++i) {

@@ -41,8 +41,7 @@ double squaredNorm(const std::vector<double>& x) {
 }
 
 void report(const Progress& progress, double fraction) {
-  if (progress.cancelled && progress.cancelled()) throw Cancelled();
-  if (progress.report) progress.report("closing jumps", std::clamp(fraction, 0.0, 1.0));
+  progress.at("closing jumps", std::clamp(fraction, 0.0, 1.0));
 }
 
 /// Conjugate gradients on (M + λ)d = −Mx₀, preconditioned by the diagonal.

@@ -85,7 +85,7 @@ std::vector<double> anglesAt(const VerifiedSurface& surface, const ExactSamples&
   const std::size_t stride = std::max<std::size_t>(1, samples.points.size() / wanted);
   std::vector<double> angles((samples.points.size() + stride - 1) / stride, -1.0);
   forEachChunk(angles.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
-    if (progress.cancelled && progress.cancelled()) throw Cancelled();
+    progress.pause();
     for (std::size_t n = first; n < first + count; ++n) {
       const std::size_t at = n * stride;
       const Vector3 normal = surface.normal(samples.points[at], samples.distances[at]);
@@ -233,7 +233,7 @@ Verification verify(const Field& field, const VerifiedSurface& surface, const Ve
     const double bound = options.signBound > 0 ? options.signBound : 10 * result.nearSurface.error.rms;
     result.uniform.signs = signFigures(atUniform, uniform.distances, bound);
     result.nearSurface.signs = signFigures(atNear, near.distances, bound);
-    if (progress.report) progress.report("comparing gradients", 0.8);
+    progress.at("comparing gradients", 0.8);
     const std::size_t anglesOfEach = options.anglePoints / 2;
     result.uniform.gradient =
         gradientFigures(uniform, atUniform, anglesAt(surface, uniform, atUniform, anglesOfEach, progress));

@@ -26,4 +26,8 @@ struct Image {
 void savePng(const Image& image, const std::filesystem::path& file);
 Image loadPng(const std::filesystem::path& file);
 
+/// Of a picture drawn from a view. Throws `Error` for a size or sample count out of range: 16 to 16384 pixels, 1 to 8,
+/// no more than 64 Mi samples in all.
+void checkPictureSize(int width, int height, int samples);
+
 }  // namespace hpsdf::render
