@@ -212,6 +212,18 @@ TEST(MeshCleanup, KeepsBothFacesOfAWallBetweenBodiesThatTouch) {
   EXPECT_EQ(twice.duplicateFaces, 5 * 12u);
 }
 
+TEST(MeshCleanup, KeepsAllFacesThatBodiesWithinEachOtherShare) {
+  const TriangleMesh low = support::boxBetween({0, 0, 0}, {1, 1, 1}), high = support::boxBetween({0, 0, 0}, {1, 1, 2});
+  const auto [clean, report] = cleaned(joined(low, high));
+  EXPECT_EQ(clean.triangles.size(), 24u) << "the bottom of both";
+  EXPECT_EQ(report.duplicateFaces, 0u);
+  EXPECT_EQ(report.unbalancedEdges, 0u);
+  EXPECT_EQ(cleaned(joined(joined(low, high), low)).report.unbalancedEdges, 0u) << "one of them twice";
+  TriangleMesh stray = joined(low, high);
+  stray.triangles.push_back(stray.triangles[5]);
+  EXPECT_EQ(cleaned(stray).report.unbalancedEdges, 0u);
+}
+
 TEST(MeshCleanup, OfASurfaceGivenWithBothSidesTheFirstStays) {
   for (const TriangleMesh& one : {cube(), turned(cube())}) {
     const auto [clean, report] = cleaned(joined(one, turned(one)));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdlib>
 
 #include "mesh/face_sets.h"
 #include "mesh/sides.h"
@@ -23,71 +24,120 @@ bool isEven(const Triangle& t) { return (t[0] < t[1]) == ((t[1] < t[2]) == (t[0]
 struct Group {
   std::uint32_t first;     ///< of all
   std::uint32_t opposite;  ///< the first that looks the other way than that, or `first`
-  int balance;             ///< so many more look as the first does than the other way
+  int along = 1;           ///< so many look as the first does,
+  int against = 0;         ///< so many the other way
 
-  std::uint32_t kept() const { return balance < 0 ? opposite : first; }
-  bool looksBothWays() const { return opposite != first; }
+  bool looksBothWays() const { return against > 0; }
+  std::uint32_t kept() const { return against > along ? opposite : first; }
+  int excess() const { return std::abs(along - against); }  ///< so many more look as the kept one does
 };
 
-std::vector<Group> groupsOf(std::span<const Triangle> triangles) {
+struct Groups {
+  std::vector<Group> all;
+  std::vector<std::uint32_t> of;  ///< each face's
+  std::vector<Side> sides;        ///< of those that are kept, by edge; `Side::face` is the group
+};
+
+Groups groupsOf(std::span<const Triangle> triangles) {
   std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // the corners sorted, and the face
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
     const auto [a, b, c] = sorted(triangles[f]);
     order[f] = {a, b, c, f};
   }
   std::ranges::sort(order);
-  std::vector<Group> groups;
+  Groups groups{.all = {}, .of = std::vector<std::uint32_t>(triangles.size()), .sides = {}};
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint32_t f = order[i][3];
     if (i == 0 || !std::equal(order[i].begin(), order[i].begin() + 3, order[i - 1].begin())) {
-      groups.push_back({f, f, 1});
-      continue;
+      groups.all.push_back({.first = f, .opposite = f});
+    } else {
+      Group& group = groups.all.back();
+      const bool agrees = isEven(triangles[f]) == isEven(triangles[group.first]);
+      if (!agrees && !group.looksBothWays()) group.opposite = f;
+      ++(agrees ? group.along : group.against);
     }
-    Group& group = groups.back();
-    const bool agrees = isEven(triangles[f]) == isEven(triangles[group.first]);
-    group.balance += agrees ? 1 : -1;
-    if (!agrees && group.opposite == group.first) group.opposite = f;
+    groups.of[f] = static_cast<std::uint32_t>(groups.all.size() - 1);
   }
+  if (groups.all.size() == triangles.size()) return groups;
+  std::vector<Triangle> kept;
+  for (const Group& group : groups.all) kept.push_back(triangles[group.kept()]);
+  groups.sides = sidesByEdge(kept);
   return groups;
 }
 
-/// Of each group: whether it is of a wall.
-std::vector<char> wallsOf(std::span<const Triangle> triangles, const std::vector<Group>& groups) {
-  std::vector<Triangle> faces;
-  for (const Group& group : groups) faces.push_back(triangles[group.kept()]);
-  const std::vector<Side> sides = sidesByEdge(faces);
-  FaceSets sets(groups.size());
-  struct Around {
-    bool others = false, unbalanced = false;  // faces that look one way only, along the set's edges
-  };
-  std::vector<Around> around(groups.size());
-  const auto visitEdges = [&](const auto& visit) {
-    forEachEdge(sides, [&](std::span<const Side> edge) {
-      const auto both = std::ranges::find_if(edge, [&](const Side& s) { return groups[s.face].looksBothWays(); });
-      if (both != edge.end()) visit(edge, both->face);
-    });
-  };
-  visitEdges([&](std::span<const Side> edge, std::uint32_t group) {
+/// Sets of some groups, 1 in `chosen`, that hang together by edges, each by its lowest group.
+FaceSets setsOf(const Groups& groups, const std::vector<char>& chosen) {
+  FaceSets sets(groups.all.size());
+  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
+    const auto first = std::ranges::find_if(edge, [&](const Side& side) { return chosen[side.face]; });
     for (const Side& side : edge)
-      if (groups[side.face].looksBothWays()) sets.join(group, side.face);
+      if (chosen[side.face]) sets.join(first->face, side.face);
   });
-  visitEdges([&](std::span<const Side> edge, std::uint32_t group) {
-    int others = 0, balance = 0;
+  return sets;
+}
+
+/// Calls visit(a set of these groups, the sides there) for each edge that one has.
+template <typename Visit>
+void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, FaceSets& sets, const Visit& visit) {
+  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
+    const auto first = std::ranges::find_if(edge, [&](const Side& side) { return chosen[side.face]; });
+    if (first != edge.end()) visit(sets.first(first->face), edge);
+  });
+}
+
+int signOf(const Side& side) { return side.rising ? 1 : -1; }
+
+/// Of each group: whether it is of a wall.
+std::vector<char> wallsOf(const Groups& groups) {
+  std::vector<char> both(groups.all.size());
+  for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].looksBothWays();
+  FaceSets sets = setsOf(groups, both);
+  struct Around {
+    bool others = false;                       // faces that look one way only, along the set's edges
+    bool unbalanced = false, asGiven = false;  // those, of each group one; and all of them
+  };
+  std::vector<Around> around(groups.all.size());
+  forEachEdgeOf(groups, both, sets, [&](std::uint32_t set, std::span<const Side> edge) {
+    int balance = 0, asGiven = 0;
     for (const Side& side : edge) {
-      if (groups[side.face].looksBothWays()) continue;
-      ++others;
-      balance += side.rising ? 1 : -1;
+      if (both[side.face]) continue;
+      around[set].others = true;
+      balance += signOf(side);
+      asGiven += signOf(side) * groups.all[side.face].excess();
     }
-    Around& here = around[sets.first(group)];
-    here.others |= others > 0;
-    here.unbalanced |= balance != 0;
+    around[set].unbalanced |= balance != 0;
+    around[set].asGiven |= asGiven != 0;
   });
-  std::vector<char> walls(groups.size());
-  for (std::uint32_t g = 0; g < groups.size(); ++g) {
+  std::vector<char> walls(groups.all.size());
+  for (std::uint32_t g = 0; g < walls.size(); ++g) {
     const Around& here = around[sets.first(g)];
-    walls[g] = groups[g].looksBothWays() && here.others && !here.unbalanced;
+    walls[g] = both[g] && here.others && !(here.unbalanced && here.asGiven);
   }
   return walls;
+}
+
+/// Of each group: whether all its faces count, because bodies share it that look the same way there: without some of
+/// them more edges would be held by no other face than gain by that.
+std::vector<char> sharedOf(const Groups& groups, const std::vector<char>& walls) {
+  std::vector<char> several(groups.all.size());
+  for (std::size_t g = 0; g < several.size(); ++g) {
+    const Group& group = groups.all[g];
+    several[g] = walls[g] ? group.along + group.against > 2 : !group.looksBothWays() && group.along > 1;
+  }
+  FaceSets sets = setsOf(groups, several);
+  std::vector<int> lost(groups.all.size());  // edges
+  forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const Side> edge) {
+    int reduced = 0, asGiven = 0;
+    for (const Side& side : edge) {
+      const int one = walls[side.face] ? 0 : signOf(side);
+      reduced += one;
+      asGiven += several[side.face] ? signOf(side) * groups.all[side.face].excess() : one;
+    }
+    lost[set] += int(reduced != 0) - int(asGiven != 0);
+  });
+  std::vector<char> shared(groups.all.size());
+  for (std::uint32_t g = 0; g < shared.size(); ++g) shared[g] = several[g] && lost[sets.first(g)] > 0;
+  return shared;
 }
 
 }  // namespace
@@ -95,13 +145,14 @@ std::vector<char> wallsOf(std::span<const Triangle> triangles, const std::vector
 bool areTwins(const Triangle& one, const Triangle& other) { return sorted(one) == sorted(other); }
 
 std::vector<char> superfluousFaces(std::span<const Triangle> triangles) {
-  const std::vector<Group> groups = groupsOf(triangles);
-  const bool someLookBothWays = std::ranges::any_of(groups, &Group::looksBothWays);
-  const std::vector<char> walls = someLookBothWays ? wallsOf(triangles, groups) : std::vector<char>(groups.size());
-  std::vector<char> superfluous(triangles.size(), 1);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    superfluous[groups[g].kept()] = 0;
-    if (walls[g]) superfluous[groups[g].opposite] = 0;
+  const Groups groups = groupsOf(triangles);
+  if (groups.all.size() == triangles.size()) return std::vector<char>(triangles.size());
+  const std::vector<char> walls = wallsOf(groups), shared = sharedOf(groups, walls);
+  std::vector<char> superfluous(triangles.size());
+  for (std::uint32_t f = 0; f < triangles.size(); ++f) {
+    const std::uint32_t g = groups.of[f];
+    const Group& group = groups.all[g];
+    superfluous[f] = !shared[g] && f != group.kept() && !(walls[g] && (f == group.first || f == group.opposite));
   }
   return superfluous;
 }
