@@ -26,6 +26,7 @@
 namespace hpsdf {
 namespace {
 
+using support::boxBetween;
 using support::boxOfTwo;
 using support::joined;
 using support::moved;
@@ -149,12 +150,6 @@ TEST(MeshRepair, CavitiesStay) {
 }
 
 /// A box of size 2 that reaches from one corner to the other.
-TriangleMesh boxBetween(const Vector3& low, const Vector3& high) {
-  TriangleMesh mesh = boxOfTwo();
-  for (Vector3& x : mesh.vertices) x = (low + high) / 2 + x.cwiseProduct(high - low) / 2;
-  return mesh;
-}
-
 void expectUnchanged(const TriangleMesh& mesh, const char* what) {
   const RepairedMesh mended = repaired(cleaned(mesh));
   EXPECT_EQ(mended.turnedPatches, 0u) << what;
@@ -226,6 +221,39 @@ TEST(MeshRepair, CavitiesThatReachIntoEachOtherStay) {
   const RepairedMesh mended = repaired(cleaned(hollow));
   EXPECT_EQ(mended.turnedPatches, 0u);
   EXPECT_EQ(mended.imported.mesh.triangles, cleaned(hollow).mesh.triangles);
+}
+
+TEST(MeshRepair, PocketsThatEndInASideStay) {
+  const TriangleMesh block = boxBetween({0, 0, 0}, {10, 10, 10});
+  expectUnchanged(joined(block, turned(boxBetween({1, 1, 9.5}, {9, 9, 10}))), "most of it in the side");
+}
+
+TEST(MeshRepair, AShellThatLooksInwardsKeepsItsCavity) {
+  const TriangleMesh shell = joined(ball({0, 0, 0}, 2), turned(ball())), beside = ball({20, 0, 0}, 9);
+  const RepairedMesh mended = repaired(cleaned(joined(beside, turned(shell))));
+  EXPECT_EQ(mended.turnedPatches, 2u);
+  EXPECT_EQ(mended.imported.mesh.triangles, joined(beside, shell).triangles);
+}
+
+TEST(MeshRepair, ABodyAmongBodiesIsNoCavityOfThem) {
+  TriangleMesh cubes;
+  std::size_t middle = 0;
+  for (int i = 0; i < 27; ++i) {
+    const Vector3 low(i % 3, i / 3 % 3, i / 9);
+    if (i == 13) middle = cubes.triangles.size();
+    cubes = joined(cubes, boxBetween(low, low + Vector3(1, 1, 1)));
+  }
+  // all cut otherwise than their neighbours, for the middle one alone touches the six
+  TriangleMesh inner = boxBetween({1, 1, 1}, {2, 2, 2});
+  for (Vector3& x : inner.vertices) x.x() = 3 - x.x();  // mirrored, and so inwards
+  std::copy(inner.triangles.begin(), inner.triangles.end(),
+            cubes.triangles.begin() + static_cast<std::ptrdiff_t>(middle));
+  for (auto t = cubes.triangles.begin() + static_cast<std::ptrdiff_t>(middle), end = t + 12; t != end; ++t)
+    for (std::uint32_t& v : *t) v += 8 * 13;
+  std::copy(inner.vertices.begin(), inner.vertices.end(), cubes.vertices.begin() + 8 * 13);
+  const Vector3 center(1.5, 1.4, 1.3);
+  ASSERT_NEAR(windingNumber(cubes, center), -1, 1e-9);
+  EXPECT_NEAR(windingNumber(repaired(cleaned(cubes)).imported.mesh, center), 1, 1e-9);
 }
 
 TEST(MeshRepair, WhatReachesOutOfAnotherIsNoCavity) {

@@ -40,7 +40,13 @@ inline TriangleMesh openAbove(TriangleMesh mesh, double z) {
 /// A box of size 2, at the origin.
 inline TriangleMesh boxOfTwo() { return shapes::mesh("box,width=2,height=2,depth=2"); }
 
-/// The same without its upper side.
+inline TriangleMesh boxBetween(const Vector3& low, const Vector3& high) {
+  TriangleMesh mesh = boxOfTwo();
+  for (Vector3& x : mesh.vertices) x = (low + high) / 2 + x.cwiseProduct(high - low) / 2;
+  return mesh;
+}
+
+/// A box of size 2 without its upper side.
 inline TriangleMesh openBox() { return openAbove(boxOfTwo(), 0.999); }
 
 /// In a box and a little around it.

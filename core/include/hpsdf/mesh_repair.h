@@ -19,9 +19,15 @@ struct RepairedMesh {
 /// area; one that has one side only, as a Möbius strip, stays as it is.
 ///
 /// Bodies are closed patches, patches that only together are closed (at every edge as many sides run one way as the
-/// other, with a solid between them), and each other patch. A body that looks inwards is turned unless it is a cavity: within an odd number of
-/// other bodies, by their winding number, for three quarters of its area and more. Of open bodies only those look
-/// inwards, or have something within, whose volume is plain, as of the whole mesh in `cleaned`.
+/// other, with a solid between them), and each other patch.
+///
+/// If any body's volume says that it looks inwards, what winding numbers say of three quarters of its area decides:
+/// - it stays with the outside before it and the inside behind it, such as a cavity;
+/// - it is turned where that is so of the mesh turned as a whole, such as both sides of a hollow body that looks
+/// inwards;
+/// - of others one that looks inwards is turned, unless it lies within an odd number of other bodies.
+///
+/// Only bodies whose volume is plain are turned, or have something within; open ones as the whole mesh in `cleaned`.
 ///
 /// Throws `Error` for a mesh without triangles or of more than 2²⁸, of vertices that do not exist or are not finite.
 RepairedMesh repaired(ImportedMesh imported);

@@ -138,25 +138,52 @@ std::vector<Vector3> placesBefore(const TriangleMesh& mesh, const Body& body, do
   return places;
 }
 
-/// Puts back what is a cavity, of the bodies that were turned: what is within an odd number of other solids, for three
-/// quarters of its area and more, or has as much the outside before it and the inside behind it as it was given. (What
-/// merely reaches into another is a body; cavities may reach a little into each other.) `outward`: as it is with all
-/// solids looking outwards.
+/// What the mesh as it was given says of the way a body looks.
+enum class Given { unclear, right, inwards };
+
+/// Of three quarters and more of such places before it and behind it, leaving out those where something else of the
+/// mesh takes the body back. `right`: outside before it, inside behind it. `inwards`: so it would be with all turned.
+/// Where it is both, because a body touches another that looks the other way, it is as its volume has it, `byVolume`.
+Given givenWay(const Around& given, const std::vector<Vector3>& before, const std::vector<Vector3>& behind,
+               Given byVolume) {
+  std::ptrdiff_t right = 0, inwards = 0, left = std::ssize(before), all = left;
+  const auto isMost = [&](std::ptrdiff_t count) { return 4 * count >= 3 * all && count > 0; };
+  for (std::size_t n = 0; n < before.size() && (4 * (right + left) >= 3 * all || 4 * (inwards + left) >= 3 * all);
+       ++n, --left) {
+    const long from = std::lround(given.times(before[n])), to = std::lround(given.times(behind[n]));
+    all -= from == to;
+    const bool isRight = from <= 0 && to >= 1, isInwards = from <= -1 && to >= 0;
+    right += isRight && !(isInwards && byVolume == Given::inwards);
+    inwards += isInwards && !(isRight && byVolume == Given::right);
+  }
+  return isMost(right) ? Given::right : isMost(inwards) ? Given::inwards : Given::unclear;
+}
+
+/// Sets anew which bodies are turned, where there are several solids and any of them was:
+/// - one stays that has the outside before it and the inside behind it as given, such as a cavity,
+/// - one is turned that had so were all turned, such as a cavity of a shell that looks inwards, and its outer side,
+/// - of the others, one that looks inwards is turned but for a cavity: for three quarters of its area and more within
+///   an odd number of other solids. What merely reaches into another is none; cavities may reach a little into each
+///   other.
+/// `outward`: as it is with all solids looking outwards.
 void spareCavities(const TriangleMesh& given, const TriangleMesh& outward, std::vector<Body>& bodies) {
   if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::turned)) return;
   const Around all(outward, bodies), asGiven(given, bodies);
   const double aside = distance::besideSurface(boundingBox(given));
   tbb::parallel_for(std::size_t{0}, bodies.size(), [&](std::size_t i) {
     Body& body = bodies[i];
-    if (!body.turned) return;
-    const Around itself(outward, {&body, 1});
+    if (!body.solid) return;
     const std::vector<Vector3> before = placesBefore(given, body, aside), behind = placesBefore(given, body, -aside);
-    std::ptrdiff_t within = 0, bounding = 0;
-    for (std::size_t n = 0; n < behind.size(); ++n) {  // behind it as given is before it as it looks outwards
-      within += std::lround(all.times(behind[n]) - itself.times(behind[n])) % 2 != 0;
-      bounding += asGiven.times(before[n]) < 0.5 && asGiven.times(behind[n]) > 0.5;
+    const Given way = givenWay(asGiven, before, behind, body.turned ? Given::inwards : Given::right);
+    if (way == Given::unclear && body.turned) {
+      const Around itself(outward, {&body, 1});
+      const auto within = std::ranges::count_if(behind, [&](const Vector3& x) {  // before it as it looks outwards
+        return std::lround(all.times(x) - itself.times(x)) % 2 != 0;
+      });
+      body.turned = 4 * within < 3 * std::ssize(behind);
+    } else if (way != Given::unclear) {
+      body.turned = way == Given::inwards;
     }
-    body.turned = 4 * std::max(within, bounding) < 3 * std::ssize(behind);
   });
 }
 
