@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -23,6 +24,7 @@
 namespace hpsdf {
 namespace {
 
+using support::boxBetween;
 using support::boxOfTwo;
 using support::joined;
 using support::moved;
@@ -101,17 +103,65 @@ TEST(Hull, LeavesOutWallsThatBodiesHaveInCommon) {
 
 /// Where three walls meet, or one ends on another, pieces of them are cut to the last: all around is inside.
 TEST(Hull, LeavesNothingOfWallsThatMeet) {
-  const auto box = [](const Vector3& size, const Vector3& corner) {
-    TriangleMesh mesh = moved(boxOfTwo(), {1, 1, 1}, 1);
-    for (Vector3& x : mesh.vertices) x = 0.5 * x.cwiseProduct(size) + corner;
-    return mesh;
-  };
-  const TriangleMesh mesh =
-      joined(joined(box({1, 2, 2}, {0, 0, 0}), box({1, 2, 2}, {1, 0, 0})), box({2, 2, 2}, {0, 0, 2}));
-  const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(box({2, 2, 4}, {0, 0, 0})), plain(mesh, kWinding);
+  const TriangleMesh mesh = joined(joined(boxBetween({0, 0, 0}, {1, 2, 2}), boxBetween({1, 0, 0}, {2, 2, 2})),
+                                   boxBetween({0, 0, 2}, {2, 2, 4}));
+  const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(boxBetween({0, 0, 0}, {2, 2, 4})), plain(mesh, kWinding);
   EXPECT_EQ(plain(Vector3(1, 1, 2)), 0) << "else this tells nothing";
   for (const Vector3& x : placesIn(boundingBox(mesh), 1000, 3)) EXPECT_NEAR(hull(x), whole(x), 0.02);
   EXPECT_NEAR(hull(Vector3(1, 1, 2)), -1, 0.02);
+}
+
+/// What only touches a triangle's sides cuts nothing of it, however its neighbours are cut.
+TEST(Hull, OfBodiesThatTouchIsExact) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+  for (const bool rotated : {false, true}) {
+    TriangleMesh mesh, box = boxBetween({0, 0, 0}, {4, 4, 4});
+    for (int i = 0; i < 64; ++i) {
+      const Vector3 low(i % 4, i / 4 % 4, i / 16);
+      const bool mirrored = (i + i / 4 + i / 16) % 2 != 0;  // cut along the other diagonals
+      TriangleMesh cube = boxBetween({0, 0, 0}, {1, 1, 1});
+      if (mirrored)
+        for (Vector3& x : cube.vertices) x.x() = 1 - x.x();
+      mesh = joined(mesh, moved(mirrored ? support::turned(cube) : cube, low));
+    }
+    if (rotated)
+      for (TriangleMesh* m : {&mesh, &box})
+        for (Vector3& x : m->vertices) x = turn * x;
+    const ExactDistance hull(mesh, kHull), whole(box), plain(mesh, kWinding);
+    double most = 0, films = 0;
+    for (const Vector3& x : placesIn(boundingBox(mesh), 1000, 3)) {
+      most = std::max(most, std::abs(hull(x) - whole(x)));
+      films = std::max(films, plain(x) - whole(x));
+    }
+    EXPECT_LT(most, 1e-9) << rotated;
+    EXPECT_GT(films, 1) << "else this tells nothing";
+  }
+}
+
+/// Between plates and in sharp wedges outside is nearer to a piece than the piece is long.
+TEST(Hull, OutsideIsAsWithAllTriangles) {
+  const TriangleMesh plates =
+      joined(joined(boxBetween({0, 0, 0}, {1000, 1000, 100}), boxBetween({0, 0, 100.2}, {1000, 1000, 200})),
+             boxBetween({450, 450, -10}, {550, 550, 210}));
+  TriangleMesh wedge = boxBetween({-50, -50, -1}, {50, 50, 1});
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.2, Vector3(0, 1, 0.3).normalized()).toRotationMatrix();
+  for (Vector3& x : wedge.vertices) x = turn * x;
+  wedge = joined(boxBetween({-50, -50, -1}, {50, 50, 1}), wedge);
+  for (const TriangleMesh& mesh : {plates, wedge}) {
+    const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+    std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000, 5);
+    for (int n = 0; n < 500; ++n) places.emplace_back(549.9 + 0.005 * n, 500 + 0.01 * n, 100.1);
+    for (int n = 0; n < 500; ++n) places.emplace_back(5 + 0.02 * n, -25 + 0.1 * n, 1.01 + 0.002 * n);
+    std::vector<double> together(places.size());
+    hull(places, together);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const double before = plain(places[i]);
+      if (before > 0)
+        ASSERT_NEAR(together[i], before, 1e-9) << places[i].transpose();
+      else
+        ASSERT_LE(together[i], 0) << places[i].transpose();
+    }
+  }
 }
 
 TEST(Hull, KeepsOneTriangleThatIsPartlyOutside) {

@@ -49,8 +49,9 @@ struct SignChoice {
 /// * `Sign::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided as the
 ///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
 ///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.
-/// * `Sign::hull`: the same sign, but triangles that have the inside on both sides, such as walls within bodies that
-///   overlap, are no surface. One that meets others counts up to a five-hundredth of the mesh's size beyond that.
+/// * `Sign::hull`: the same sign, and outside the same distance, but triangles that have the inside on both sides, such
+///   as walls within bodies that overlap, are no surface to what is inside. One that meets others counts, or is left
+///   out, up to a five-hundredth of the mesh's size beyond that.
 /// * `Sign::shell`: half of the thickness less than the unsigned distance. For sheets.
 ///
 /// Equal distances are decided by the lower triangle index, so that a result depends on neither the order nor the

@@ -291,7 +291,9 @@ bool sidesCut(const Triangle& one, const Triangle& other, const std::array<bool,
 }
 
 bool lieInOnePlane(const Triangle& one, const Triangle& other) {
-  return std::ranges::all_of(other, [&](const Vector3& x) { return orientation(one[0], one[1], one[2], x) == 0; });
+  constexpr double kRounding = 1e-12;
+  const Vector3 normal = (one[1] - one[0]).cross(one[2] - one[0]).stableNormalized();
+  return std::ranges::all_of(other, [&](const Vector3& x) { return std::abs(normal.dot(x - one[0])) < kRounding; });
 }
 
 double scaleToOne(std::span<const Vector3> vertices) {

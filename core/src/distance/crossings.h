@@ -17,7 +17,7 @@ bool meet(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other
 bool sidesCut(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other,
               const std::array<bool, 3>& counts);
 
-/// Whether they lie in one plane, without rounding.
+/// Whether they lie in one plane, but for rounding. Coordinates of order 1.
 bool lieInOnePlane(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
 
 /// A power of two, so that it rounds nothing, times which coordinates are of order 1.

@@ -112,13 +112,13 @@ struct ExactDistance::Data {
   void sign(std::span<const Vector3> points, std::span<double> distances) const {
     if (choice.sign == Sign::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
-    if (choice.sign == Sign::hull && inside.hasHoles()) {
-      // the winding number changes smoothly up to the next triangle, a buried one too
+    if (choice.sign == Sign::hull) {
+      // outside, none that is nearer than the hull was rightly left out of it
       std::vector<double> free(points.size());
       toTriangles(whole, points, free);
       for (double& distance : free) distance = std::abs(distance);
       inside.sign(points, free, distances);
-    } else if (choice.sign == Sign::winding || choice.sign == Sign::hull) {
+    } else if (choice.sign == Sign::winding) {
       inside.sign(points, distances);
     }
   }

@@ -1,8 +1,11 @@
 #include "distance/hull.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -29,8 +32,9 @@ constexpr double kCoarserBesideHoles = 8;  // times: what only holes leave unsur
 constexpr std::size_t kMostPairs = 2'000'000;
 constexpr std::size_t kMostPieces = 250'000;  // besides whole triangles
 
-/// Whether both sides of a triangle, or of a part of it, are the inside; `cut`: others cut it still.
-enum class Kind : char { surface, buried, unsure, cut };
+/// Whether both sides of a triangle, or of a part of it, are the inside; `cut`: others cut it still; `replaced`: by its
+/// parts.
+enum class Kind : char { surface, buried, unsure, cut, replaced };
 
 struct Piece {
   Corners corners;
@@ -70,42 +74,52 @@ std::array<Corners, 4> quarters(const Corners& t) {
 
 struct TooManyPieces {};
 
+/// What of a triangle is no nearer to its sides than rounding: others that share these cut nothing of it.
+Corners interior(const Corners& t) {
+  const Vector3 middle = (t[0] + t[1] + t[2]) / 3;
+  constexpr double kLess = 1e-6;
+  return {t[0] + kLess * (middle - t[0]), t[1] + kLess * (middle - t[1]), t[2] + kLess * (middle - t[2])};
+}
+
 /// Cuts triangles where others meet them. All coordinates are scaled to order 1.
 class Cutter {
  public:
-  Cutter(std::size_t most, double finest) : most_(most), finest_(finest) {}
+  explicit Cutter(double finest) : finest_(finest) {}
 
-  /// Adds the pieces of a triangle: cut, or unsure where others cut them no more.
-  void add(const Corners& corners, std::uint32_t triangle, const std::vector<Crosser>& crossers) {
-    add({corners, triangle, true}, crossers);
+  /// Adds to the pieces those of one: cut, or unsure where others cut them no more. From any thread. Throws
+  /// `TooManyPieces`.
+  void add(Piece piece, const std::vector<Crosser>& crossers, std::vector<Piece>& pieces) {
+    const Corners corners = interior(piece.corners);
+    const bool isFinest = !canCut(piece.corners);
+    std::vector<Crosser> cutting;
+    for (const Crosser& crosser : crossers) {
+      if (cuts(crosser, corners)) cutting.push_back(crosser);
+      if (isFinest && !cutting.empty()) break;
+    }
+    if (cutting.empty()) piece.kind = Kind::unsure;
+    if (cutting.empty() || isFinest) return pieces.push_back(piece);
+    countMore();
+    for (const Corners& quarter : quarters(piece.corners)) add({quarter, piece.triangle, false}, cutting, pieces);
   }
 
-  /// Adds the quarters of one that is unsure.
-  void refine(const Piece& piece) {
-    for (const Corners& quarter : quarters(piece.corners)) keep({quarter, piece.triangle, false, Kind::unsure});
+  /// Puts the quarters of one that is unsure in its place. Throws `TooManyPieces`.
+  void refine(std::size_t at, std::vector<Piece>& pieces) {
+    countMore();
+    pieces[at].kind = Kind::replaced;
+    const Piece piece = pieces[at];
+    for (const Corners& quarter : quarters(piece.corners))
+      pieces.push_back({quarter, piece.triangle, false, Kind::unsure});
   }
 
   bool canCut(const Corners& corners, double times = 1) const { return longestSide(corners) > times * finest_; }
 
-  std::vector<Piece> pieces;
-
  private:
-  void add(Piece piece, const std::vector<Crosser>& crossers) {
-    std::vector<Crosser> cutting;
-    for (const Crosser& crosser : crossers)
-      if (cuts(crosser, piece.corners)) cutting.push_back(crosser);
-    if (cutting.empty()) piece.kind = Kind::unsure;
-    if (cutting.empty() || !canCut(piece.corners)) return keep(piece);
-    for (const Corners& quarter : quarters(piece.corners)) add({quarter, piece.triangle, false}, cutting);
+  void countMore() {
+    if ((more_ += 3) > kMostPieces) throw TooManyPieces();
   }
 
-  void keep(const Piece& piece) {
-    if (pieces.size() >= most_) throw TooManyPieces();
-    pieces.push_back(piece);
-  }
-
-  std::size_t most_;
   double finest_;
+  std::atomic<std::size_t> more_ = 0;  ///< pieces than triangles
 };
 
 using Pair = std::array<std::uint32_t, 2>;
@@ -146,27 +160,42 @@ void leaveOutInnerSides(const TriangleMesh& mesh, const std::vector<Pair>& pairs
   }
 }
 
-/// Pieces of all triangles. Coordinates are scaled to order 1.
-void cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter,
-                  const Progress& progress) {
+/// Pieces of all triangles. Coordinates are scaled to order 1. Throws `TooManyPieces`.
+std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter,
+                                const Progress& progress) {
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
   };
-  auto next = pairs.begin();
-  std::vector<Crosser> crossers;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+  std::vector<std::size_t> firsts;  // of the pairs of each triangle that has any, and the end
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (i == 0 || pairs[i][0] != pairs[i - 1][0]) firsts.push_back(i);
+  firsts.push_back(pairs.size());
+  std::vector<std::vector<Piece>> parts(firsts.size() - 1);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) {
     progress.pause();
+    const std::uint32_t t = pairs[firsts[n]][0];
     const Corners corners = cornersOf(t);
-    crossers.clear();
-    for (; next != pairs.end() && (*next)[0] == t; ++next) {
-      const std::uint32_t other = (*next)[1];
-      if (areTwins(mesh.triangles[t], mesh.triangles[other])) continue;  // cuts nothing of it
-      crossers.push_back({other, cornersOf(other), lieInOnePlane(corners, cornersOf(other))});
+    std::vector<Crosser> crossers;
+    for (const Pair& pair : std::span(pairs).subspan(firsts[n], firsts[n + 1] - firsts[n])) {
+      if (areTwins(mesh.triangles[t], mesh.triangles[pair[1]])) continue;  // cuts nothing of it
+      const Corners other = cornersOf(pair[1]);
+      crossers.push_back({pair[1], other, lieInOnePlane(corners, other)});
     }
     leaveOutInnerSides(mesh, pairs, crossers);
-    cutter.add(corners, t, crossers);
+    cutter.add({corners, t, true}, crossers, parts[n]);
+  });
+  std::vector<Piece> pieces;
+  auto next = parts.begin();
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (next == parts.end() || next->front().triangle != t) {
+      pieces.push_back({cornersOf(t), t, true, Kind::unsure});
+      continue;
+    }
+    pieces.insert(pieces.end(), next->begin(), next->end());
+    ++next;
   }
+  return pieces;
 }
 
 /// What a piece is that no triangle meets: surface, if it is that in its middle. One without an area has the inside on
@@ -183,11 +212,16 @@ Kind kindOf(const Corners& corners, const Inside& inside, double scale, double a
   return inside.isSameWithin(before, reach) && inside.isSameWithin(behind, reach) ? Kind::buried : Kind::unsure;
 }
 
-/// Whether all is inside around a small piece that others cut, in fourteen directions, as far as it is long: then it is
-/// no more than what is left of a wall.
-bool isSurrounded(const Corners& corners, const Inside& inside, double scale) {
+/// Whether all is inside around a small piece that others cut, before and behind it and in fourteen directions, as far
+/// as it is long: then it is taken for what is left of a wall.
+bool isSurrounded(const Corners& corners, const Inside& inside, double scale, double aside) {
   const auto& [a, b, c] = corners;
-  const Vector3 middle = (a + b + c) / (3 * scale);
+  const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
+  const auto middleOf = [&](const Corners& t) { return Vector3((t[0] + t[1] + t[2]) / (3 * scale)); };
+  for (const Corners& quarter : quarters(corners))
+    for (const double sign : {-1.0, 1.0})
+      if (!inside.contains(middleOf(quarter) + sign * step)) return false;
+  const Vector3 middle = middleOf(corners);
   const double far = longestSide(corners) / scale;
   const auto isInside = [&](const Vector3& direction) {
     return inside.contains(middle + far * direction.normalized());
@@ -206,7 +240,7 @@ void setKinds(std::span<Piece> pieces, const Inside& inside, double scale, doubl
     for (Piece& piece : pieces.subspan(first, count)) {
       if (piece.kind == Kind::unsure) piece.kind = kindOf(piece.corners, inside, scale, aside);
       if (piece.kind == Kind::cut)
-        piece.kind = isSurrounded(piece.corners, inside, scale) ? Kind::buried : Kind::surface;
+        piece.kind = isSurrounded(piece.corners, inside, scale, aside) ? Kind::buried : Kind::surface;
     }
   });
 }
@@ -218,24 +252,21 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
   const Box box = boundingBox(mesh);
   const double aside = besideSurface(box);
   const std::string task = "leaving out walls within, pieces of 1/" + std::to_string(std::lround(1 / finest));
-  Cutter cutter(mesh.triangles.size() + kMostPieces, scale * finest * box.sizes().maxCoeff());
+  Cutter cutter(scale * finest * box.sizes().maxCoeff());
   try {
-    cutTriangles(mesh, scale, pairs, cutter, progress);
-    setKinds(cutter.pieces, inside, scale, aside, progress, task);
+    std::vector<Piece> pieces = cutTriangles(mesh, scale, pairs, cutter, progress);
+    setKinds(pieces, inside, scale, aside, progress, task);
     // Beside holes the winding number changes along a piece.
-    for (std::size_t first = 0, end = cutter.pieces.size(); first < end; first = end, end = cutter.pieces.size()) {
+    for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
-        if (const Piece piece = cutter.pieces[i];
-            piece.kind == Kind::unsure && cutter.canCut(piece.corners, kCoarserBesideHoles)) {
-          cutter.refine(piece);
-          cutter.pieces[i].kind = Kind::buried;  // its quarters are there instead
-        }
-      setKinds(std::span(cutter.pieces).subspan(end), inside, scale, aside, progress, task);
+        if (pieces[i].kind == Kind::unsure && cutter.canCut(pieces[i].corners, kCoarserBesideHoles))
+          cutter.refine(i, pieces);
+      setKinds(std::span(pieces).subspan(end), inside, scale, aside, progress, task);
     }
+    return pieces;
   } catch (const TooManyPieces&) {
     return std::nullopt;
   }
-  return std::move(cutter.pieces);
 }
 
 }  // namespace
@@ -249,7 +280,7 @@ Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& 
   if (!pieces) refuse(mesh);
   Hull hull{.mesh = {.vertices = mesh.vertices, .triangles = {}, .name = mesh.name}, .triangles = {}};
   for (const Piece& piece : *pieces) {
-    if (piece.kind == Kind::buried) continue;
+    if (piece.kind == Kind::buried || piece.kind == Kind::replaced) continue;
     hull.triangles.push_back(piece.triangle);
     if (piece.isWhole) {
       hull.mesh.triangles.push_back(mesh.triangles[piece.triangle]);

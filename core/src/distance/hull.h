@@ -12,9 +12,9 @@ namespace hpsdf::distance {
 /// What of a mesh is between outside and inside: its triangles without those that have the inside on both sides, such
 /// as walls within bodies that overlap.
 ///
-/// A triangle that meets others is cut into quarters, and these again, until a piece meets none of them, so that each
-/// of its sides is of one kind, or is a five-hundredth of the mesh's size: such a piece stays where anything around it
-/// is outside. Where that would make more than 250,000 pieces, they are coarser, up to a thirty-second. Of a mesh with
+/// A triangle that others meet within its sides is cut into quarters, and these again, until a piece is met by none, so
+/// that each of its sides is of one kind, or is a five-hundredth of the mesh's size: such a piece stays where a place
+/// before it, behind it or around it is outside. Where that would make more than 250,000 pieces, they are coarser, up to a thirty-second. Of a mesh with
 /// holes, the winding number changes along a piece: it stays as well where its middle is no wall, and is cut on until
 /// it is certain to be one.
 struct Hull {

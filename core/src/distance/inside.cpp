@@ -119,7 +119,7 @@ void Inside::signTogether(std::span<const Vector3> points, std::span<const doubl
       if (here = other.at(points[i], free[i], distances[i]); here.isSettled()) break;
     if (!here.isSettled()) here = find(points[i], free[i], distances[i]);
     known.push_back(here);
-    distances[i] = here.inside ? -here.nearest : here.nearest;
+    distances[i] = here.inside ? -here.nearest : std::min(here.nearest, free[i]);
   }
 }
 

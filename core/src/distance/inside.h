@@ -22,14 +22,13 @@ class Inside {
   /// around it. `rims`: of the hierarchy's triangles.
   Inside(const Hierarchy& hierarchy, const TriangleMesh& mesh, HoleRims rims);
 
-  bool hasHoles() const { return !rims_.empty(); }
-
   /// Makes signed ones, in place, of distances to the triangles, with the fewer winding numbers the closer together the
   /// points lie. A point gets the same alone and among others.
   void sign(std::span<const Vector3> points, std::span<double> distances) const { sign(points, distances, distances); }
 
   /// The same where some triangles do not count as surface: `free`, so far is the nearest of all, `distances`, so far
-  /// the nearest of those that do.
+  /// the nearest of those that do. Outside it is as if all did: one that lies between inside and inside is behind
+  /// others.
   void sign(std::span<const Vector3> points, std::span<const double> free, std::span<double> distances) const;
 
   /// Whether the triangle in a slot, at its middle, has the outside before it and the inside behind it: then the
