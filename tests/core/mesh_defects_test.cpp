@@ -149,7 +149,6 @@ TEST(MeshRepair, CavitiesStay) {
   EXPECT_NEAR(nested.imported.report.volume, (27 - 8 + 1) * signedVolume(ball()), 1e-9);
 }
 
-/// A box of size 2 that reaches from one corner to the other.
 void expectUnchanged(const TriangleMesh& mesh, const char* what) {
   const RepairedMesh mended = repaired(cleaned(mesh));
   EXPECT_EQ(mended.turnedPatches, 0u) << what;
@@ -201,6 +200,24 @@ TEST(MeshRepair, BodiesThatShareAWallCutOtherwiseAreTurnedEachByItself) {
         EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 1, 1e-9) << leftTurned << rightTurned << x.transpose();
       for (const Vector3& x : {Vector3(-0.1, 1.1, 0.2), Vector3(3.1, 0.3, 0.2)})
         EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 0, 1e-9) << leftTurned << rightTurned << x.transpose();
+    }
+}
+
+/// Some of the cubes of a cube, all ways of turning them, beside a body that looks outwards.
+TEST(MeshRepair, CubesThatTouchAreTurnedEachByItself) {
+  const auto lowest = [](int at) { return Vector3(at & 1, at >> 1 & 1, at >> 2); };
+  for (const std::vector<int>& all :
+       {std::vector{0, 1}, std::vector{0, 3}, std::vector{0, 1, 2}, std::vector{0, 4, 2}, std::vector{0, 1, 6}})
+    for (unsigned inwards = 0; inwards < 1u << all.size(); ++inwards) {
+      TriangleMesh mesh = boxBetween({5, 0, 0}, {9, 4, 4});
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const TriangleMesh cube = boxBetween(lowest(all[i]), lowest(all[i]) + Vector3(1, 1, 1));
+        mesh = joined(mesh, inwards >> i & 1 ? turned(cube) : cube);
+      }
+      const RepairedMesh mended = repaired(cleaned(mesh));
+      for (const int at : all)
+        EXPECT_NEAR(windingNumber(mended.imported.mesh, lowest(at) + Vector3(0.5, 0.4, 0.3)), 1, 1e-9)
+            << all.size() << " " << inwards << " " << at;
     }
 }
 

@@ -24,7 +24,8 @@ struct RepairedMesh {
 /// If any body's volume says that it looks inwards, what winding numbers say of three quarters of its area decides:
 /// - it stays with the outside before it and the inside behind it, such as a cavity;
 /// - it is turned where that is so of the mesh turned as a whole, such as both sides of a hollow body that looks
-/// inwards;
+///   inwards, unless it is open and its volume says otherwise; where both are so, because it touches another that looks
+///   the other way, it is by its volume;
 /// - of others one that looks inwards is turned, unless it lies within an odd number of other bodies.
 ///
 /// Only bodies whose volume is plain are turned, or have something within; open ones as the whole mesh in `cleaned`.

@@ -84,11 +84,12 @@ Corners interior(const Corners& t) {
 /// Cuts triangles where others meet them. All coordinates are scaled to order 1.
 class Cutter {
  public:
-  explicit Cutter(double finest) : finest_(finest) {}
+  Cutter(double finest, const Progress& progress) : finest_(finest), progress_(progress) {}
 
   /// Adds to the pieces those of one: cut, or unsure where others cut them no more. From any thread. Throws
-  /// `TooManyPieces`.
+  /// `TooManyPieces`, `Cancelled`.
   void add(Piece piece, const std::vector<Crosser>& crossers, std::vector<Piece>& pieces) {
+    progress_.pause();
     const Corners corners = interior(piece.corners);
     const bool isFinest = !canCut(piece.corners);
     std::vector<Crosser> cutting;
@@ -119,6 +120,7 @@ class Cutter {
   }
 
   double finest_;
+  const Progress& progress_;
   std::atomic<std::size_t> more_ = 0;  ///< pieces than triangles
 };
 
@@ -161,8 +163,8 @@ void leaveOutInnerSides(const TriangleMesh& mesh, const std::vector<Pair>& pairs
 }
 
 /// Pieces of all triangles. Coordinates are scaled to order 1. Throws `TooManyPieces`.
-std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs, Cutter& cutter,
-                                const Progress& progress) {
+std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
+                                Cutter& cutter) {
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
@@ -173,7 +175,6 @@ std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const st
   firsts.push_back(pairs.size());
   std::vector<std::vector<Piece>> parts(firsts.size() - 1);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) {
-    progress.pause();
     const std::uint32_t t = pairs[firsts[n]][0];
     const Corners corners = cornersOf(t);
     std::vector<Crosser> crossers;
@@ -252,9 +253,9 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
   const Box box = boundingBox(mesh);
   const double aside = besideSurface(box);
   const std::string task = "leaving out walls within, pieces of 1/" + std::to_string(std::lround(1 / finest));
-  Cutter cutter(scale * finest * box.sizes().maxCoeff());
+  Cutter cutter(scale * finest * box.sizes().maxCoeff(), progress);
   try {
-    std::vector<Piece> pieces = cutTriangles(mesh, scale, pairs, cutter, progress);
+    std::vector<Piece> pieces = cutTriangles(mesh, scale, pairs, cutter);
     setKinds(pieces, inside, scale, aside, progress, task);
     // Beside holes the winding number changes along a piece.
     for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {

@@ -14,9 +14,9 @@ namespace hpsdf::distance {
 ///
 /// A triangle that others meet within its sides is cut into quarters, and these again, until a piece is met by none, so
 /// that each of its sides is of one kind, or is a five-hundredth of the mesh's size: such a piece stays where a place
-/// before it, behind it or around it is outside. Where that would make more than 250,000 pieces, they are coarser, up to a thirty-second. Of a mesh with
-/// holes, the winding number changes along a piece: it stays as well where its middle is no wall, and is cut on until
-/// it is certain to be one.
+/// before it, behind it or around it is outside. Where that would make more than 250,000 pieces, they are coarser, up to
+/// a thirty-second. Of a mesh with holes, the winding number changes along a piece: it stays as well where its middle is
+/// no wall, and is cut on until it is certain to be one.
 struct Hull {
   TriangleMesh mesh;
   std::vector<std::uint32_t> triangles;  ///< of each, the index of that in the whole mesh of which it is a part

@@ -26,8 +26,9 @@ struct Body {
   std::vector<std::uint32_t> faces;
   double area = 0, volume = 0;
   Box box;
-  bool solid = false;  ///< its volume tells inside from outside
-  bool turned = false;
+  bool closed = false;
+  bool solid = false;   ///< its volume tells inside from outside
+  bool turned = false;  ///< is to be
 };
 
 Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
@@ -69,7 +70,8 @@ std::vector<Body> measured(const TriangleMesh& mesh, const Patches& patches, con
     if (body.faces.empty() || patches.oneSided[i]) continue;
     for (const std::uint32_t f : body.faces)
       body.volume += areaVector(mesh, f).dot(mesh.vertices[mesh.triangles[f][0]] - body.box.center()) / 3;
-    body.solid = isPlain(body.volume, body.area, body.box, bodies.closed[i] != 0);
+    body.closed = bodies.closed[i] != 0;
+    body.solid = isPlain(body.volume, body.area, body.box, body.closed);
     body.turned = body.solid && body.volume < 0;
   }
   return found;
@@ -148,8 +150,8 @@ Given givenWay(const Around& given, const std::vector<Vector3>& before, const st
                Given byVolume) {
   std::ptrdiff_t right = 0, inwards = 0, left = std::ssize(before), all = left;
   const auto isMost = [&](std::ptrdiff_t count) { return 4 * count >= 3 * all && count > 0; };
-  for (std::size_t n = 0; n < before.size() && (4 * (right + left) >= 3 * all || 4 * (inwards + left) >= 3 * all);
-       ++n, --left) {
+  const auto canBeMost = [&](std::ptrdiff_t count) { return 4 * (count + left) >= 3 * all; };
+  for (std::size_t n = 0; n < before.size() && (canBeMost(right) || canBeMost(inwards)); ++n, --left) {
     const long from = std::lround(given.times(before[n])), to = std::lround(given.times(behind[n]));
     all -= from == to;
     const bool isRight = from <= 0 && to >= 1, isInwards = from <= -1 && to >= 0;
@@ -161,7 +163,8 @@ Given givenWay(const Around& given, const std::vector<Vector3>& before, const st
 
 /// Sets anew which bodies are turned, where there are several solids and any of them was:
 /// - one stays that has the outside before it and the inside behind it as given, such as a cavity,
-/// - one is turned that had so were all turned, such as a cavity of a shell that looks inwards, and its outer side,
+/// - one is turned that had so were all turned, such as a cavity of a shell that looks inwards, and its outer side; but
+///   none that is open and looks outwards: what surrounds it is less plain than its volume,
 /// - of the others, one that looks inwards is turned but for a cavity: for three quarters of its area and more within
 ///   an odd number of other solids. What merely reaches into another is none; cavities may reach a little into each
 ///   other.
@@ -182,7 +185,7 @@ void spareCavities(const TriangleMesh& given, const TriangleMesh& outward, std::
       });
       body.turned = 4 * within < 3 * std::ssize(behind);
     } else if (way != Given::unclear) {
-      body.turned = way == Given::inwards;
+      body.turned = way == Given::inwards && (body.turned || body.closed);
     }
   });
 }

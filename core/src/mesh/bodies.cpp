@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -14,7 +15,8 @@ namespace {
 /// So far apart, in radians, faces lie in one plane but for rounding.
 constexpr double kSameAngle = 1e-9;
 
-/// Of an edge: those sides whose patch has others there that run back, and so many of the patch's, are left out.
+/// The sides at an edge without those that others of their patch take back. Of three of a patch the first or the last
+/// is left: whichever, the patch is the same.
 std::vector<Side> unbalanced(const Patches& patches, std::span<const Side> edge) {
   std::vector<Side> sides(edge.begin(), edge.end());
   std::ranges::stable_sort(sides, {}, [&](const Side& side) { return patches.of[side.face]; });
@@ -34,19 +36,18 @@ struct Spoke {
   std::uint32_t patch;
 };
 
-/// Counterclockwise as the edge comes towards the eye. Of faces in one plane those that rise come first, so that bodies
-/// which touch there are not within each other; and all orders are the opposite ones along the edge's other direction.
+/// Counterclockwise as the edge comes towards the eye, from within rounding of 0. Those of faces in one plane have the
+/// same angle; of these that look one way the solids before them are those of the higher patches, at all their edges.
 void sortAround(std::vector<Spoke>& spokes) {
   std::ranges::sort(spokes, {}, &Spoke::angle);
-  const auto before = [](const Spoke& a, const Spoke& b) {
-    if (a.rising != b.rising) return a.rising;
-    return a.rising ? a.patch > b.patch : a.patch < b.patch;
-  };
+  const auto before = [](const Spoke& a, const Spoke& b) { return a.rising ? a.patch < b.patch : a.patch > b.patch; };
   for (auto first = spokes.begin(), next = first; first != spokes.end(); first = next) {
     while (++next != spokes.end() && next->angle - (next - 1)->angle < kSameAngle) {
     }
     for (auto same = first; same != next; ++same) same->angle = first->angle;
-    std::sort(first, next, before);
+    const auto falling = std::partition(first, next, [](const Spoke& spoke) { return spoke.rising; });
+    std::sort(first, falling, before);
+    std::sort(falling, next, before);
   }
 }
 
@@ -71,30 +72,45 @@ std::vector<Spoke> spokesOf(const TriangleMesh& mesh, const Patches& patches, st
 
 using Wedge = std::array<Spoke, 2>;
 
-/// The solids at an edge, each from where it falls to where it rises; as many do the one as the other.
-std::vector<Wedge> wedgesOf(const std::vector<Spoke>& spokes) {
+/// What lies between two faces at an edge, each from where one begins it to where the next that is left ends it; as
+/// many begin as end one. `begins`: `Spoke::rising` of those that begin. What ends in a plane does so before what
+/// begins.
+std::vector<Wedge> wedgesOf(const std::vector<Spoke>& spokes, bool begins) {
+  std::vector<Spoke> around;
+  for (auto first = spokes.begin(); first != spokes.end();) {
+    const auto next = std::find_if(first, spokes.end(), [&](const Spoke& s) { return s.angle != first->angle; });
+    for (const bool rising : {!begins, begins})
+      std::copy_if(first, next, std::back_inserter(around), [&](const Spoke& s) { return s.rising == rising; });
+    first = next;
+  }
   std::vector<Wedge> wedges;
-  std::vector<Spoke> falling;  // whose solid has not ended
-  std::vector<char> ended(spokes.size(), 0);
-  for (std::size_t i = 0; i < 2 * spokes.size(); ++i) {
-    const std::size_t at = i % spokes.size();
-    if (!spokes[at].rising) {
-      if (i < spokes.size()) falling.push_back(spokes[at]);
-    } else if (!falling.empty() && !std::exchange(ended[at], 1)) {
-      wedges.push_back({falling.back(), spokes[at]});
-      falling.pop_back();
+  std::vector<Spoke> begun;
+  std::vector<char> ended(around.size(), 0);
+  for (std::size_t i = 0; i < 2 * around.size(); ++i) {
+    const std::size_t at = i % around.size();
+    if (around[at].rising == begins) {
+      if (i < around.size()) begun.push_back(around[at]);
+    } else if (!begun.empty() && !std::exchange(ended[at], 1)) {
+      wedges.push_back({begun.back(), around[at]});
+      begun.pop_back();
     }
   }
   return wedges;
 }
 
-/// Joins patches that have a solid between them. Where that would make walls a body without a volume, as where solids
-/// that touch all look inwards, all are one.
-void joinSolids(const std::vector<Wedge>& wedges, FaceSets& together) {
-  const bool flat = std::ranges::any_of(wedges, [](const Wedge& w) { return w[0].angle == w[1].angle; });
+bool anyIsFlat(const std::vector<Wedge>& wedges) {
+  return std::ranges::any_of(wedges, [](const Wedge& wedge) { return wedge[0].angle == wedge[1].angle; });
+}
+
+/// Joins patches that have a solid between them. Where that would make two faces in one plane a body, as where solids
+/// that touch all look inwards, what is solid is read the other way; where that does, too, all are one.
+void joinSolids(const std::vector<Spoke>& spokes, FaceSets& together) {
+  std::vector<Wedge> wedges = wedgesOf(spokes, false);
+  if (anyIsFlat(wedges)) wedges = wedgesOf(spokes, true);
+  const bool unclear = anyIsFlat(wedges);
   for (const auto& [from, to] : wedges) {
     together.join(from.patch, to.patch);
-    if (flat) together.join(wedges.front()[0].patch, to.patch);
+    if (unclear) together.join(wedges.front()[0].patch, to.patch);
   }
 }
 
@@ -107,7 +123,7 @@ Bodies bodiesOf(const TriangleMesh& mesh, const Patches& patches, std::span<cons
     const std::vector<Side> left = unbalanced(patches, edge);
     if (left.empty()) return;
     const auto rising = static_cast<std::size_t>(std::ranges::count_if(left, &Side::rising));
-    if (2 * rising == left.size()) return joinSolids(wedgesOf(spokesOf(mesh, patches, left)), together);
+    if (2 * rising == left.size()) return joinSolids(spokesOf(mesh, patches, left), together);
     for (const Side& side : left) together.join(patches.of[left.front().face], patches.of[side.face]);
     open[patches.of[left.front().face]] = 1;
   });

@@ -10,8 +10,8 @@
 namespace hpsdf {
 
 /// The bodies of a surface. Patches are one that only together are closed: at every edge as many sides run one way as
-/// the other, and a solid lies between them. Those of solids that touch along an edge or in a wall are apart, unless
-/// all that meet there look inwards. Any other patch is one of its own.
+/// the other, and a solid lies between them. Those of solids that touch along an edge or in a wall are apart.
+/// Any other patch is one of its own.
 struct Bodies {
   std::vector<std::uint32_t> of;  ///< each patch's: the lowest of its patches
   std::vector<char> closed;       ///< 1 for patches of closed bodies, each with two sides

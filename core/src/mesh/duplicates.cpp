@@ -116,9 +116,44 @@ std::vector<char> wallsOf(const Groups& groups) {
   return walls;
 }
 
-/// Of each group: whether all its faces count, because bodies share it that look the same way there: without some of
-/// them more edges would be held by no other face than gain by that.
-std::vector<char> sharedOf(const Groups& groups, const std::vector<char>& walls) {
+/// How many faces of a group stay.
+struct Stay {
+  int asKept = 1;  ///< of those that look as the kept one does
+  int turned = 0;  ///< of the others
+};
+
+/// Of sets that are shared, drops what is too many besides: a face without which fewer edges are unbalanced.
+void dropStrays(const Groups& groups, const std::vector<char>& shared, std::vector<Stay>& stay) {
+  std::vector<int> balances;                                         // of each edge
+  std::vector<std::array<std::size_t, 3>> edges(groups.all.size());  // of each group
+  std::vector<std::array<int, 3>> signs(groups.all.size());
+  std::vector<char> count(groups.all.size());
+  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
+    int balance = 0;
+    for (const Side& side : edge) {
+      const int sign = signOf(side);
+      balance += sign * (stay[side.face].asKept - stay[side.face].turned);
+      edges[side.face][std::size_t(count[side.face])] = balances.size();
+      signs[side.face][std::size_t(count[side.face]++)] = sign;
+    }
+    balances.push_back(balance);
+  });
+  for (std::size_t g = 0; g < groups.all.size(); ++g)
+    while (shared[g] && stay[g].asKept > 1) {
+      int fewer = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int balance = balances[edges[g][k]];
+        fewer += int(balance != 0) - int(balance != signs[g][k]);
+      }
+      if (fewer <= 0) break;
+      for (std::size_t k = 0; k < 3; ++k) balances[edges[g][k]] -= signs[g][k];
+      --stay[g].asKept;
+    }
+}
+
+/// One of each group, or one each way; but all where bodies share them that look the same way there: where with one
+/// more edges would be unbalanced than with all.
+std::vector<Stay> stayOf(const Groups& groups, const std::vector<char>& walls) {
   std::vector<char> several(groups.all.size());
   for (std::size_t g = 0; g < several.size(); ++g) {
     const Group& group = groups.all[g];
@@ -135,9 +170,15 @@ std::vector<char> sharedOf(const Groups& groups, const std::vector<char>& walls)
     }
     lost[set] += int(reduced != 0) - int(asGiven != 0);
   });
+  std::vector<Stay> stay(groups.all.size());
   std::vector<char> shared(groups.all.size());
-  for (std::uint32_t g = 0; g < shared.size(); ++g) shared[g] = several[g] && lost[sets.first(g)] > 0;
-  return shared;
+  for (std::uint32_t g = 0; g < stay.size(); ++g) {
+    const auto [fewer, more] = std::minmax(groups.all[g].along, groups.all[g].against);
+    shared[g] = several[g] && lost[sets.first(g)] > 0;
+    stay[g] = shared[g] ? Stay{more, fewer} : Stay{1, walls[g]};
+  }
+  dropStrays(groups, shared, stay);
+  return stay;
 }
 
 }  // namespace
@@ -147,12 +188,13 @@ bool areTwins(const Triangle& one, const Triangle& other) { return sorted(one) =
 std::vector<char> superfluousFaces(std::span<const Triangle> triangles) {
   const Groups groups = groupsOf(triangles);
   if (groups.all.size() == triangles.size()) return std::vector<char>(triangles.size());
-  const std::vector<char> walls = wallsOf(groups), shared = sharedOf(groups, walls);
+  const std::vector<Stay> stay = stayOf(groups, wallsOf(groups));
+  std::vector<Stay> seen(groups.all.size(), Stay{0, 0});
   std::vector<char> superfluous(triangles.size());
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
     const std::uint32_t g = groups.of[f];
-    const Group& group = groups.all[g];
-    superfluous[f] = !shared[g] && f != group.kept() && !(walls[g] && (f == group.first || f == group.opposite));
+    const bool asKept = isEven(triangles[f]) == isEven(triangles[groups.all[g].kept()]);
+    superfluous[f] = asKept ? seen[g].asKept++ >= stay[g].asKept : seen[g].turned++ >= stay[g].turned;
   }
   return superfluous;
 }
