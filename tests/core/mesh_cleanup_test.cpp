@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -219,6 +220,16 @@ TEST(MeshCleanup, KeepsAllFacesThatBodiesWithinEachOtherShare) {
   EXPECT_EQ(report.duplicateFaces, 0u);
   EXPECT_EQ(report.unbalancedEdges, 0u);
   EXPECT_EQ(cleaned(joined(joined(low, high), low)).report.unbalancedEdges, 0u) << "one of them twice";
+  for (int axis = 0; axis < 3; ++axis) {
+    TriangleMesh side = low;
+    std::erase_if(side.triangles, [&](const Triangle& t) {
+      return std::ranges::any_of(t, [&](std::uint32_t v) { return low.vertices[v][axis] != 0; });
+    });
+    ASSERT_EQ(side.triangles.size(), 2u);
+    const MeshReport once = cleaned(joined(joined(low, high), side)).report;
+    EXPECT_EQ(once.unbalancedEdges, 0u) << "and a side of one " << axis;
+    EXPECT_EQ(once.duplicateFaces, 2u) << axis;
+  }
   for (std::size_t n = 0; n < 24; ++n) {
     TriangleMesh stray = joined(low, high);
     stray.triangles.push_back(stray.triangles[n]);

@@ -120,64 +120,69 @@ std::vector<char> wallsOf(const Groups& groups) {
 struct Stay {
   int asKept = 1;  ///< of those that look as the kept one does
   int turned = 0;  ///< of the others
+
+  int excess() const { return asKept - turned; }
 };
 
-/// Of sets that are shared, drops what is too many besides: a face without which fewer edges are unbalanced.
-void dropStrays(const Groups& groups, const std::vector<char>& shared, std::vector<Stay>& stay) {
+/// Of several faces of a group drops those without which fewer edges are unbalanced, from the outlines of what is too
+/// many inwards.
+void dropStrays(const Groups& groups, const std::vector<char>& several, std::vector<Stay>& stay) {
   std::vector<int> balances;                                         // of each edge
   std::vector<std::array<std::size_t, 3>> edges(groups.all.size());  // of each group
   std::vector<std::array<int, 3>> signs(groups.all.size());
-  std::vector<char> count(groups.all.size());
+  std::vector<std::uint8_t> count(groups.all.size());
   forEachEdge(groups.sides, [&](std::span<const Side> edge) {
     int balance = 0;
     for (const Side& side : edge) {
-      const int sign = signOf(side);
-      balance += sign * (stay[side.face].asKept - stay[side.face].turned);
-      edges[side.face][std::size_t(count[side.face])] = balances.size();
-      signs[side.face][std::size_t(count[side.face]++)] = sign;
+      balance += signOf(side) * stay[side.face].excess();
+      edges[side.face][count[side.face]] = balances.size();
+      signs[side.face][count[side.face]++] = signOf(side);
     }
     balances.push_back(balance);
   });
-  for (std::size_t g = 0; g < groups.all.size(); ++g)
-    while (shared[g] && stay[g].asKept > 1) {
-      int fewer = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const int balance = balances[edges[g][k]];
-        fewer += int(balance != 0) - int(balance != signs[g][k]);
-      }
-      if (fewer <= 0) break;
-      for (std::size_t k = 0; k < 3; ++k) balances[edges[g][k]] -= signs[g][k];
-      --stay[g].asKept;
+  const auto drops = [&](std::size_t g) {
+    int fewer = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int balance = balances[edges[g][k]];
+      fewer += int(balance != 0) - int(balance != signs[g][k]);
     }
+    if (fewer <= 0) return false;
+    for (std::size_t k = 0; k < 3; ++k) balances[edges[g][k]] -= signs[g][k];
+    --stay[g].asKept;
+    return true;
+  };
+  for (bool any = true; any;) {  // each time fewer edges are unbalanced
+    any = false;
+    for (std::size_t g = 0; g < groups.all.size(); ++g)
+      while (several[g] && stay[g].asKept > 1 && drops(g)) any = true;
+  }
 }
 
-/// One of each group, or one each way; but all where bodies share them that look the same way there: where with one
-/// more edges would be unbalanced than with all.
+/// One of each group, or one each way; but where bodies share them that look the same way there, all but strays: where
+/// with one more edges would be unbalanced.
 std::vector<Stay> stayOf(const Groups& groups, const std::vector<char>& walls) {
   std::vector<char> several(groups.all.size());
-  for (std::size_t g = 0; g < several.size(); ++g) {
+  std::vector<Stay> least(groups.all.size()), stay(groups.all.size());
+  for (std::uint32_t g = 0; g < several.size(); ++g) {
     const Group& group = groups.all[g];
+    const auto [fewer, more] = std::minmax(group.along, group.against);
     several[g] = walls[g] ? group.along + group.against > 2 : !group.looksBothWays() && group.along > 1;
+    least[g] = {1, walls[g]};
+    stay[g] = several[g] ? Stay{more, fewer} : least[g];
   }
+  dropStrays(groups, several, stay);
   FaceSets sets = setsOf(groups, several);
   std::vector<int> lost(groups.all.size());  // edges
   forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const Side> edge) {
-    int reduced = 0, asGiven = 0;
+    int withLeast = 0, balance = 0;
     for (const Side& side : edge) {
-      const int one = walls[side.face] ? 0 : signOf(side);
-      reduced += one;
-      asGiven += several[side.face] ? signOf(side) * groups.all[side.face].excess() : one;
+      withLeast += signOf(side) * least[side.face].excess();
+      balance += signOf(side) * stay[side.face].excess();
     }
-    lost[set] += int(reduced != 0) - int(asGiven != 0);
+    lost[set] += int(withLeast != 0) - int(balance != 0);
   });
-  std::vector<Stay> stay(groups.all.size());
-  std::vector<char> shared(groups.all.size());
-  for (std::uint32_t g = 0; g < stay.size(); ++g) {
-    const auto [fewer, more] = std::minmax(groups.all[g].along, groups.all[g].against);
-    shared[g] = several[g] && lost[sets.first(g)] > 0;
-    stay[g] = shared[g] ? Stay{more, fewer} : Stay{1, walls[g]};
-  }
-  dropStrays(groups, shared, stay);
+  for (std::uint32_t g = 0; g < stay.size(); ++g)
+    if (lost[sets.first(g)] <= 0) stay[g] = least[g];
   return stay;
 }
 
