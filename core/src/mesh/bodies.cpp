@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -14,6 +13,11 @@ namespace {
 
 /// So far apart, in radians, faces lie in one plane but for rounding.
 constexpr double kSameAngle = 1e-9;
+
+/// Whether the edge is as most are: two faces of a patch take back each other's side.
+bool isWithinPatch(const Patches& patches, std::span<const Side> edge) {
+  return edge.size() == 2 && edge[0].rising != edge[1].rising && patches.of[edge[0].face] == patches.of[edge[1].face];
+}
 
 /// The sides at an edge without those that others of their patch take back. Of three of a patch the first or the last
 /// is left: whichever, the patch is the same.
@@ -36,18 +40,20 @@ struct Spoke {
   std::uint32_t patch;
 };
 
-/// Counterclockwise as the edge comes towards the eye, from within rounding of 0. Those of faces in one plane have the
-/// same angle; of these that look one way the solids before them are those of the higher patches, at all their edges.
-void sortAround(std::vector<Spoke>& spokes) {
+/// Counterclockwise as the edge comes towards the eye, from within rounding of 0. Those of faces in one plane get the
+/// same angle, and what does not begin comes first; of these that look one way the solids before them are those of the
+/// higher patches, at all their edges. `begins`: `Spoke::rising` of those that begin.
+void sortAround(std::vector<Spoke>& spokes, bool begins) {
   std::ranges::sort(spokes, {}, &Spoke::angle);
-  const auto before = [](const Spoke& a, const Spoke& b) { return a.rising ? a.patch < b.patch : a.patch > b.patch; };
+  const auto before = [begins](const Spoke& a, const Spoke& b) {
+    if (a.rising != b.rising) return b.rising == begins;
+    return a.rising ? a.patch < b.patch : a.patch > b.patch;
+  };
   for (auto first = spokes.begin(), next = first; first != spokes.end(); first = next) {
     while (++next != spokes.end() && next->angle - (next - 1)->angle < kSameAngle) {
     }
     for (auto same = first; same != next; ++same) same->angle = first->angle;
-    const auto falling = std::partition(first, next, [](const Spoke& spoke) { return spoke.rising; });
-    std::sort(first, falling, before);
-    std::sort(falling, next, before);
+    std::sort(first, next, before);
   }
 }
 
@@ -66,32 +72,24 @@ std::vector<Spoke> spokesOf(const TriangleMesh& mesh, const Patches& patches, st
     const double angle = std::atan2(arm.dot(up), arm.dot(right));
     spokes.push_back({angle < -kSameAngle ? angle + 2 * std::numbers::pi : angle, side.rising, patches.of[side.face]});
   }
-  sortAround(spokes);
   return spokes;
 }
 
 using Wedge = std::array<Spoke, 2>;
 
 /// What lies between two faces at an edge, each from where one begins it to where the next that is left ends it; as
-/// many begin as end one. `begins`: `Spoke::rising` of those that begin. What ends in a plane does so before what
-/// begins.
-std::vector<Wedge> wedgesOf(const std::vector<Spoke>& spokes, bool begins) {
-  std::vector<Spoke> around;
-  for (auto first = spokes.begin(); first != spokes.end();) {
-    const auto next = std::find_if(first, spokes.end(), [&](const Spoke& s) { return s.angle != first->angle; });
-    for (const bool rising : {!begins, begins})
-      std::copy_if(first, next, std::back_inserter(around), [&](const Spoke& s) { return s.rising == rising; });
-    first = next;
-  }
+/// many begin as end one.
+std::vector<Wedge> wedgesOf(std::vector<Spoke> spokes, bool begins) {
+  sortAround(spokes, begins);
   std::vector<Wedge> wedges;
   std::vector<Spoke> begun;
-  std::vector<char> ended(around.size(), 0);
-  for (std::size_t i = 0; i < 2 * around.size(); ++i) {
-    const std::size_t at = i % around.size();
-    if (around[at].rising == begins) {
-      if (i < around.size()) begun.push_back(around[at]);
+  std::vector<char> ended(spokes.size(), 0);
+  for (std::size_t i = 0; i < 2 * spokes.size(); ++i) {
+    const std::size_t at = i % spokes.size();
+    if (spokes[at].rising == begins) {
+      if (i < spokes.size()) begun.push_back(spokes[at]);
     } else if (!begun.empty() && !std::exchange(ended[at], 1)) {
-      wedges.push_back({begun.back(), around[at]});
+      wedges.push_back({begun.back(), spokes[at]});
       begun.pop_back();
     }
   }
@@ -120,6 +118,7 @@ Bodies bodiesOf(const TriangleMesh& mesh, const Patches& patches, std::span<cons
   FaceSets together(patches.count);
   std::vector<char> open = patches.oneSided;
   forEachEdge(sides, [&](std::span<const Side> edge) {
+    if (isWithinPatch(patches, edge)) return;
     const std::vector<Side> left = unbalanced(patches, edge);
     if (left.empty()) return;
     const auto rising = static_cast<std::size_t>(std::ranges::count_if(left, &Side::rising));

@@ -65,24 +65,23 @@ Groups groupsOf(std::span<const Triangle> triangles) {
   return groups;
 }
 
-/// Sets of some groups, 1 in `chosen`, that hang together by edges, each by its lowest group.
-FaceSets setsOf(const Groups& groups, const std::vector<char>& chosen) {
-  FaceSets sets(groups.all.size());
-  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
-    const auto first = std::ranges::find_if(edge, [&](const Side& side) { return chosen[side.face]; });
-    for (const Side& side : edge)
-      if (chosen[side.face]) sets.join(first->face, side.face);
-  });
-  return sets;
-}
-
-/// Calls visit(a set of these groups, the sides there) for each edge that one has.
+/// Calls visit(a set of these groups, the sides there) for each edge that one of some groups has, 1 in `chosen`.
 template <typename Visit>
 void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, FaceSets& sets, const Visit& visit) {
   forEachEdge(groups.sides, [&](std::span<const Side> edge) {
     const auto first = std::ranges::find_if(edge, [&](const Side& side) { return chosen[side.face]; });
     if (first != edge.end()) visit(sets.first(first->face), edge);
   });
+}
+
+/// Sets of some groups that hang together by edges, each by its lowest group.
+FaceSets setsOf(const Groups& groups, const std::vector<char>& chosen) {
+  FaceSets sets(groups.all.size());
+  forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const Side> edge) {
+    for (const Side& side : edge)
+      if (chosen[side.face]) sets.join(set, side.face);
+  });
+  return sets;
 }
 
 int signOf(const Side& side) { return side.rising ? 1 : -1; }
