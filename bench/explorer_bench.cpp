@@ -4,10 +4,10 @@
 
 #include <sstream>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "explorer/explorer.h"
+#include "language/script.h"
 #include "scene.h"
-#include "script.h"
 
 namespace hpsdf::bench {
 namespace {

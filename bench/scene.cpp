@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 
 namespace hpsdf::bench {
 

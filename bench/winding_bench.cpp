@@ -1,9 +1,9 @@
 // Inside or outside by the winding number: the hierarchy against the sum over all faces, and what it costs a
 // construction.
 
-#include "distance/winding.h"
-#include "hpsdf/sign_check.h"
+#include "hpsdf/detail/sign_check.h"
 #include "scene.h"
+#include "sign/winding.h"
 
 namespace hpsdf::bench {
 namespace {
@@ -24,25 +24,25 @@ void byHierarchy(benchmark::State& state) {
   });
 }
 
-void construction(benchmark::State& state, Sign sign) {
+void construction(benchmark::State& state, InsideTest sign) {
   const BuildOptions options{.targetError = 1e-6};
   for ([[maybe_unused]] auto _ : state)
-    benchmark::DoNotOptimize(build(ExactDistance(bunny(), {.sign = sign}), paperDomain(), options));
+    benchmark::DoNotOptimize(build(ExactDistance(bunny(), {.insideTest = sign}), paperDomain(), options));
 }
 
 BENCHMARK(allFaces)->Name("winding/all_faces");
 BENCHMARK(byHierarchy)->Name("winding/ours");
-BENCHMARK_CAPTURE(construction, normals, Sign::pseudonormal)
+BENCHMARK_CAPTURE(construction, normals, InsideTest::pseudonormal)
     ->Name("winding/build_normals")
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Iterations(1);
-BENCHMARK_CAPTURE(construction, winding, Sign::winding)
+BENCHMARK_CAPTURE(construction, winding, InsideTest::winding)
     ->Name("winding/build")
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Iterations(1);
-BENCHMARK_CAPTURE(construction, automatic, Sign::automatic)
+BENCHMARK_CAPTURE(construction, automatic, InsideTest::automatic)
     ->Name("winding/build_auto")
     ->MeasureProcessCPUTime()
     ->UseRealTime()

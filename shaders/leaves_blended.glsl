@@ -1,4 +1,4 @@
-// A blended field: near a leaf's faces others have a say (core/src/field/blend.h).
+// A blended field: near a leaf's faces others have a say (core/src/field/query/blend.h).
 
 layout(binding = 6) uniform usamplerBuffer zones;  // see FieldUpload
 layout(location = 18) uniform float blend;

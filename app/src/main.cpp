@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "interrupt.h"
-#include "mesh_process.h"
+#include "console/interrupt.h"
+#include "construction/mesh_process.h"
 #include "program.h"
 
 namespace {

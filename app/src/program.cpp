@@ -6,11 +6,11 @@
 #include <exception>
 #include <ostream>
 
-#include "commands.h"
-#include "error_text.h"
-#include "help.h"
+#include "commands/commands.h"
+#include "console/error_text.h"
+#include "console/printable.h"
 #include "hpsdf/error.h"
-#include "printable.h"
+#include "language/help.h"
 #include "version.h"
 
 namespace hpsdf::app {

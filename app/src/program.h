@@ -3,8 +3,8 @@
 #include <span>
 #include <string>
 
-#include "failed.h"
-#include "session.h"
+#include "console/failed.h"
+#include "session/session.h"
 
 namespace hpsdf::app {
 

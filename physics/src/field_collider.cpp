@@ -111,7 +111,7 @@ class LowerBounds {
   /// A leaf's polynomial where it has a say. A blended field is a mean of those that do.
   Piece pieceOf(const Cell& leaf) const {
     const FieldData& data = field_.data();
-    const GridFrame& frame = field_.directory().frame;
+    const GridFrame& frame = field_.lookupGrid().frame;
     const std::uint64_t bits = data.nodes[leaf.id];
     const int stored = node::degree(bits), degree = std::max(stored, 1);
     Piece piece{{}, {}, degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
@@ -129,8 +129,8 @@ class LowerBounds {
       piece.upper[axis] = piece.lower[axis] + edge;
       if (data.blend == 0) continue;
       const auto beyond = [&](bool upper) {
-        const int depth = reach::depth(field_.directory().reaches[leaf.id], axis, upper);
-        return depth == reach::kWall ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
+        const int depth = blend_extent::depth(field_.lookupGrid().blendExtents[leaf.id], axis, upper);
+        return depth == blend_extent::kWall ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
       };
       const double below = beyond(false), above = beyond(true);
       piece.lower[axis] -= below;
@@ -282,7 +282,7 @@ std::uint16_t roundedDown(double value, double unit) {
 }  // namespace
 
 FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
-  const GridFrame& frame = field.directory().frame;
+  const GridFrame& frame = field.lookupGrid().frame;
   const std::size_t base = std::size_t(field.grid()[0]) * field.grid()[1] * field.grid()[2];
   while (depth_ < kMaxDepth && base << (3 * (depth_ + 1)) <= kMostCells) ++depth_;
   Vector3 cell;
@@ -304,7 +304,7 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
 }
 
 const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const {
-  const GridFrame& frame = field_->directory().frame;
+  const GridFrame& frame = field_->lookupGrid().frame;
   const double scale = double(std::uint32_t{1} << depth_);
   std::array<std::int64_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {

@@ -15,16 +15,16 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
+#include "commands/commands.h"
+#include "files/other_program.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/shapes.h"
-#include "other_program.h"
+#include "language/script.h"
 #include "outcome.h"
-#include "script.h"
-#include "session.h"
+#include "session/session.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {

@@ -20,10 +20,10 @@
 #include <string_view>
 #include <vector>
 
-#include "batch_list.h"
+#include "batch/batch_list.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
-#include "script.h"
+#include "language/script.h"
 #include "started_program.h"
 #include "support/temporary_directory.h"
 

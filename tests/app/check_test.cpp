@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "baseline.h"
-#include "check_page.h"
-#include "data_table.h"
+#include "check/baseline.h"
+#include "check/check_page.h"
+#include "files/data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/image.h"
 #include "outcome.h"

@@ -29,16 +29,16 @@
 #include <thread>
 #include <vector>
 
-#include "hpsdf/cubic_grid.h"
+#include "console/progress_line.h"
+#include "files/html_page.h"
+#include "hpsdf/detail/cubic_grid.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/render/image.h"
-#include "point_query.h"
-#include "progress_line.h"
-#include "report_page.h"
+#include "language/point_query.h"
+#include "language/summaries.h"
 #include "started_program.h"
-#include "summaries.h"
 #include "support/one_leaf_field.h"
 #include "support/require_gl.h"
 #include "support/short_files.h"

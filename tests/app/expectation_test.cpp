@@ -1,4 +1,4 @@
-#include "expectation.h"
+#include "language/expectation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

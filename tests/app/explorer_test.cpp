@@ -10,11 +10,11 @@
 #include <fstream>
 #include <sstream>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "explorer/raster.h"
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_export.h"
-#include "script.h"
+#include "hpsdf/mesh_file.h"
+#include "language/script.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"

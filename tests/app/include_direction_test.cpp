@@ -140,7 +140,7 @@ struct Sample {
 
 TEST(IncludeDirection, acceptsWhatRunsTheRightWay) {
   const Sample samples[] = {
-      {"core/src/field/build.cpp",
+      {"core/src/field/build/build.cpp",
        "#include \"hpsdf/build.h\"\n#include \"basis/legendre.h\"\n#include <tbb/task_group.h>"},
       {"core/include/hpsdf/field.h", "#include <array>\n#include <Eigen/Core>\n#include \"hpsdf/types.h\""},
       {"render/src/gl/context.cpp",
@@ -157,16 +157,16 @@ TEST(IncludeDirection, acceptsWhatRunsTheRightWay) {
 
 TEST(IncludeDirection, refusesWhatRunsTheWrongWay) {
   const Sample samples[] = {
-      {"core/src/field/build.cpp", "#include \"hpsdf/render/view.h\""},
-      {"core/src/field/build.cpp", "#include <hpsdf/render/view.h>"},
-      {"core/src/field/build.cpp", "  #  include \"../../../render/src/gl/context.h\"  // why not"},
-      {"core/src/field/build.cpp", "#include \"app/src/registry.h\""},
-      {"core/src/field/build.cpp", "#include \"hpsdf/physics/contacts.h\""},
-      {"core/src/field/build.cpp", "#include <GL/gl.h>"},
-      {"render/src/gl/context.cpp", "#include \"../../../app/src/registry.h\""},
+      {"core/src/field/build/build.cpp", "#include \"hpsdf/render/view.h\""},
+      {"core/src/field/build/build.cpp", "#include <hpsdf/render/view.h>"},
+      {"core/src/field/build/build.cpp", "  #  include \"../../../../render/src/gl/context.h\"  // why not"},
+      {"core/src/field/build/build.cpp", "#include \"app/src/language/registry.h\""},
+      {"core/src/field/build/build.cpp", "#include \"hpsdf/physics/contacts.h\""},
+      {"core/src/field/build/build.cpp", "#include <GL/gl.h>"},
+      {"render/src/gl/context.cpp", "#include \"../../../app/src/language/registry.h\""},
       {"render/src/gl/context.cpp", "#include \"hpsdf/physics/contacts.h\""},
       {"physics/src/contacts.cpp", "#include \"hpsdf/render/view.h\""},
-      {"physics/src/contacts.cpp", "#include \"app/src/registry.h\""},
+      {"physics/src/contacts.cpp", "#include \"app/src/language/registry.h\""},
   };
   for (const Sample& sample : samples)
     EXPECT_EQ(faults(sample.file, sample.text).size(), 1u) << sample.file << "\n" << sample.text;
@@ -189,14 +189,14 @@ TEST(IncludeDirection, refusesForeignHeadersInPublicOnes) {
 }
 
 TEST(IncludeDirection, refusesPrivateHeadersOfAnotherRoom) {
-  EXPECT_EQ(faults("render/src/gl/upload.cpp", "#include \"../../../core/src/field/evaluate.h\"").size(), 1u);
+  EXPECT_EQ(faults("render/src/gl/upload.cpp", "#include \"../../../core/src/field/query/evaluate.h\"").size(), 1u);
   EXPECT_EQ(faults("app/src/main.cpp", "#include \"render/src/gl/context.h\"").size(), 1u);
   EXPECT_EQ(faults("physics/src/contacts.cpp", "#include \"../../core/src/threads.h\"").size(), 1u);
 }
 
 TEST(IncludeDirection, namesFileLineAndInclude) {
-  const auto found = faults("core/src/field/build.cpp", "#include <array>\n\n#include \"hpsdf/render/view.h\"\n");
-  EXPECT_EQ(found, Lines{"core/src/field/build.cpp:3: hpsdf/render/view.h: core must not know render"});
+  const auto found = faults("core/src/field/build/build.cpp", "#include <array>\n\n#include \"hpsdf/render/view.h\"\n");
+  EXPECT_EQ(found, Lines{"core/src/field/build/build.cpp:3: hpsdf/render/view.h: core must not know render"});
 }
 
 }  // namespace

@@ -11,12 +11,12 @@
 #include <thread>
 #include <vector>
 
-#include "commands.h"
+#include "commands/commands.h"
+#include "console/long_work.h"
 #include "explorer/explorer.h"
-#include "explorer/live_work.h"
-#include "explorer/recording.h"
-#include "long_work.h"
-#include "script.h"
+#include "language/script.h"
+#include "window/live_work.h"
+#include "window/recording.h"
 
 namespace hpsdf::app {
 namespace {

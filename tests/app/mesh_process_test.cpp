@@ -1,5 +1,5 @@
 // Mesh files from strangers: what the process that reads them answers, and what becomes of it.
-#include "mesh_process.h"
+#include "construction/mesh_process.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,8 +24,8 @@
 #include <utility>
 #include <vector>
 
+#include "construction/mesh_reply.h"
 #include "hpsdf/error.h"
-#include "mesh_reply.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
@@ -76,8 +76,8 @@ ImportedMesh tetrahedron() {
            .degenerateFaces = 8,
            .flippedFaces = 9,
            .duplicateFaces = 10,
-           .degeneratePlace = {12, 13, 14},
-           .duplicatePlace = {15, 16, 17},
+           .degeneratePosition = {12, 13, 14},
+           .duplicatePosition = {15, 16, 17},
            .turned = true,
            .volume = 2.5,
            .area = 12.5,
@@ -113,8 +113,8 @@ TEST(MeshReplies, bringAMeshAndAllOfItsReport) {
   EXPECT_EQ(report.nonManifoldEdges, 3u);
   EXPECT_EQ(report.inconsistentEdges, 5u);
   EXPECT_EQ(report.unbalancedEdges, 11u);
-  EXPECT_EQ(report.degeneratePlace, Vector3(12, 13, 14));
-  EXPECT_EQ(report.duplicatePlace, Vector3(15, 16, 17));
+  EXPECT_EQ(report.degeneratePosition, Vector3(12, 13, 14));
+  EXPECT_EQ(report.duplicatePosition, Vector3(15, 16, 17));
   EXPECT_EQ(report.weldedVertices, 6u);
   EXPECT_EQ(report.unreferencedVertices, 7u);
   EXPECT_EQ(report.degenerateFaces, 8u);
@@ -225,7 +225,7 @@ class MeshProcess : public testing::Test {
   static std::string errorOf(const fs::path& file, const ReadingLimits& limits = kPlenty,
                              const fs::path& program = HPSDF_PROGRAM) {
     try {
-      importApart(program, file, limits, {});
+      importInSubprocess(program, file, limits, {});
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), AllOf(StartsWith(file.string() + ": "), Not(HasSubstr("\n"))));
       expectNoChild();
@@ -259,7 +259,7 @@ std::string polygon(int corners) {
 TEST_F(MeshProcess, readsWhatThisProcessWouldRead) {
   for (const fs::path& file : {write("t.obj", kObj), write("t.off", kOff)}) {
     const ImportedMesh here = importMesh(file);
-    const ImportedMesh apart = importApart(HPSDF_PROGRAM, file, kPlenty, {});
+    const ImportedMesh apart = importInSubprocess(HPSDF_PROGRAM, file, kPlenty, {});
     EXPECT_EQ(apart.mesh.vertices, here.mesh.vertices);
     EXPECT_EQ(apart.mesh.triangles, here.mesh.triangles);
     EXPECT_EQ(apart.mesh.name, here.mesh.name);
@@ -356,7 +356,7 @@ TEST_F(MeshProcess, isCancelled) {
       .report = [&](std::string_view task, double) { tasks.emplace_back(task); },
       .cancelled = [&] { return Clock::now() - start > std::chrono::milliseconds(2500); },
   };
-  EXPECT_THROW(importApart(HPSDF_PROGRAM, file, kPlenty, progress), Cancelled);
+  EXPECT_THROW(importInSubprocess(HPSDF_PROGRAM, file, kPlenty, progress), Cancelled);
   EXPECT_LT(Clock::now() - start, std::chrono::seconds(5));
   ASSERT_FALSE(tasks.empty());
   EXPECT_EQ(tasks[0], "Reading  [2Jt.obj");

@@ -1,4 +1,4 @@
-#include "registry.h"
+#include "language/registry.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,14 +9,14 @@
 #include <set>
 #include <sstream>
 
-#include "building.h"
-#include "commands.h"
-#include "help.h"
+#include "commands/commands.h"
+#include "construction/building.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/render/picture.h"
-#include "pictures.h"
-#include "script.h"
+#include "language/help.h"
+#include "language/script.h"
+#include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
 namespace {

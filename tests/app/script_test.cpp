@@ -1,4 +1,4 @@
-#include "script.h"
+#include "language/script.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "hpsdf/error.h"
-#include "session.h"
+#include "session/session.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {

@@ -10,9 +10,9 @@
 #include <sstream>
 #include <vector>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "explorer/explorer.h"
-#include "script.h"
+#include "language/script.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
 

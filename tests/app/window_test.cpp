@@ -17,11 +17,11 @@
 #include <thread>
 #include <vector>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "explorer/explorer.h"
+#include "files/other_program.h"
 #include "hpsdf/render/image.h"
-#include "other_program.h"
-#include "script.h"
+#include "language/script.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
 

@@ -5,14 +5,14 @@
 #include <limits>
 #include <random>
 
-#include "field/evaluate.h"
+#include "field/query/evaluate.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/line.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
-#include "hpsdf/line.h"
 #include "hpsdf/shapes.h"
 #include "support/random_field.h"
 #include "support/temporary_directory.h"
@@ -144,7 +144,7 @@ Field rudeWithDirectory(unsigned seed) {
 
 TEST(Blend, IsWhatItsDefinitionSays) {
   std::size_t most = 0;
-  ASSERT_GT(rudeWithDirectory(1).directory().depth, 0);
+  ASSERT_GT(rudeWithDirectory(1).lookupGrid().depth, 0);
   for (const unsigned seed : {1u, 2u, 3u, 4u})
     for (const double width : {0.03, 0.25}) {
       const Field field = seed % 2 == 0 ? rude(seed) : rudeWithDirectory(seed), smooth = blended(field, width);
@@ -387,7 +387,7 @@ TEST(Blend, TakesMemoryThatIsCounted) {
   const Field field = rude(17);
   EXPECT_EQ(blended(field, 0).bytes(), field.bytes());
   EXPECT_EQ(blended(field, 0.1).bytes(),
-            field.bytes() + 4 * (field.data().nodes.size() + field.directory().entries.size()));
+            field.bytes() + 4 * (field.data().nodes.size() + field.lookupGrid().entries.size()));
 }
 
 TEST(Blend, RefusesWidthsOutOfRange) {

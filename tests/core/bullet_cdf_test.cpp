@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
-#include "hpsdf/cubic_grid.h"
+#include "hpsdf/detail/cubic_grid.h"
 #include "support/cubic_grid_file.h"
 #include "support/one_leaf_field.h"
 

@@ -1,6 +1,4 @@
 // Constructions that are interrupted and taken up again.
-#include "hpsdf/checkpoint.h"
-
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -20,9 +18,10 @@
 #include <string_view>
 #include <vector>
 
+#include "hpsdf/build.h"
+#include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
-#include "hpsdf/output_file.h"
 #include "support/short_files.h"
 #include "support/temporary_directory.h"
 
@@ -97,9 +96,9 @@ TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
   support::TemporaryDirectory folder;
   std::mt19937_64 random(7);
   constexpr int kResumed = 4, kAttempts = 300;
-  int way = 0;
+  int path = 0;
   for (BuildOptions options : everyWay()) {
-    SCOPED_TRACE("way " + std::to_string(way++));
+    SCOPED_TRACE("way " + std::to_string(path++));
     constexpr int kMany = 1 << 30;
     std::atomic<int> left = kMany;
     Checkpoint checkpoint = alwaysAt(folder / "state");

@@ -10,7 +10,7 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/jumps.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {

@@ -1,6 +1,6 @@
 // Where a mesh meets itself: against separating axes in whole numbers, and on meshes that are known.
 
-#include "hpsdf/crossings.h"
+#include "hpsdf/detail/crossings.h"
 
 #include <gtest/gtest.h>
 
@@ -12,12 +12,12 @@
 #include <random>
 #include <vector>
 
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
-#include "hpsdf/threads.h"
-#include "mesh/orientation.h"
 #include "support/test_mesh.h"
+#include "surface/exact_orientation.h"
 
 namespace hpsdf {
 namespace {

@@ -1,4 +1,4 @@
-#include "hpsdf/cubic_grid.h"
+#include "hpsdf/detail/cubic_grid.h"
 
 #include <gtest/gtest.h>
 

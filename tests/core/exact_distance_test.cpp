@@ -21,9 +21,9 @@
 #include <utility>
 #include <vector>
 
-#include "distance/triangle_frame.h"
+#include "bvh/triangle_frame.h"
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
@@ -250,7 +250,7 @@ void inTwoThreads(std::size_t count, Function function) {
 }
 
 /// For meshes that are not closed: triangles alone, no patches of holes.
-const DistanceOptions kByNormals{.sign = Sign::pseudonormal};
+const DistanceOptions kByNormals{.insideTest = InsideTest::pseudonormal};
 
 void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& points) {
   const ExactDistance distance(mesh, kByNormals);

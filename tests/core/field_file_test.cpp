@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
-#include "hpsdf/output_file.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -225,7 +225,7 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   data.metadata.measuredError = 0.0075;
   data.metadata.enriched = true;
   data.metadata.continuityWeight = 3;
-  data.metadata.source.sign = Sign::shell;
+  data.metadata.source.insideTest = InsideTest::shell;
   data.metadata.source.thickness = 0.125;
   save(Field(data), file);
   const Field again = load(file);
@@ -233,7 +233,7 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   ASSERT_EQ(again.data().bounds.size(), data.nodes.size());
   EXPECT_EQ(again.data().bounds.back().error, 0.25f);
   EXPECT_EQ(again.data().bounds.back().slope, 1.5f);
-  EXPECT_EQ(again.metadata().source.sign, Sign::shell);
+  EXPECT_EQ(again.metadata().source.insideTest, InsideTest::shell);
   EXPECT_EQ(again.metadata().source.thickness, 0.125);
   EXPECT_EQ(again.metadata().estimator, Estimator::residual);
   EXPECT_EQ(again.metadata().criterion, Criterion::optimal);
@@ -270,7 +270,7 @@ TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
     for (const float bound : {-1.0f, NAN}) EXPECT_TRUE(refused(at, bound)) << at;
   EXPECT_FALSE(refused(bounds, 1e30f));
   for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{2})) << flag;
-  EXPECT_FALSE(refused(since + kSinceVersion3, Sign::shell));
+  EXPECT_FALSE(refused(since + kSinceVersion3, InsideTest::shell));
   EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{5})) << "sign";
 }
 

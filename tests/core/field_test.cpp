@@ -10,7 +10,7 @@
 #include <set>
 #include <thread>
 
-#include "field/evaluate.h"
+#include "field/query/evaluate.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 
@@ -166,7 +166,7 @@ TEST(Field, NotANumberAndInfinityAreAnswered) {
   EXPECT_TRUE(field.valueAndGradient({std::nextafter(field.domain().max().x(), 9), 0, 0}).gradient.allFinite());
 }
 
-/// The directory is a short cut to where the descent from the base cells leads: on faces and corners of cells, on and
+/// The lookup grid is a short cut to where the descent from the base cells leads: on faces and corners of cells, on and
 /// beyond the domain's boundary, at depths above and below its own, for grids of any shape.
 TEST(Field, QueriesEndInTheCellThatHoldsThePoint) {
   const auto phi = [](const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; };

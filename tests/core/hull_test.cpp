@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/detail/sign_check.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
-#include "hpsdf/mesh_import.h"
-#include "hpsdf/sign_check.h"
+#include "hpsdf/mesh_file.h"
 #include "support/made_meshes.h"
 
 namespace hpsdf {
@@ -30,7 +30,7 @@ using support::joined;
 using support::moved;
 using support::placesIn;
 
-const DistanceOptions kHull{.sign = Sign::hull}, kWinding{.sign = Sign::winding};
+const DistanceOptions kHull{.insideTest = InsideTest::outerHull}, kWinding{.insideTest = InsideTest::winding};
 
 TriangleMesh twoBalls() {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=4");
@@ -53,7 +53,7 @@ double depthInTwoBalls(const Vector3& x) {
 TEST(Hull, OfTwoBallsIsTheirUnions) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
-  EXPECT_EQ(hull.source().sign, Sign::hull);
+  EXPECT_EQ(hull.source().insideTest, InsideTest::outerHull);
   EXPECT_EQ(hull.source().fingerprint, plain.source().fingerprint);
   EXPECT_EQ(hull.source().faces, mesh.triangles.size());
   std::size_t inside = 0, deeper = 0;
@@ -219,7 +219,7 @@ TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
     const ClosestPoint closest = hull.closestPoint(x);
     ASSERT_LT(closest.triangle, mesh.triangles.size());
     const TriangleMesh one{.vertices = mesh.vertices, .triangles = {mesh.triangles[closest.triangle]}, .name = {}};
-    EXPECT_NEAR(ExactDistance(one, {.sign = Sign::winding})(closest.point), 0, 1e-12);
+    EXPECT_NEAR(ExactDistance(one, {.insideTest = InsideTest::winding})(closest.point), 0, 1e-12);
     EXPECT_NEAR((x - closest.point).norm(), std::abs(closest.signedDistance), 1e-12);
   }
 }

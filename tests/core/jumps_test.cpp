@@ -9,9 +9,10 @@
 #include <numeric>
 
 #include "basis/legendre.h"
-#include "field/evaluate.h"
+#include "field/query/evaluate.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/face_steps.h"
 #include "hpsdf/error.h"
 #include "support/random_field.h"
 

@@ -1,4 +1,4 @@
-#include "hpsdf/line.h"
+#include "hpsdf/detail/line.h"
 
 #include <gtest/gtest.h>
 

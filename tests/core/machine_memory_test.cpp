@@ -1,5 +1,5 @@
 // What control groups allow, by files as Linux has them.
-#include "machine_memory.h"
+#include "util/machine_memory.h"
 
 #include <gtest/gtest.h>
 

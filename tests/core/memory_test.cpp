@@ -1,4 +1,4 @@
-#include "hpsdf/memory.h"
+#include "hpsdf/detail/memory.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/triangle_mesh.h"
 #include "support/made_meshes.h"

@@ -1,7 +1,5 @@
 // What a solid's surface would not have, where it is, and what turning faces mends.
 
-#include "hpsdf/mesh_defects.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,11 +13,12 @@
 #include <numbers>
 #include <vector>
 
+#include "hpsdf/detail/crossings.h"
+#include "hpsdf/detail/sign_check.h"
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_export.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_repair.h"
-#include "hpsdf/sign_check.h"
+#include "hpsdf/mesh_report.h"
 #include "support/made_meshes.h"
 #include "support/temporary_directory.h"
 
@@ -316,8 +315,8 @@ TEST(MeshRepair, KeepsWhatCleaningDid) {
   const RepairedMesh mended = repaired(cleaned(turned(mesh)));
   EXPECT_EQ(mended.imported.report.duplicateFaces, 1u);
   EXPECT_EQ(mended.imported.report.degenerateFaces, 1u);
-  EXPECT_EQ(mended.imported.report.duplicatePlace, middleOf(mesh, 3));
-  EXPECT_EQ(mended.imported.report.degeneratePlace, middleOf(mesh, 13));
+  EXPECT_EQ(mended.imported.report.duplicatePosition, middleOf(mesh, 3));
+  EXPECT_EQ(mended.imported.report.degeneratePosition, middleOf(mesh, 13));
   EXPECT_TRUE(mended.imported.report.turned);
 }
 

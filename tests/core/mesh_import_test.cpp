@@ -1,5 +1,3 @@
-#include "hpsdf/mesh_import.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -20,7 +18,8 @@
 #include <vector>
 
 #include "hpsdf/error.h"
-#include "mesh/triangulate.h"
+#include "hpsdf/mesh_file.h"
+#include "mesh/file/triangulate.h"
 #include "support/temporary_directory.h"
 #include "support/test_mesh.h"
 

@@ -11,7 +11,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "support/temporary_directory.h"
 #include "support/test_mesh.h"
 

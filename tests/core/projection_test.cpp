@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "field/evaluate.h"
+#include "field/query/evaluate.h"
 
 namespace hpsdf {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
-#include "hpsdf/mesh_import.h"
-#include "hpsdf/nearest_name.h"
+#include "hpsdf/mesh_file.h"
 
 namespace hpsdf {
 namespace {

@@ -10,24 +10,24 @@
 #include <utility>
 #include <vector>
 
-#include "distance/hole_rims.h"
-#include "distance/solid_angle.h"
-#include "distance/winding.h"
 #include "hpsdf/build.h"
+#include "hpsdf/detail/sign_check.h"
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
-#include "hpsdf/sign_check.h"
-#include "hpsdf/threads.h"
+#include "sign/boundary_edges.h"
+#include "sign/solid_angle.h"
+#include "sign/winding.h"
 #include "support/made_meshes.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
 namespace {
 
+using distance::BoundaryEdges;
 using distance::Hierarchy;
-using distance::HoleRims;
 using distance::Winding;
 using support::boxOfTwo;
 using support::joined;
@@ -57,7 +57,7 @@ double sumOfAngles(const TriangleMesh& mesh, const Vector3& x) {
   return double(sum / (4 * std::numbers::pi_v<long double>));
 }
 
-const DistanceOptions kAutomatic{.sign = Sign::automatic};
+const DistanceOptions kAutomatic{.insideTest = InsideTest::automatic};
 
 double value(const ExactDistance& distance, const Vector3& x) { return distance(x); }
 
@@ -94,17 +94,17 @@ TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
 TEST(Winding, GradientsAreAsNearAsTheySay) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const Hierarchy hierarchy(withHoles(sphere, 7), boundingBox(sphere));
-  const HoleRims rims(hierarchy);
+  const BoundaryEdges rims(hierarchy);
   ASSERT_GT(rims.size(), 1000u);
   double greatest = 0;
   std::size_t terms = 0;
   for (const Vector3& x : placesIn(boundingBox(sphere), 200)) {
     const Vector3 local = hierarchy.local(x);
-    const HoleRims::Gradient exact = rims.gradient(local, 0);
+    const BoundaryEdges::Gradient exact = rims.gradient(local, 0);
     EXPECT_EQ(exact.terms, rims.size());
     EXPECT_EQ(exact.error, 0);
     for (const double error : {1.0, 1e-2, 1e-4}) {
-      const HoleRims::Gradient found = rims.gradient(local, error);
+      const BoundaryEdges::Gradient found = rims.gradient(local, error);
       EXPECT_LE(found.error, error);
       EXPECT_LE((found.value - exact.value).norm(), found.error + 1e-9);
       EXPECT_GE(found.change, exact.change * (1 - 1e-9));
@@ -123,11 +123,11 @@ TEST(Winding, GradientsAreHowItChanges) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const TriangleMesh mesh = withHoles(sphere, 7);
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const HoleRims rims(hierarchy);
+  const BoundaryEdges rims(hierarchy);
   const double step = 1e-4;
   int tried = 0;
   for (const Vector3& x : placesIn(boundingBox(mesh), 20)) {
-    const HoleRims::Gradient found = rims.gradient(hierarchy.local(x), 1e-4);
+    const BoundaryEdges::Gradient found = rims.gradient(hierarchy.local(x), 1e-4);
     if (found.nearest < 0.1) continue;
     ++tried;
     for (int k = 0; k < 3; ++k) {
@@ -143,74 +143,74 @@ TEST(Winding, GradientsAreHowItChanges) {
 TEST(Winding, GradientsOfFewRimsAreExact) {
   const TriangleMesh mesh = openBox();
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const HoleRims rims(hierarchy);
-  const HoleRims::Gradient found = rims.gradient({100, 0, 0}, HUGE_VAL);
+  const BoundaryEdges rims(hierarchy);
+  const BoundaryEdges::Gradient found = rims.gradient({100, 0, 0}, HUGE_VAL);
   EXPECT_EQ(found.error, 0);
   EXPECT_EQ(found.terms, rims.size());
 }
 
-TEST(Sign, OfAClosedMeshIsThePseudonormals) {
+TEST(InsideTest, OfAClosedMeshIsThePseudonormals) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
-  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
-  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
-  EXPECT_EQ(distance.source().sign, Sign::pseudonormal);
-  EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("does not meet itself"));
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
+  EXPECT_EQ(distance.source().insideTest, InsideTest::pseudonormal);
+  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("does not meet itself"));
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(Sign, OfAMeshThatLooksInwardsIsTheOther) {
+TEST(InsideTest, OfAMeshThatLooksInwardsIsTheOther) {
   const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
-  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
-  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
   for (const Vector3& x : placesIn(boundingBox(mesh), 1000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(Sign, OfBodiesThatOverlapIsThatOfTheirUnion) {
+TEST(InsideTest, OfBodiesThatOverlapIsThatOfTheirUnion) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance distance(joined(ball, moved(ball, {1, 0, 0})), kAutomatic);
-  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
-  EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("meets itself"));
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
+  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("meets itself"));
   EXPECT_LT(value(distance, {0.5, 0, 0}), 0);
   EXPECT_LT(value(distance, {0.02, 0, 0}), 0) << "inside of one, beside the other's surface";
   EXPECT_GT(value(distance, {2.5, 0, 0}), 0);
 }
 
-TEST(Sign, OfABodyWithinAnotherIsThatOfTheOuter) {
+TEST(InsideTest, OfABodyWithinAnotherIsThatOfTheOuter) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance solid(joined(ball, moved(ball, Vector3::Zero(), 0.5)), kAutomatic);
-  EXPECT_EQ(solid.signChoice().sign, Sign::winding);
-  EXPECT_THAT(solid.signChoice().reason, testing::HasSubstr("lies within another"));
+  EXPECT_EQ(solid.insideTestChoice().insideTest, InsideTest::winding);
+  EXPECT_THAT(solid.insideTestChoice().reason, testing::HasSubstr("lies within another"));
   EXPECT_LT(value(solid, {0.55, 0, 0}), 0);
   const ExactDistance hollow(joined(ball, turned(moved(ball, Vector3::Zero(), 0.5))), kAutomatic);
-  EXPECT_EQ(hollow.signChoice().sign, Sign::pseudonormal);
+  EXPECT_EQ(hollow.insideTestChoice().insideTest, InsideTest::pseudonormal);
   EXPECT_GT(value(hollow, {0.3, 0, 0}), 0);
 }
 
-TEST(Sign, OfBodiesSideBySideIsThePseudonormals) {
+TEST(InsideTest, OfBodiesSideBySideIsThePseudonormals) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=2");
   const TriangleMesh mesh = joined(ball, joined(moved(ball, {3, 0, 0}), moved(ball, {0, 3, 0}, 0.1)));
-  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
-  EXPECT_EQ(distance.signChoice().sign, Sign::pseudonormal);
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
 /// Two boxes with an edge in common, welded: four faces there, whose normals cancel.
-TEST(Sign, OfBodiesThatShareAnEdgeIsCertainToo) {
+TEST(InsideTest, OfBodiesThatShareAnEdgeIsCertainToo) {
   const TriangleMesh box = shapes::mesh("box,width=2,height=2,depth=2");
   const TriangleMesh mesh = cleaned(joined(box, moved(box, {2, 2, 0}))).mesh;
-  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
+  const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
   EXPECT_GT(inspect(mesh).nonManifoldEdges, 0u);
-  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
 /// A vertex pushed through the other side: the spike that it makes there is inside out, and misleads normals around it.
-TEST(Sign, IsRightWhereAClosedMeshFoldsOver) {
+TEST(InsideTest, IsRightWhereAClosedMeshFoldsOver) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
   const std::uint32_t vertex = mesh.triangles[100][0];
   mesh.vertices[vertex] *= -1.5;
-  const ExactDistance distance(mesh, kAutomatic), byNormals(mesh, {.sign = Sign::pseudonormal});
-  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
+  const ExactDistance distance(mesh, kAutomatic), byNormals(mesh, {.insideTest = InsideTest::pseudonormal});
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> u(-0.5, 0.5);
   int misled = 0;
@@ -225,11 +225,12 @@ TEST(Sign, IsRightWhereAClosedMeshFoldsOver) {
   EXPECT_GT(misled, 0) << "else this tells nothing";
 }
 
-TEST(Sign, HolesAreClosedWithoutAJump) {
+TEST(InsideTest, HolesAreClosedWithoutAJump) {
   const TriangleMesh mesh = openBox();
   const ExactDistance distance(mesh, kAutomatic);
-  EXPECT_EQ(distance.signChoice().sign, Sign::winding);
-  EXPECT_THAT(distance.signChoice().reason, testing::StartsWith("4 edges have a side without a neighbour, and holes"));
+  EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
+  EXPECT_THAT(distance.insideTestChoice().reason,
+              testing::StartsWith("4 edges have a side without a neighbour, and holes"));
   EXPECT_LT(value(distance, {0, 0, 0}), -0.9);
   EXPECT_GT(value(distance, {0, 0, 3}), 0.5);
   EXPECT_GT(value(distance, {0, 0, -1.5}), 0.49);
@@ -251,14 +252,14 @@ TEST(Sign, HolesAreClosedWithoutAJump) {
   EXPECT_LT(least, -0.5);
 }
 
-TEST(Sign, AFieldOfAnOpenMeshChasesNoJump) {
+TEST(InsideTest, AFieldOfAnOpenMeshChasesNoJump) {
   const TriangleMesh mesh = openBox();
   const BuildOptions options{.targetError = 1e-5};
   const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
   const Field unsignedField =
-      build(ExactDistance(mesh, {.sign = Sign::shell, .thickness = 1e-9}), domainAround(mesh), options);
+      build(ExactDistance(mesh, {.insideTest = InsideTest::shell, .thickness = 1e-9}), domainAround(mesh), options);
   // the winding number's sign, and no patch
-  const ExactDistance byNormals(mesh, {.sign = Sign::pseudonormal}), byWinding(mesh, kAutomatic);
+  const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal}), byWinding(mesh, kAutomatic);
   const auto jump = [&](const Vector3& x) { return std::copysign(byNormals(x), byWinding(x)); };
   BuildOptions asLong = options;
   asLong.maxSteps = field.metadata().steps;
@@ -266,15 +267,15 @@ TEST(Sign, AFieldOfAnOpenMeshChasesNoJump) {
   EXPECT_LT(field.data().nodes.size(), unsignedField.data().nodes.size());
   EXPECT_LT(field.metadata().totalError, 1e-5);
   EXPECT_GT(jumping.metadata().totalError, 1e-4) << "else this tells nothing";
-  EXPECT_EQ(field.metadata().source.sign, Sign::winding);
+  EXPECT_EQ(field.metadata().source.insideTest, InsideTest::winding);
 }
 
-TEST(Sign, OneAndManyAreTheSameToTheBit) {
+TEST(InsideTest, OneAndManyAreTheSameToTheBit) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh torn = withHoles(shapes::mesh("builtin:sphere,subdivisions=4"), 7);
   for (const TriangleMesh& mesh : {openBox(), torn, joined(ball, moved(ball, {1, 0, 0}))}) {
     const ExactDistance distance(mesh, kAutomatic);
-    ASSERT_EQ(distance.signChoice().sign, Sign::winding);
+    ASSERT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
     for (const double size : {2.0, 0.3, 0.01}) {  // of the places' box: the smaller, the more they tell each other
       const Box box(Vector3(0.9, 0.2, 0.95), Vector3(0.9, 0.2, 0.95) + Vector3::Constant(size));
       std::vector<Vector3> places = placesIn(box, 700);
@@ -289,23 +290,23 @@ TEST(Sign, OneAndManyAreTheSameToTheBit) {
   }
 }
 
-TEST(Sign, OfAShellIsBelowZeroInTheWallAlone) {
+TEST(InsideTest, OfAShellIsBelowZeroInTheWallAlone) {
   TriangleMesh sheet;
   sheet.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
   const ExactDistance plain(sheet, kAutomatic);
-  EXPECT_THAT(plain.signChoice().reason, testing::HasSubstr("surround nothing"));
-  const ExactDistance shell(sheet, {.sign = Sign::shell, .thickness = 0.1});
+  EXPECT_THAT(plain.insideTestChoice().reason, testing::HasSubstr("surround nothing"));
+  const ExactDistance shell(sheet, {.insideTest = InsideTest::shell, .thickness = 0.1});
   EXPECT_EQ(value(shell, {0, 0, 0}), -0.05);
   EXPECT_DOUBLE_EQ(value(shell, {0, 0, -0.5}), 0.45);
   EXPECT_DOUBLE_EQ(shell.closestPoint({0, 0, 0.5}).signedDistance, 0.45);
   EXPECT_EQ(shell.source().thickness, 0.1);
-  EXPECT_THROW(ExactDistance(sheet, {.sign = Sign::shell}), Error);
+  EXPECT_THROW(ExactDistance(sheet, {.insideTest = InsideTest::shell}), Error);
   EXPECT_THROW(ExactDistance(sheet, {.thickness = 0.1}), Error);
-  EXPECT_THROW(ExactDistance(sheet, {.sign = Sign::shell, .thickness = HUGE_VAL}), Error);
+  EXPECT_THROW(ExactDistance(sheet, {.insideTest = InsideTest::shell, .thickness = HUGE_VAL}), Error);
 }
 
-TEST(Sign, IsTheSameAtAnyScale) {
+TEST(InsideTest, IsTheSameAtAnyScale) {
   const TriangleMesh mesh = openBox();
   const std::vector<Vector3> places = placesIn(boundingBox(mesh), 300);
   const ExactDistance plain(mesh, kAutomatic);
@@ -315,7 +316,7 @@ TEST(Sign, IsTheSameAtAnyScale) {
   }
 }
 
-TEST(Sign, IsCheckedAgainstTheWholeSum) {
+TEST(InsideTest, IsCheckedAgainstTheWholeSum) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(ball, moved(ball, {1, 0, 0}));
   for (const Vector3& x : placesIn(boundingBox(mesh), 50))
@@ -325,7 +326,7 @@ TEST(Sign, IsCheckedAgainstTheWholeSum) {
   EXPECT_EQ(right.places, 4000u);
   EXPECT_LT(right.tooNear, 100u);
   // What is inside of one looks outside to normals, beside the surface of the other.
-  const ExactDistance byNormals(mesh, {.sign = Sign::pseudonormal});
+  const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal});
   const SignCheck wrong = checkSign(mesh, byNormals, 4000), other = checkSign(mesh, byNormals, 4000, 2);
   EXPECT_GT(wrong.wrong, 100u);
   EXPECT_GT(wrong.depth, 0.1);
@@ -339,7 +340,7 @@ TEST(Sign, IsCheckedAgainstTheWholeSum) {
   EXPECT_THROW(checkSign(ball, ExactDistance(ball), 1'000'000'000'000'000, 1, {{}, [] { return true; }}), Cancelled);
 }
 
-TEST(Sign, IsCheckedOfAMeshThatLooksInwards) {
+TEST(InsideTest, IsCheckedOfAMeshThatLooksInwards) {
   const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
   EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 2000).wrong, 0u);
 }
@@ -352,7 +353,7 @@ TriangleMesh partBeforeWall(double gap) {
   return joined(moved(boxOfTwo(), {1, 0, 0}), part);
 }
 
-TEST(Sign, IsRightHoweverNearWallsCome) {
+TEST(InsideTest, IsRightHoweverNearWallsCome) {
   int misled = 0;
   for (const double gap : {1e-6, 1e-10, 1e-12, 1e-14, 1e-15, 1e-16, 1e-17, 1e-20}) {
     const TriangleMesh nested = partBeforeWall(gap);
@@ -362,26 +363,26 @@ TEST(Sign, IsRightHoweverNearWallsCome) {
       if (v.x() == 1 + gap - 1) v.x() = gap;  // representable near 0 alone
     for (const TriangleMesh& mesh : {nested, far}) {
       EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 3000).wrong, 0u) << gap;
-      misled += checkSign(mesh, ExactDistance(mesh, {.sign = Sign::pseudonormal}), 3000).wrong > 0;
+      misled += checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong > 0;
     }
   }
   EXPECT_GT(misled, 8) << "else this tells nothing";
 }
 
-TEST(Sign, IsRightBesideFacesThinnerThanRounding) {
+TEST(InsideTest, IsRightBesideFacesThinnerThanRounding) {
   TriangleMesh needle;
   needle.vertices = {{0.5, 0, 0}, {0.5 + 6e-8, 0, 0}, {0.5, 1e-16, 0}, {0.5, 0, 1e-16}};
   needle.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   const TriangleMesh mesh = cleaned(joined(boxOfTwo(), needle)).mesh;
   ASSERT_EQ(mesh.triangles.size(), 16u) << "else this tells nothing";
   const ExactDistance distance(mesh);
-  EXPECT_THAT(distance.signChoice().reason, testing::HasSubstr("thinner"));
+  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("thinner"));
   EXPECT_EQ(checkSign(mesh, distance, 3000).wrong, 0u);
-  EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.sign = Sign::pseudonormal}), 3000).wrong, 0u);
+  EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong, 0u);
 }
 
 /// A blade along z, its edge at x = 1: beyond that edge all is outside, however little.
-TEST(Sign, IsRightBesideBlades) {
+TEST(InsideTest, IsRightBesideBlades) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(-1, 1), exponent(-18, -1);
   for (const double half : {1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3}) {
@@ -390,7 +391,8 @@ TEST(Sign, IsRightBesideBlades) {
         .triangles = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}, {2, 0, 3}, {2, 3, 5}},
         .name = "blade"};
     const ExactDistance distance(blade);
-    EXPECT_EQ(distance.signChoice().sign, half < 1e-6 ? Sign::winding : Sign::pseudonormal) << half;
+    EXPECT_EQ(distance.insideTestChoice().insideTest, half < 1e-6 ? InsideTest::winding : InsideTest::pseudonormal)
+        << half;
     std::size_t inside = 0;
     for (int i = 0; i < 20000; ++i) {
       const Vector3 x(1 + std::pow(10, exponent(random)), 0.3 * uniform(random), 0.9 * uniform(random));
@@ -400,7 +402,7 @@ TEST(Sign, IsRightBesideBlades) {
   }
 }
 
-TEST(Sign, OfBodiesThatShareAnEdgeIsTurnedToo) {
+TEST(InsideTest, OfBodiesThatShareAnEdgeIsTurnedToo) {
   const ImportedMesh inward = cleaned(turned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))));
   EXPECT_TRUE(inward.report.turned);
   EXPECT_EQ(inward.report.unbalancedEdges, 0u);
@@ -425,13 +427,13 @@ TEST(AngleSum, CountsTurns) {
 }
 
 /// Real meshes, closed and broken, at fewer places than `hpsdf mesh --check-sign` takes.
-TEST(Sign, OfRealMeshesIsTheWindingNumbers) {
+TEST(InsideTest, OfRealMeshesIsTheWindingNumbers) {
   HPSDF_SKIP_WITHOUT_MESHES();
   for (const char* name : {"cad/cube_12.obj", "cad/fandisk.obj", "cad/wingnut.obj", "cad/1002_tray_bottom.STL",
                            "paper/finger_skeletonhand_part.ply", "broken/self_intersectA.obj", "broken/teapot.obj",
                            "broken/suzanne.obj", "broken/mp_bed.obj", "broken/Generic_Twin_7081_left.obj"}) {
     const TriangleMesh mesh = importMesh(support::testMesh(name)).mesh;
-    const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.sign = Sign::winding});
+    const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
     for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
       if (std::abs(distance(x)) < 1e-6 * boundingBox(mesh).sizes().maxCoeff()) continue;
       const bool inside = sumOfAngles(mesh, x) > 0.5;

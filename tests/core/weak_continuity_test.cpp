@@ -6,9 +6,9 @@
 #include <random>
 
 #include "basis/projection.h"
-#include "field/evaluate.h"
-#include "field/face_coupling.h"
-#include "field/float_coefficients.h"
+#include "field/continuity/face_coupling.h"
+#include "field/query/evaluate.h"
+#include "field/query/float_coefficients.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/error.h"

@@ -1,5 +1,5 @@
 // The JSON beside a baseline: what is read is written and read again.
-#include "baseline.h"
+#include "check/baseline.h"
 
 #include "target.h"
 

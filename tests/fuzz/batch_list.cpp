@@ -1,5 +1,5 @@
 // The list of `hpsdf build --batch`: each mesh once, under a name that stays in its folder and is of the line alone.
-#include "batch_list.h"
+#include "batch/batch_list.h"
 
 #include <algorithm>
 #include <cctype>

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "hpsdf/checkpoint.h"
+#include "hpsdf/build.h"
 
 namespace hpsdf::fuzz {
 

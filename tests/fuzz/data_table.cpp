@@ -1,6 +1,6 @@
 // Raw values that `hpsdf check` compares, .pfm where they begin like one, else .csv: rows times columns of them, which
 // equal themselves.
-#include "data_table.h"
+#include "files/data_table.h"
 
 #include "target.h"
 

@@ -1,5 +1,5 @@
 // What `expect` says of figures: it holds of the number that it names, or it does not, as its comparison wants.
-#include "expectation.h"
+#include "language/expectation.h"
 
 #include <algorithm>
 #include <string>

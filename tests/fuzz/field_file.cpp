@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "current_field.h"
-#include "hpsdf/line.h"
+#include "hpsdf/detail/line.h"
 #include "hpsdf/safe_distance.h"
-#include "summaries.h"
+#include "language/summaries.h"
+#include "session/current_field.h"
 #include "target.h"
 
 namespace {

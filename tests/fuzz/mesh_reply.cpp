@@ -1,5 +1,5 @@
 // The answer of the process that reads a mesh file: what is taken is written again as it was.
-#include "mesh_reply.h"
+#include "construction/mesh_reply.h"
 
 #include <xxhash.h>
 

@@ -1,9 +1,9 @@
 // A script: read and checked as `hpsdf run` does before its first line runs; nothing is run.
-#include "script.h"
+#include "language/script.h"
 
 #include <string>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "target.h"
 
 namespace {

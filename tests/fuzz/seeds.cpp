@@ -9,10 +9,10 @@
 #include <string>
 
 #include "checkpoint.h"
+#include "construction/mesh_reply.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
-#include "mesh_reply.h"
 #include "target.h"
 
 namespace {
@@ -32,7 +32,7 @@ void writeFields(const fs::path& folder) {
     BuildOptions options = plain;
     change(options);
     Source source{"sphere.obj", 7, 8, 12, fuzz::domain()};
-    source.sign = Sign::pseudonormal;
+    source.insideTest = InsideTest::pseudonormal;
     save(build(DistanceFunction(fuzz::sphere, source), fuzz::domain(), options), folder / (name + ".hpsdf"));
   };
   add("double", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::float64; });

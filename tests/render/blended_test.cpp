@@ -10,10 +10,10 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
-#include "node_bounds.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
-#include "zone_bounds.h"
+#include "view/blend_zone_bounds.h"
+#include "view/surface_bounds.h"
 
 namespace hpsdf::render {
 namespace {

@@ -17,13 +17,13 @@
 #include <string>
 #include <vector>
 
-#include "body_meshes.h"
-#include "color_view.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/shapes.h"
+#include "picture/color_view.h"
 #include "support/require_gl.h"
+#include "view/body_meshes.h"
 
 namespace hpsdf::render {
 namespace {

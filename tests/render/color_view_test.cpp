@@ -1,4 +1,4 @@
-#include "color_view.h"
+#include "picture/color_view.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "colormap.h"
+#include "image/colormap.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "cracks.h"
+#include "picture/cracks.h"
 
 namespace hpsdf::render {
 namespace {

@@ -1,11 +1,11 @@
-#include "cracks.h"
+#include "picture/cracks.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <utility>
 
-#include "view_buffers.h"
+#include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace {

@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "legend.h"
+#include "picture/legend.h"
 
 namespace hpsdf::render {
 
 /// Nothing beyond the picture; texts large enough, and apart from each other.
-inline void expectReadable(const Furniture& furniture, const Frame& frame, const std::string& what) {
+inline void expectReadable(const Overlay& overlay, const Frame& frame, const std::string& what) {
   const PixelRect whole = {0, 0, frame.width, frame.height};
   std::vector<PixelRect> boxes;
-  for (const TextItem& item : furniture.texts) {
+  for (const TextItem& item : overlay.texts) {
     const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
     EXPECT_TRUE(whole.contains(ink)) << what << ": \"" << item.text << "\" is cut";
     EXPECT_GE(item.size, 7.9) << what << ": \"" << item.text << "\" cannot be read";
@@ -23,8 +23,8 @@ inline void expectReadable(const Furniture& furniture, const Frame& frame, const
   for (std::size_t i = 0; i < boxes.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)
       EXPECT_FALSE(boxes[i].overlaps(boxes[k]))
-          << what << ": \"" << furniture.texts[i].text << "\" lies on \"" << furniture.texts[k].text << "\"";
-  for (const BoxItem& box : furniture.boxes) {
+          << what << ": \"" << overlay.texts[i].text << "\" lies on \"" << overlay.texts[k].text << "\"";
+  for (const BoxItem& box : overlay.boxes) {
     EXPECT_GE(box.x0, 0) << what;
     EXPECT_GE(box.y0, 0) << what;
     EXPECT_LE(box.x1, frame.width) << what;
@@ -33,9 +33,9 @@ inline void expectReadable(const Furniture& furniture, const Frame& frame, const
 }
 
 /// Also no text in the view.
-inline void expectTidy(const Furniture& furniture, const Frame& frame, const std::string& what) {
-  expectReadable(furniture, frame, what);
-  for (const TextItem& item : furniture.texts) {
+inline void expectTidy(const Overlay& overlay, const Frame& frame, const std::string& what) {
+  expectReadable(overlay, frame, what);
+  for (const TextItem& item : overlay.texts) {
     const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
     EXPECT_TRUE(frame.panel.contains(ink) || frame.caption.contains(ink)) << what << ": \"" << item.text << "\" strays";
   }

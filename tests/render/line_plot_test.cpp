@@ -7,10 +7,10 @@
 #include <set>
 #include <string>
 
-#include "color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
-#include "line_layout.h"
+#include "picture/color_view.h"
+#include "picture/line_layout.h"
 #include "support/random_field.h"
 
 namespace hpsdf::render {
@@ -35,7 +35,7 @@ std::vector<double> exactAlong(const Line& line) {
 
 std::set<std::string> textsOf(const LineLayout& layout) {
   std::set<std::string> texts;
-  for (const TextItem& item : layout.furniture.texts) texts.insert(item.text);
+  for (const TextItem& item : layout.overlay.texts) texts.insert(item.text);
   return texts;
 }
 
@@ -72,7 +72,7 @@ TEST(LinePlot, EachNumberStandsAtItsLevel) {
   const LineLayout layout = layOutLine(frame(1280, 720), field, line, {});
   const PixelRect& chart = layout.charts[0];
   const auto rowOf = [&](const std::string& text) {
-    for (const TextItem& item : layout.furniture.texts) {
+    for (const TextItem& item : layout.overlay.texts) {
       const double row = item.baseline - capHeight(item.size) / 2;
       if (item.text == text && item.x < chart.x0 && row > chart.y0 && row < chart.y1) return row;
     }
@@ -147,7 +147,7 @@ TEST(LinePlot, NothingIsCutOrOverlapsAtAnySize) {
         for (const bool known : {true, false}) {
           const LineLayout layout = layOutLine(f, field, line, known ? exact : std::vector<double>{});
           const std::string what = std::to_string(width) + "x" + std::to_string(height);
-          expectReadable(layout.furniture, f, what);
+          expectReadable(layout.overlay, f, what);
           ASSERT_FALSE(layout.charts.empty());
           for (std::size_t n = 0; n < layout.charts.size(); ++n) {
             const PixelRect& chart = layout.charts[n];
@@ -155,7 +155,7 @@ TEST(LinePlot, NothingIsCutOrOverlapsAtAnySize) {
             EXPECT_FALSE(chart.empty()) << what;
             EXPECT_GE(chart.width(), width / 8) << what;
             for (std::size_t k = 0; k < n; ++k) EXPECT_FALSE(chart.overlaps(layout.charts[k])) << what;
-            for (const TextItem& item : layout.furniture.texts)
+            for (const TextItem& item : layout.overlay.texts)
               EXPECT_FALSE(chart.overlaps(measureText(item.text, item.size, item.x, item.baseline).ink))
                   << what << ": \"" << item.text << "\" covers a curve";
           }

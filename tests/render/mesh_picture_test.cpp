@@ -16,9 +16,9 @@
 
 #include "expect_tidy.h"
 #include "hpsdf/build.h"
-#include "hpsdf/crossings.h"
+#include "hpsdf/detail/crossings.h"
 #include "hpsdf/error.h"
-#include "marks.h"
+#include "picture/defect_marks.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 
@@ -249,12 +249,12 @@ TEST(MeshPicture, LegendIsTidyAtAnySize) {
   for (const auto& [width, height] : {std::pair(200, 140), std::pair(320, 240), std::pair(400, 800),
                                       std::pair(640, 360), std::pair(1280, 720), std::pair(3840, 2160)}) {
     const Frame frame = render::frame(width, height);
-    Furniture furniture;
-    addSwatches(furniture, frame, titles, defectSwatches(defects));
-    expectTidy(furniture, frame, std::to_string(width));
-    for (const TextItem& item : furniture.texts) EXPECT_FALSE(item.text.ends_with("…")) << width << ": " << item.text;
+    Overlay overlay;
+    addSwatches(overlay, frame, titles, defectSwatches(defects));
+    expectTidy(overlay, frame, std::to_string(width));
+    for (const TextItem& item : overlay.texts) EXPECT_FALSE(item.text.ends_with("…")) << width << ": " << item.text;
     if (width >= 640) {
-      EXPECT_EQ(furniture.texts.size(), 11u) << width;
+      EXPECT_EQ(overlay.texts.size(), 11u) << width;
     }
   }
 }

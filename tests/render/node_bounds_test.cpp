@@ -1,5 +1,3 @@
-#include "node_bounds.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -9,6 +7,7 @@
 #include <random>
 
 #include "support/random_field.h"
+#include "view/surface_bounds.h"
 
 namespace hpsdf::render {
 namespace {

@@ -9,10 +9,10 @@
 #include <set>
 #include <tuple>
 
-#include "color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
-#include "legend.h"
+#include "picture/color_view.h"
+#include "picture/legend.h"
 
 namespace hpsdf::render {
 namespace {
@@ -223,14 +223,14 @@ TEST(Picture, TheScaleOfOnePictureServesAnother) {
   const Field field = planeField({2, 3, 5}), other = planeField({3, 3, 4});
   FakeRenderer renderer(field), otherRenderer(other);
   const DistanceFunction exact{[](const Vector3& x) { return 3 * x.x(); }};
-  const Evidence evidence{.exact = &exact};
+  const ReferenceData reference{.exact = &exact};
   for (const ColorBy color : {ColorBy::degree, ColorBy::depth, ColorBy::distance, ColorBy::error, ColorBy::slope}) {
     SlicePicture picture = slice(color);
     picture.scale.logarithmic = false;
-    const Drawn first = drawSlice(renderer, field, picture, evidence);
+    const Drawn first = drawSlice(renderer, field, picture, reference);
     picture.scale = first.scale;
-    EXPECT_EQ(drawSlice(renderer, field, picture, evidence).image.pixels, first.image.pixels);
-    const Drawn second = drawSlice(otherRenderer, other, picture, evidence);
+    EXPECT_EQ(drawSlice(renderer, field, picture, reference).image.pixels, first.image.pixels);
+    const Drawn second = drawSlice(otherRenderer, other, picture, reference);
     EXPECT_EQ(second.scale.limits, first.scale.limits);
     EXPECT_EQ(first.scale.limits.has_value(), color == ColorBy::distance || isQuantity(color));
     if (color == ColorBy::degree) {
@@ -249,11 +249,11 @@ TEST(Picture, TheScaleOfOnePictureServesAnother) {
 
 TEST(Picture, LegendNamesEachLevelAndItsShare) {
   const std::map<int, double> shares = {{2, 0.14}, {3, 0.6396}, {5, 0.22}, {12, 0.0004}};
-  Furniture furniture;
+  Overlay overlay;
   static const std::string titles[] = {"polynomial degree", "degree"};
-  addLevelLegend(furniture, frame(1280, 720), titles, shares, LevelMap(std::vector<int>{2, 3, 5, 12}));
+  addLevelLegend(overlay, frame(1280, 720), titles, shares, LevelMap(std::vector<int>{2, 3, 5, 12}));
   std::vector<std::string> texts;
-  for (const TextItem& item : furniture.texts) texts.push_back(item.text);
+  for (const TextItem& item : overlay.texts) texts.push_back(item.text);
   EXPECT_EQ(texts, (std::vector<std::string>{"polynomial degree", "share of the volume", "12", "<0.1 %", "5", "22.0 %",
                                              "3", "64.0 %", "2", "14.0 %"}));
 }
@@ -485,41 +485,41 @@ TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
       for (int level = 0; level < count; ++level) shares[level] = 1.0 / count;
       std::vector<int> levels(count);
       std::iota(levels.begin(), levels.end(), 0);
-      Furniture furniture;
-      addLevelLegend(furniture, f, titles, shares, LevelMap(levels));
-      const auto swatches = furniture.boxes.size();
+      Overlay overlay;
+      addLevelLegend(overlay, f, titles, shares, LevelMap(levels));
+      const auto swatches = overlay.boxes.size();
       EXPECT_GE(swatches, f.panel.empty() ? 0U : std::size_t(count)) << size;
-      addCaption(furniture, f, count % 2 ? longName : "bunny.obj", details);
-      expectTidy(furniture, f, size + ", " + std::to_string(count) + " levels");
+      addCaption(overlay, f, count % 2 ? longName : "bunny.obj", details);
+      expectTidy(overlay, f, size + ", " + std::to_string(count) + " levels");
     }
     for (double high : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9})
       for (double ratio : {1e-6, 0.02, 0.7})
         for (bool logarithmic : {false, true}) {
-          Furniture furniture;
-          addScaleBar(furniture, f, titles, ColorScale(ratio * high, high, logarithmic));
-          expectTidy(furniture, f, size + ", scale up to " + std::to_string(high));
+          Overlay overlay;
+          addScaleBar(overlay, f, titles, ColorScale(ratio * high, high, logarithmic));
+          expectTidy(overlay, f, size + ", scale up to " + std::to_string(high));
           if (f.panel.empty() || f.panel.height() < 100) continue;
-          EXPECT_GE(furniture.texts.size(), 3U) << size << ": hardly a number beside the scale up to " << high;
+          EXPECT_GE(overlay.texts.size(), 3U) << size << ": hardly a number beside the scale up to " << high;
         }
     for (double range : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9}) {
-      Furniture furniture;
-      addDistanceBar(furniture, f, distanceScale(-0.3 * range, range));
-      expectTidy(furniture, f, size + ", range " + std::to_string(range));
+      Overlay overlay;
+      addDistanceBar(overlay, f, distanceScale(-0.3 * range, range));
+      expectTidy(overlay, f, size + ", range " + std::to_string(range));
       if (f.panel.empty() || f.panel.height() < 100) continue;
-      EXPECT_GE(furniture.texts.size(), 4U) << size << ": hardly a number beside the bar for range " << range;
-      for (const TextItem& item : furniture.texts) EXPECT_EQ(item.text.find("…"), std::string::npos) << item.text;
+      EXPECT_GE(overlay.texts.size(), 4U) << size << ": hardly a number beside the bar for range " << range;
+      for (const TextItem& item : overlay.texts) EXPECT_EQ(item.text.find("…"), std::string::npos) << item.text;
     }
     // close looks, far from the surface: very many lines within the range
     for (const double spread : {7e-2, 7e-3, 7e-5, 1e-16}) {
-      Furniture furniture;
-      addDistanceBar(furniture, f, distanceScale(0.4648, 0.4648 + spread));
-      expectTidy(furniture, f, size + ", spread " + std::to_string(spread));
-      EXPECT_LT(furniture.boxes.size(), std::size_t(3 * f.height)) << size << ": all lines drawn";
+      Overlay overlay;
+      addDistanceBar(overlay, f, distanceScale(0.4648, 0.4648 + spread));
+      expectTidy(overlay, f, size + ", spread " + std::to_string(spread));
+      EXPECT_LT(overlay.boxes.size(), std::size_t(3 * f.height)) << size << ": all lines drawn";
     }
-    Furniture furniture;
-    addFacts(furniture, f, titles, facts);
-    addCaption(furniture, f, "", {});
-    expectTidy(furniture, f, size + ", facts");
+    Overlay overlay;
+    addFacts(overlay, f, titles, facts);
+    addCaption(overlay, f, "", {});
+    expectTidy(overlay, f, size + ", facts");
   }
 }
 
@@ -538,9 +538,9 @@ TEST(Layout, NarrowPicturesKeepALegend) {
 
 constexpr Color kBlank = {250, 250, 248};
 
-Image painted(const Furniture& furniture, const Frame& f) {
+Image painted(const Overlay& overlay, const Frame& f) {
   Image image(f.width, f.height, kBlank);
-  paint(image, furniture);
+  paint(image, overlay);
   return image;
 }
 
@@ -568,12 +568,12 @@ TEST(Layout, EachLevelsNumberStandsAtItsColor) {
     std::vector<int> levels;
     for (int level = 0; level < count; ++level) shares[level] = 1.0 / count, levels.push_back(level);
     const LevelMap map(levels);
-    Furniture furniture;
-    addLevelLegend(furniture, f, titles, shares, map);
-    const Image image = painted(furniture, f);
-    const int swatch = static_cast<int>(furniture.boxes.front().x0) + 1;
+    Overlay overlay;
+    addLevelLegend(overlay, f, titles, shares, map);
+    const Image image = painted(overlay, f);
+    const int swatch = static_cast<int>(overlay.boxes.front().x0) + 1;
     std::set<int> seen;
-    for (const TextItem& item : furniture.texts) {
+    for (const TextItem& item : overlay.texts) {
       const auto level = numberOf(item.text);
       if (!level) continue;
       EXPECT_EQ(image.at(swatch, int(middleOf(item))), encodeSrgb(map(int(*level)))) << item.text << " of " << count;
@@ -589,18 +589,18 @@ TEST(Layout, EachDistancesNumberStandsAtItsColor) {
     for (const DistanceScale& scale : {distanceScale(-0.4, 1.1), distanceScale(-3e4, 1e3), distanceScale(1e-6, 2e-5),
                                        distanceScale(0.4648, 0.4715)}) {
       const Frame f = frame(width, height);
-      Furniture furniture;
-      addDistanceBar(furniture, f, scale);
-      const Image image = painted(furniture, f);
+      Overlay overlay;
+      addDistanceBar(overlay, f, scale);
+      const Image image = painted(overlay, f);
       std::vector<std::pair<double, double>> labels;  // value and row
-      for (const TextItem& item : furniture.texts)
+      for (const TextItem& item : overlay.texts)
         if (const auto value = numberOf(item.text)) labels.emplace_back(*value, middleOf(item));
       ASSERT_GE(labels.size(), 3U);
       std::ranges::sort(labels);
       const auto [lowest, bottom] = labels.front();
       const auto [highest, top] = labels.back();
       EXPECT_GT(bottom, top) << "outside is above";
-      const int bar = static_cast<int>(furniture.boxes.front().x0) + 2;
+      const int bar = static_cast<int>(overlay.boxes.front().x0) + 2;
       for (const auto& [value, row] : labels)
         for (int beside : {-3, 3}) {  // the line itself covers the label's own row
           const int y = static_cast<int>(std::floor(row)) + beside;
@@ -621,13 +621,13 @@ TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
     const PixelRect band = {0, h / 4, w, 3 * h / 4};  // zoomed: from edge to edge
     const PixelRect flat = {w / 40, h / 4, w - w / 40, 3 * h / 4}, full = {w / 40, h / 40, w - w / 40, h - h / 40};
     for (const PixelRect& section : {middle, band, flat, full, f.view}) {
-      Furniture furniture;
-      addAxes(furniture, f, section, 'x', 'z');
-      ASSERT_EQ(furniture.texts.size(), 2U) << width << "x" << height;
-      const bool plate = furniture.boxes.front().color == kBlank;
+      Overlay overlay;
+      addAxes(overlay, f, section, 'x', 'z');
+      ASSERT_EQ(overlay.texts.size(), 2U) << width << "x" << height;
+      const bool plate = overlay.boxes.front().color == kBlank;
       EXPECT_EQ(plate, section == full || section == f.view) << width << "x" << height;
-      const BoxItem& ground = furniture.boxes.front();
-      for (const TextItem& item : furniture.texts) {
+      const BoxItem& ground = overlay.boxes.front();
+      for (const TextItem& item : overlay.texts) {
         const PixelRect ink = measureText(item.text, item.size, item.x, item.baseline).ink;
         EXPECT_TRUE(f.view.contains(ink));
         EXPECT_GE(item.size, 7.9);
@@ -637,19 +637,19 @@ TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
         else
           EXPECT_FALSE(section.overlaps(ink)) << "covers the slice";
       }
-      for (const BoxItem& box : furniture.boxes) {
+      for (const BoxItem& box : overlay.boxes) {
         EXPECT_TRUE(box.x0 >= 0 && box.y0 >= 0 && box.x1 <= w && box.y1 <= h);
         const PixelRect pixels = {int(box.x0), int(box.y0), int(std::ceil(box.x1)), int(std::ceil(box.y1))};
         EXPECT_TRUE(plate || !section.overlaps(pixels)) << "covers the slice";
       }
-      const TextItem &right = furniture.texts[0], &up = furniture.texts[1];
+      const TextItem &right = overlay.texts[0], &up = overlay.texts[1];
       EXPECT_EQ(right.text, "x");
       EXPECT_EQ(up.text, "z");
       EXPECT_GT(right.x, up.x + up.size);
       EXPECT_GT(right.baseline, up.baseline + up.size);
     }
   }
-  Furniture none;
+  Overlay none;
   addAxes(none, frame(64, 64), {2, 2, 62, 62}, 'x', 'y');
   EXPECT_TRUE(none.boxes.empty() && none.texts.empty());
 }
@@ -673,9 +673,9 @@ TEST(Picture, SlicesAlongAnAxisNameTheAxesAcross) {
       for (int x = 0; x < buffers.width; ++x)
         if (buffers.hit(std::size_t(y) * buffers.width + x))
           section = {std::min(section.x0, x), std::min(section.y0, y), std::max(section.x1, x + 1), y + 1};
-    Furniture furniture;
-    if (axes != nullptr) addAxes(furniture, f, section, axes[0], axes[1]);
-    EXPECT_EQ(leftOf(draw(renderer, field, picture), section.x0), leftOf(painted(furniture, f), section.x0))
+    Overlay overlay;
+    if (axes != nullptr) addAxes(overlay, f, section, axes[0], axes[1]);
+    EXPECT_EQ(leftOf(draw(renderer, field, picture), section.x0), leftOf(painted(overlay, f), section.x0))
         << (axes == nullptr ? "none" : axes);
   };
   for (int axis = 0; axis < 3; ++axis) {
@@ -734,11 +734,11 @@ TEST(Surface, SaysWhetherTheWallsCutIt) {
 
 TEST(Layout, CaptionsKeepWhatFits) {
   const std::vector<std::string> details = {"distance", std::string(200, 'x'), "7 cells"};
-  Furniture furniture;
-  addCaption(furniture, frame(320, 240), "bunny.obj", details);
-  ASSERT_EQ(furniture.texts.size(), 2U);
-  EXPECT_EQ(furniture.texts[0].text, "bunny.obj");
-  EXPECT_EQ(furniture.texts[1].text, "distance · 7 cells");
+  Overlay overlay;
+  addCaption(overlay, frame(320, 240), "bunny.obj", details);
+  ASSERT_EQ(overlay.texts.size(), 2U);
+  EXPECT_EQ(overlay.texts[0].text, "bunny.obj");
+  EXPECT_EQ(overlay.texts[1].text, "distance · 7 cells");
 }
 
 TEST(Layout, NumbersAreWrittenAsReadersExpect) {

@@ -1,4 +1,4 @@
-#include "quantity.h"
+#include "picture/quantity.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ struct Seen {
   Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
   Jumps jumps = findJumps(field);
   DistanceFunction exact{[](const Vector3& x) { return x.norm() - 0.5; }};
-  Evidence evidence{&jumps, &exact};
+  ReferenceData reference{&jumps, &exact};
 };
 
 Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
@@ -26,7 +26,7 @@ TEST(Quantity, OfASliceIsThatOfItsPoints) {
   const Seen seen;
   const SliceView view = planeSlice(seen.field.domain(), {0.1, 0, 0.05}, {1, 2, 3}, 60, 40);
   const ViewBuffers buffers = makeCpuRenderer(seen.field)->slice(view, 60, 40);
-  const auto at = [&](ColorBy quantity) { return quantityAt(seen.field, view, buffers, quantity, seen.evidence); };
+  const auto at = [&](ColorBy quantity) { return quantityAt(seen.field, view, buffers, quantity, seen.reference); };
   const auto valueJump = at(ColorBy::valueJump), gradientJump = at(ColorBy::gradientJump), slope = at(ColorBy::slope),
              error = at(ColorBy::error), cellError = at(ColorBy::cellError);
   const auto worstValue = worstJumpOfCells(seen.field, seen.jumps, JumpKind::value);
@@ -83,7 +83,7 @@ TEST(Quantity, OfASurfaceIsThatOfItsHits) {
   const Seen seen;
   const SurfaceView view{cameraOf({}, seen.field.domain(), 50, 50), 0};
   const ViewBuffers buffers = makeCpuRenderer(seen.field)->surface(view, 50, 50);
-  const auto error = quantityAt(seen.field, view, buffers, ColorBy::error, seen.evidence);
+  const auto error = quantityAt(seen.field, view, buffers, ColorBy::error, seen.reference);
   int hits = 0;
   for (std::size_t i = 0; i < error.size(); ++i) {
     if (!buffers.hit(i)) continue;

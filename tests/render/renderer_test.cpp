@@ -16,13 +16,13 @@
 #include <thread>
 
 #include "compare_buffers.h"
-#include "cracks.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "section.h"
+#include "picture/cracks.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
+#include "view/section.h"
 
 namespace hpsdf::render {
 namespace {

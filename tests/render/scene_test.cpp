@@ -13,12 +13,12 @@
 #include <set>
 #include <vector>
 
-#include "arrows.h"
-#include "cells.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
-#include "section.h"
+#include "picture/arrows.h"
 #include "support/random_field.h"
+#include "view/cells.h"
+#include "view/section.h"
 
 namespace hpsdf::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "surface_blocks.h"
+#include "view/surface_blocks.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "text.h"
+#include "image/text.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <string>
 
-#include "hpsdf/cubic_grid.h"
+#include "hpsdf/detail/cubic_grid.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {

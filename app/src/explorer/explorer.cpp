@@ -6,9 +6,9 @@
 #include <cmath>
 #include <sstream>
 
-#include "pictures.h"
-#include "script.h"
-#include "summaries.h"
+#include "language/script.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
 namespace {
@@ -317,7 +317,7 @@ std::string Explorer::pictureKey() const {
   return fmt::format("{} {}x{} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_);
 }
 
-render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::Evidence& evidence,
+render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
                               const render::ScaleOptions& scale, int shrink) const {
   const UiRect canvas = layoutOf(view_).canvas;
   const auto fit = [&](auto picture) {
@@ -330,16 +330,16 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
   };
   // planes and cameras are those of the current field, so that both show the same part of space
   const Field& current = session_.current().field;
-  return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), evidence)
-                     : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), evidence);
+  return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
+                     : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), reference);
 }
 
 void Explorer::drawPicture(int shrink) {
   const Coloring& colors = view_.colors();
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
-  render::Evidence evidence = session_.evidence(colors.by, colors.mesh, colors.other);
-  if (!view_.slice && !view_.defects.empty()) evidence.defects = &session_.defects(view_.defects);
+  render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
+  if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
   const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
   const auto levels = [&](const FieldStatistics& all) {
     for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
@@ -351,12 +351,12 @@ void Explorer::drawPicture(int shrink) {
     std::ranges::sort(scale.levels);
     scale.levels.erase(std::unique(scale.levels.begin(), scale.levels.end()), scale.levels.end());
   }
-  render::Drawn picture = drawn(session_.renderer(view_.backend), field, evidence, scale, shrink);
+  render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
   if (other != nullptr) {
-    if (evidence.jumps != nullptr) evidence.jumps = &session_.otherJumps(view_.beside);
+    if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
     try {
-      beside = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, evidence, picture.scale, shrink);
+      beside = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, reference, picture.scale, shrink);
     } catch (const Error& error) {
       throw Error(view_.beside + ": " + error.what());
     }

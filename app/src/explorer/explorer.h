@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "explorer/readout.h"
 #include "explorer/ui.h"
 #include "explorer/view_state.h"
-#include "session.h"
+#include "pictures/readout.h"
+#include "session/session.h"
 
 namespace hpsdf::app {
 
@@ -101,7 +101,7 @@ class Explorer {
   /// `build`'s parameters that made the current field, as far as it tells.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
-  render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::Evidence& evidence,
+  render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
                       const render::ScaleOptions& scale, int shrink) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settle();

@@ -10,10 +10,10 @@
 
 #include "explorer/explorer.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
-#include "hpsdf/memory.h"
-#include "pictures.h"
-#include "summaries.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "explorer/explorer.h"
-#include "hpsdf/nearest_name.h"
+#include "hpsdf/detail/nearest_name.h"
 
 namespace hpsdf::app {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "pictures.h"
+#include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "hpsdf/render/picture.h"
-#include "session.h"
+#include "session/session.h"
 
 namespace hpsdf::app {
 

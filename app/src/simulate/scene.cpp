@@ -8,15 +8,15 @@
 #include <cmath>
 #include <numbers>
 
-#include "building.h"
+#include "console/long_work.h"
+#include "construction/building.h"
 #include "hpsdf/build.h"
+#include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_report.h"
-#include "hpsdf/output_file.h"
 #include "hpsdf/shapes.h"
-#include "long_work.h"
 
 namespace hpsdf::app {
 namespace {

@@ -11,7 +11,7 @@
 #include "hpsdf/field.h"
 #include "hpsdf/physics/world.h"
 #include "hpsdf/triangle_mesh.h"
-#include "session.h"
+#include "session/session.h"
 #include "simulate/scene_request.h"
 
 namespace hpsdf::app {

@@ -9,11 +9,11 @@
 #include <numbers>
 #include <random>
 
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/error.h"
-#include "hpsdf/memory.h"
 #include "hpsdf/shapes.h"
+#include "language/summaries.h"
 #include "simulate/scene.h"
-#include "summaries.h"
 
 namespace hpsdf::app {
 namespace {

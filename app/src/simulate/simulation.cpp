@@ -9,8 +9,8 @@
 #include <cmath>
 #include <optional>
 
-#include "hpsdf/threads.h"
-#include "long_work.h"
+#include "console/long_work.h"
+#include "hpsdf/detail/threads.h"
 #include "simulate/scene.h"
 #include "simulate/studio.h"
 

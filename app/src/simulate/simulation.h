@@ -7,7 +7,7 @@
 
 #include "hpsdf/field.h"
 #include "hpsdf/render/picture.h"
-#include "session.h"
+#include "session/session.h"
 #include "simulate/scene_request.h"
 
 namespace hpsdf::app {

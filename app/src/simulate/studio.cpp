@@ -11,9 +11,9 @@
 #include <stdexcept>
 
 #include "hpsdf/shapes.h"
-#include "pictures.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
 #include "simulate/coarse_mesh.h"
-#include "summaries.h"
 
 namespace hpsdf::app {
 namespace {

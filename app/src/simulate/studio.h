@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hpsdf/render/picture.h"
-#include "session.h"
+#include "session/session.h"
 #include "simulate/scene.h"
 #include "simulate/simulation.h"
 

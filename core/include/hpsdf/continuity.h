@@ -1,26 +1,11 @@
 #pragma once
 // Fields that jump less where their leaves meet, or not at all.
 
+#include "hpsdf/build_options.h"
+#include "hpsdf/error.h"
 #include "hpsdf/field.h"
-#include "hpsdf/progress.h"
 
 namespace hpsdf {
-
-/// λ beyond which a field hardly changes; far beyond it the solver would divide by zero.
-constexpr double kMaxContinuityWeight = 1e9;
-
-/// Settings of weak continuity, which makes Σ_F w_F ∫_F jump² dA + λ‖f − f₀‖² least (Koschier et al. 2017): F the
-/// interfaces, w_F the smaller cell's edge across F, ‖·‖ the L2 norm over the domain, f₀ the leaves' own fits. With w_F
-/// a length both terms have one unit, and λ has none: the same λ trades alike at every size of cell and in any unit.
-struct WeakContinuity {
-  /// λ, above 0, up to `kMaxContinuityWeight`: small for little jump, great for little change. See
-  /// docs/accuracy-continuity.md.
-  double weight = 2.5;
-  /// Of the conjugate gradients: residual at the end over the one at the start, 0 to 1. At the default the jumps and
-  /// the change are those of the solution to three digits.
-  double tolerance = 1e-3;
-  int maxIterations = 5000;  ///< 1 or more
-};
 
 /// A field after the post-process, and what it took.
 struct WeaklyContinuous {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -16,12 +17,19 @@
 namespace hpsdf {
 
 /// How inside is told from outside.
-enum class Sign : std::uint8_t {
+enum class InsideTest : std::uint8_t {
   automatic,     ///< whichever of the next two suits the mesh
   pseudonormal,  ///< by the nearest feature's normal: for closed meshes that do not meet themselves
   winding,       ///< by the winding number: for any mesh, holes being closed
   shell,         ///< a wall of some thickness around the surface, which may be open
-  hull,          ///< as winding, and faces with the inside on both sides are no surface
+  outerHull,     ///< as winding, and faces with the inside on both sides are no surface
+};
+
+/// Which sign distances have, and why.
+struct InsideTestChoice {
+  InsideTest insideTest = InsideTest::pseudonormal;  ///< never automatic
+  std::string reason = {};            ///< half a sentence, such as "the mesh has no holes and does not meet itself"
+  std::optional<Vector3> place = {};  ///< where that is seen, if it is at a place
 };
 
 /// Where a signed distance comes from: kept with a field built from it.
@@ -32,8 +40,8 @@ struct Source {
   std::uint64_t faces = 0;
   Box box = {};                      ///< smallest box of the surface in world units; empty where it is not known
   Normalization normalization = {};  ///< that took the mesh's own units to these
-  Sign sign = Sign::automatic;       ///< as it was chosen; automatic where it is not known
-  double thickness = 0;              ///< of a shell, in world units
+  InsideTest insideTest = InsideTest::automatic;  ///< as it was chosen; automatic where it is not known
+  double thickness = 0;                           ///< of a shell, in world units
 };
 
 /// Any signed distance Φ, evaluated in batches; negative inside. Converts from anything callable, single

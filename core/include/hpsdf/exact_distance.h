@@ -8,9 +8,9 @@
 #include <string>
 #include <string_view>
 
-#include "hpsdf/crossings.h"
 #include "hpsdf/distance_function.h"
-#include "hpsdf/progress.h"
+#include "hpsdf/error.h"
+#include "hpsdf/mesh_report.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
 
@@ -27,32 +27,27 @@ struct ClosestPoint {
 };
 
 struct DistanceOptions {
-  Sign sign = Sign::automatic;
+  InsideTest insideTest = InsideTest::automatic;
   double thickness = 0;  ///< of a shell, in world units: above 0 for one, else 0
   int threads = 0;       ///< at most, 0: all. The result does not depend on them.
-};
-
-/// Which sign distances have, and why.
-struct SignChoice {
-  Sign sign = Sign::pseudonormal;     ///< never automatic
-  std::string reason = {};            ///< half a sentence, such as "the mesh has no holes and does not meet itself"
-  std::optional<Vector3> place = {};  ///< where that is seen, if it is at a place
 };
 
 /// Exact signed distance to a triangle mesh in double precision.
 ///
 /// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time.
 ///
-/// Sign, one of four, or `Sign::automatic`: the first where it is certain to be right, else the second.
-/// * `Sign::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
+/// Sign, one of four, or `InsideTest::automatic`: the first where it is certain to be right, else the second.
+/// * `InsideTest::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
 ///   feature (Bærentzen & Aanæs 2005): right for closed meshes that do not meet themselves.
-/// * `Sign::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided as the
+/// * `InsideTest::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided
+/// as the
 ///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
 ///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.
-/// * `Sign::hull`: the same sign, and outside the same distance, but triangles that have the inside on both sides, such
+/// * `InsideTest::outerHull`: the same sign, and outside the same distance, but triangles that have the inside on both
+/// sides, such
 ///   as walls within bodies that overlap, are no surface to what is inside. One that meets others counts, or is left
 ///   out, up to a five-hundredth of the mesh's size beyond that.
-/// * `Sign::shell`: half of the thickness less than the unsigned distance. For sheets.
+/// * `InsideTest::shell`: half of the thickness less than the unsigned distance. For sheets.
 ///
 /// Equal distances are decided by the lower triangle index, so that a result depends on neither the order nor the
 /// grouping of queries: single and batched queries agree bit for bit.
@@ -82,7 +77,7 @@ class ExactDistance {
   /// beside a closed hole, and of a shell, not the distance to the point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
-  const SignChoice& signChoice() const;
+  const InsideTestChoice& insideTestChoice() const;
 
   /// The triangles that distances go to. Of a hull, what is left of a triangle that was cut has vertices of its own.
   TriangleMesh surface() const;

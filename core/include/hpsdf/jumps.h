@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "hpsdf/error.h"
 #include "hpsdf/field.h"
-#include "hpsdf/progress.h"
 
 namespace hpsdf {
 
@@ -47,21 +47,6 @@ struct Jumps {
 /// Measures every interface. The result does not depend on `threads` (0: all that the machine offers).
 /// Throws `Cancelled` when progress says so.
 Jumps findJumps(const Field& field, int threads = 0, const Progress& progress = {});
-
-/// The greatest steps from one side of a face to the other.
-struct FaceSteps {
-  std::size_t points = 0;
-  double value = 0;     ///< of f, in the field's units
-  double gradient = 0;  ///< length of the difference of the gradients
-};
-
-/// What queries answer on either side of `count` random points of faces: at two points that are neighbours in floating
-/// point and lie in different leaves, so that the answers share nothing. Each point lies on a random one of `faces`,
-/// which are the field's own (`Jumps::interfaces`): small ones count like large ones. The same seed gives the same
-/// figures, whatever the number of `threads` (0: all that the machine offers). Throws `Cancelled` when progress says
-/// so.
-FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces, std::size_t count,
-                           std::uint64_t seed = 1, int threads = 0, const Progress& progress = {});
 
 enum class JumpKind : std::uint8_t { value, gradient };
 

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "hpsdf/mesh_import.h"
+#include "hpsdf/mesh_file.h"
 
 namespace hpsdf {
 

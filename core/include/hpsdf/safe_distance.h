@@ -12,8 +12,8 @@
 #include <optional>
 
 #include "hpsdf/distance_function.h"
+#include "hpsdf/error.h"
 #include "hpsdf/field.h"
-#include "hpsdf/progress.h"
 
 namespace hpsdf {
 

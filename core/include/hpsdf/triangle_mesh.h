@@ -10,6 +10,9 @@
 
 namespace hpsdf {
 
+/// Beyond this, squares and volumes leave the range of double.
+constexpr double kLargestCoordinate = 1e100;
+
 /// Vertices in mesh units; triangles index them, counter-clockwise seen from outside.
 struct TriangleMesh {
   std::vector<Vector3> vertices;

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "hpsdf/field.h"
+#include "hpsdf/types.h"
 
 namespace hpsdf {
 

@@ -10,7 +10,7 @@
 
 #include "basis/cubature.h"
 #include "basis/legendre.h"
-#include "hpsdf/field.h"
+#include "hpsdf/types.h"
 
 namespace hpsdf {
 

@@ -9,18 +9,18 @@
 #include <utility>
 #include <vector>
 
-#include "distance/crossings.h"
-#include "distance/hierarchy.h"
-#include "distance/hole_rims.h"
-#include "distance/hull.h"
-#include "distance/inside.h"
-#include "distance/pseudonormals.h"
-#include "distance/search.h"
-#include "distance/segment.h"
-#include "distance/sign_choice.h"
-#include "distance/triangle_frame.h"
+#include "bvh/hierarchy.h"
+#include "bvh/search.h"
+#include "bvh/segment.h"
+#include "bvh/triangle_frame.h"
+#include "distance/inside_test.h"
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
-#include "hpsdf/threads.h"
+#include "sign/boundary_edges.h"
+#include "sign/inside.h"
+#include "sign/pseudonormals.h"
+#include "surface/crossings.h"
+#include "surface/outer_hull.h"
 
 namespace hpsdf {
 namespace {
@@ -30,7 +30,7 @@ using distance::FramePoint;
 using distance::TriangleFrame;
 
 void check(const DistanceOptions& options) {
-  const bool isShell = options.sign == Sign::shell;
+  const bool isShell = options.insideTest == InsideTest::shell;
   if (isShell ? !(options.thickness > 0) || !std::isfinite(options.thickness) : options.thickness != 0)
     throw Error("a shell, and nothing else, has a thickness, a number above 0");
 }
@@ -46,25 +46,25 @@ struct ExactDistance::Data {
                .thickness = options.thickness} {
     tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
                          [&] { hierarchy = distance::Hierarchy(mesh, source.box); });
-    choice.sign = options.sign;
-    if (options.sign == Sign::automatic) {
-      distance::ChosenSign chosen = distance::chooseSign(hierarchy, mesh, progress);
+    choice.insideTest = options.insideTest;
+    if (options.insideTest == InsideTest::automatic) {
+      distance::ChosenInsideTest chosen = distance::chooseInsideTest(hierarchy, mesh, progress);
       choice = std::move(chosen.choice);
       inside = std::move(chosen.inside);
       normals = std::move(chosen.normals);
-    } else if (options.sign == Sign::pseudonormal) {
+    } else if (options.insideTest == InsideTest::pseudonormal) {
       normals = distance::Pseudonormals(hierarchy);
-    } else if (options.sign == Sign::winding) {
-      inside = distance::Inside(hierarchy, mesh, distance::HoleRims(hierarchy));
-    } else if (options.sign == Sign::hull) {
+    } else if (options.insideTest == InsideTest::winding) {
+      inside = distance::Inside(hierarchy, mesh, distance::BoundaryEdges(hierarchy));
+    } else if (options.insideTest == InsideTest::outerHull) {
       leaveOutBuried(mesh, progress);
     }
-    source.sign = choice.sign;
+    source.insideTest = choice.insideTest;
   }
 
   void leaveOutBuried(const TriangleMesh& mesh, const Progress& progress) {
     whole = std::move(hierarchy);
-    inside = distance::Inside(whole, mesh, distance::HoleRims(whole));
+    inside = distance::Inside(whole, mesh, distance::BoundaryEdges(whole));
     distance::Hull hull = distance::hullOf(whole, mesh, inside, progress);
     hierarchy = distance::Hierarchy(hull.mesh, source.box);
     parts = std::move(hull.triangles);
@@ -103,22 +103,22 @@ struct ExactDistance::Data {
       const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
       std::array<Vector3, kPacket> packet;
       for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
-      of.nearest(packet, nearest);
+      nearestTriangles(of, packet, nearest);
       for (std::size_t i = 0; i < count; ++i) out[first + i] = resolve(of, packet[i], nearest[i]).signedDistance;
     }
   }
 
   /// From those, in place, the distances that were asked for.
   void sign(std::span<const Vector3> points, std::span<double> distances) const {
-    if (choice.sign == Sign::pseudonormal) return;
+    if (choice.insideTest == InsideTest::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
-    if (choice.sign == Sign::hull) {
+    if (choice.insideTest == InsideTest::outerHull) {
       // outside, none that is nearer than the hull was rightly left out of it
       std::vector<double> free(points.size());
       toTriangles(whole, points, free);
       for (double& distance : free) distance = std::abs(distance);
       inside.sign(points, free, distances);
-    } else if (choice.sign == Sign::winding) {
+    } else if (choice.insideTest == InsideTest::winding) {
       inside.sign(points, distances);
     }
   }
@@ -131,14 +131,14 @@ struct ExactDistance::Data {
   std::vector<std::uint32_t> parts;  ///< of which triangle each of a hull's is a part
   distance::Pseudonormals normals;   ///< empty unless they give the sign
   distance::Inside inside;           ///< likewise
-  SignChoice choice;
+  InsideTestChoice choice;
 
  private:
   Vector3 normalOfVertex(std::uint32_t vertex) const {
-    return choice.sign == Sign::pseudonormal ? normals.ofVertex(vertex) : Vector3::Zero();
+    return choice.insideTest == InsideTest::pseudonormal ? normals.ofVertex(vertex) : Vector3::Zero();
   }
   Vector3 normalOfEdge(std::uint32_t slot, std::uint32_t from) const {
-    return choice.sign == Sign::pseudonormal ? normals.ofEdge(hierarchy, slot, from) : Vector3::Zero();
+    return choice.insideTest == InsideTest::pseudonormal ? normals.ofEdge(hierarchy, slot, from) : Vector3::Zero();
   }
 
   /// `difference` is x - closest, given apart: far from the origin the point itself is rounded more.
@@ -168,13 +168,13 @@ void ExactDistance::operator()(std::span<const Vector3> points, std::span<double
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  ClosestPoint closest = data_->resolve(data_->hierarchy, x, data_->hierarchy.nearest(x));
+  ClosestPoint closest = data_->resolve(data_->hierarchy, x, nearestTriangle(data_->hierarchy, x));
   data_->sign({&x, 1}, {&closest.signedDistance, 1});
   closest.triangle = data_->triangleOf(closest.triangle);
   return closest;
 }
 
-const SignChoice& ExactDistance::signChoice() const { return data_->choice; }
+const InsideTestChoice& ExactDistance::insideTestChoice() const { return data_->choice; }
 
 TriangleMesh ExactDistance::surface() const {
   const auto vertices = data_->hierarchy.vertices();

@@ -1,14 +1,14 @@
-#include "hpsdf/sign_check.h"
+#include "hpsdf/detail/sign_check.h"
 
 #include <cmath>
 #include <mutex>
 #include <numbers>
 
-#include "chunks.h"
-#include "distance/solid_angle.h"
-#include "field/random_points.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
+#include "sign/solid_angle.h"
+#include "util/chunks.h"
+#include "util/random_points.h"
 
 namespace hpsdf {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hpsdf/field.h"
+#include "hpsdf/build_options.h"
 
 namespace hpsdf {
 

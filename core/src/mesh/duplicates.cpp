@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdlib>
 
+#include "mesh/directed_edges.h"
 #include "mesh/face_sets.h"
-#include "mesh/sides.h"
 
 namespace hpsdf {
 namespace {
@@ -84,7 +84,7 @@ FaceSets setsOf(const Groups& groups, const std::vector<char>& chosen) {
   return sets;
 }
 
-int signOf(const Side& side) { return side.rising ? 1 : -1; }
+int insideTestOf(const Side& side) { return side.rising ? 1 : -1; }
 
 /// Of each group: whether it is of a wall.
 std::vector<char> wallsOf(const Groups& groups) {
@@ -101,8 +101,8 @@ std::vector<char> wallsOf(const Groups& groups) {
     for (const Side& side : edge) {
       if (both[side.face]) continue;
       around[set].others = true;
-      balance += signOf(side);
-      asGiven += signOf(side) * groups.all[side.face].excess();
+      balance += insideTestOf(side);
+      asGiven += insideTestOf(side) * groups.all[side.face].excess();
     }
     around[set].unbalanced |= balance != 0;
     around[set].asGiven |= asGiven != 0;
@@ -133,9 +133,9 @@ void dropStrays(const Groups& groups, const std::vector<char>& several, std::vec
   forEachEdge(groups.sides, [&](std::span<const Side> edge) {
     int balance = 0;
     for (const Side& side : edge) {
-      balance += signOf(side) * stay[side.face].excess();
+      balance += insideTestOf(side) * stay[side.face].excess();
       edges[side.face][count[side.face]] = balances.size();
-      signs[side.face][count[side.face]++] = signOf(side);
+      signs[side.face][count[side.face]++] = insideTestOf(side);
     }
     balances.push_back(balance);
   });
@@ -175,8 +175,8 @@ std::vector<Stay> stayOf(const Groups& groups, const std::vector<char>& walls) {
   forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const Side> edge) {
     int withLeast = 0, balance = 0;
     for (const Side& side : edge) {
-      withLeast += signOf(side) * least[side.face].excess();
-      balance += signOf(side) * stay[side.face].excess();
+      withLeast += insideTestOf(side) * least[side.face].excess();
+      balance += insideTestOf(side) * stay[side.face].excess();
     }
     lost[set] += int(withLeast != 0) - int(balance != 0);
   });

@@ -3,11 +3,9 @@
 
 #include <string>
 
-#include "hpsdf/triangle_mesh.h"
-
 namespace hpsdf {
 
 /// "NAME: " before a message, or "mesh: " for a mesh without a name.
-inline std::string messagePrefix(const TriangleMesh& mesh) { return (mesh.name.empty() ? "mesh" : mesh.name) + ": "; }
+inline std::string messagePrefix(const std::string& name) { return (name.empty() ? "mesh" : name) + ": "; }
 
 }  // namespace hpsdf

@@ -1,17 +1,23 @@
 #pragma once
-// On which side a point lies, without rounding: what decides whether two triangles meet.
 
-#include <array>
+#include <cmath>
 
 #include "hpsdf/types.h"
 
 namespace hpsdf {
 
-/// The sign, exactly, of (b − a) × (c − a) · (d − a): above 0 where a, b, c look counter-clockwise from d, and 0 where
-/// all four lie in a plane. Exact while products of three coordinates neither overflow nor underflow.
-int orientation(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d);
+/// Whether the sign of this volume, of a surface of this area and box, tells inside from outside. Of a closed one it is
+/// a fact. Of an open one the volume depends on the apex chosen, so that a nearly flat sheet would be turned by chance:
+/// it is believed only where it is at least a hundredth of its box, as of a solid with some holes, and more than the
+/// rounding of a sum of such areas.
+inline bool isPlain(double volume, double area, const Box& box, bool closed) {
+  const Vector3 size = box.sizes();
+  return closed || (std::abs(volume) > 0.01 * size.prod() && std::abs(volume) > 1e-9 * area * size.norm());
+}
 
-/// The same for three points in the plane of two axes: the sign of (b − a) × (c − a).
-int orientation(const std::array<int, 2>& axes, const Vector3& a, const Vector3& b, const Vector3& c);
+/// Whether a surface of this signed volume, area and box looks inwards.
+inline bool looksInward(double volume, double area, const Box& box, bool closed) {
+  return volume < 0 && isPlain(volume, area, box, closed);
+}
 
 }  // namespace hpsdf

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "mesh/directed_edges.h"
 #include "mesh/face_sets.h"
-#include "mesh/sides.h"
 
 namespace hpsdf {
 

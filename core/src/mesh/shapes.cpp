@@ -11,8 +11,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
-#include "hpsdf/nearest_name.h"
 
 namespace hpsdf::shapes {
 namespace {

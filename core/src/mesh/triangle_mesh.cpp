@@ -68,7 +68,7 @@ void requireValidIndices(const TriangleMesh& mesh) {
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
     for (const std::uint32_t v : mesh.triangles[f])
       if (v >= mesh.vertices.size())
-        throw Error(messagePrefix(mesh) + "face " + std::to_string(f + 1) + " refers to vertex " +
+        throw Error(messagePrefix(mesh.name) + "face " + std::to_string(f + 1) + " refers to vertex " +
                     std::to_string(std::uint64_t{v} + 1) + ", but there are only " +
                     std::to_string(mesh.vertices.size()) + "; repair or export the mesh again");
 }
@@ -126,7 +126,7 @@ Normalization normalizing(const Box& surface) { return {surface.center(), 2 / lo
 TriangleMesh normalized(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
   const Box box = boundingBox(mesh);
-  const double longest = longestSide(box, messagePrefix(mesh));
+  const double longest = longestSide(box, messagePrefix(mesh.name));
   TriangleMesh result = mesh;
   // (x - min) - (max - x) is 2(x - centre) without rounding the centre: on the longest side it is -longest at min and
   // longest at max in floating point too, and it never decreases with x, so that nothing leaves [-1, 1].

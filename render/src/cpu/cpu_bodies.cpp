@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "body_meshes.h"
 #include "hpsdf/render/bodies.h"
+#include "view/body_meshes.h"
 
 namespace hpsdf::render {
 namespace {

@@ -6,7 +6,7 @@
 #include "cpu/trace.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
-#include "view_buffers.h"
+#include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace {

@@ -93,7 +93,7 @@ double certainlyAbove(double height, double steepest) {
 
 TraceField::TraceField(const Field& field)
     : field_(field.data()),
-      reaches_(field.directory().reaches),
+      reaches_(field.lookupGrid().blendExtents),
       space_(field_),
       zones_(zoneBounds(field)),
       bounds_(nodeBounds(field_, zones_)) {}
@@ -118,8 +118,8 @@ void TraceField::forEachReaching(const Vector3& p, const Use& use) const {
     std::array<double, 3> step = {1, 1, 1}, slope = {0, 0, 0};
     for (int axis = 0; axis < 3; ++axis)
       for (const bool upper : {false, true}) {
-        const int deepest = reach::depth(reaches_[index], axis, upper);
-        if (deepest == reach::kWall) continue;
+        const int deepest = blend_extent::depth(reaches_[index], axis, upper);
+        if (deepest == blend_extent::kWall) continue;
         const double delta = field_.blend * std::ldexp(1.0, -deepest);
         const double t = (upper ? edge - within[axis] : within[axis]) / delta;
         const double s = t < -1 ? 0 : t > 1 ? 1 : 0.25 * (2 + 3 * t - t * t * t);

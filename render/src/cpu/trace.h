@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "grid_space.h"
 #include "hpsdf/field.h"
-#include "node_bounds.h"
-#include "zone_bounds.h"
+#include "view/blend_zone_bounds.h"
+#include "view/grid_space.h"
+#include "view/surface_bounds.h"
 
 namespace hpsdf::render {
 

@@ -120,7 +120,7 @@ FieldUpload::FieldUpload(const Field& whole, const std::vector<NodeBounds>& boun
   upload(coefficientBuffer_, coefficients_, GL_R32F, coefficients.data(), coefficients.size() * sizeof(float));
   glTextureBuffer(coefficientQuads_.name(), GL_RGBA32F, coefficientBuffer_.name());
   if (zones.empty()) return;
-  const std::vector<NodeTexel> ofZones = zoneTexels(zones, whole.directory().reaches);
+  const std::vector<NodeTexel> ofZones = zoneTexels(zones, whole.lookupGrid().blendExtents);
   upload(zoneBuffer_, zones_, GL_RGBA32UI, ofZones.data(), ofZones.size() * sizeof(NodeTexel));
 }
 

@@ -2,7 +2,7 @@
 
 #include "gl/gl_objects.h"
 #include "hpsdf/field.h"
-#include "node_bounds.h"
+#include "view/surface_bounds.h"
 
 namespace hpsdf::render {
 
@@ -14,7 +14,7 @@ namespace hpsdf::render {
 /// coefficients, R32F: as in FieldData, but those of leaves up to degree 4 in the order of field.glsl's straight code,
 /// and all leaves padded to a multiple of four; coefficientQuads: the same by four, RGBA32F.
 /// linearParts, RGBA32F: `NodeBounds::linear`.
-/// zones, RGBA32UI, none without blending: `Directory::reaches`, and `ZoneBounds` by the floats' bits.
+/// zones, RGBA32UI, none without blending: `LookupGrid::reaches`, and `ZoneBounds` by the floats' bits.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "body_meshes.h"
 #include "gl/egl_context.h"
 #include "gl/gl_objects.h"
 #include "gl/program.h"
 #include "gl/tiles.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/bodies.h"
+#include "view/body_meshes.h"
 
 namespace hpsdf::render {
 namespace {

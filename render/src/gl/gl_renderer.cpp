@@ -9,12 +9,12 @@
 #include "gl/gl_objects.h"
 #include "gl/program.h"
 #include "gl/tiles.h"
-#include "grid_space.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
-#include "scaled_renderer.h"
-#include "surface_blocks.h"
-#include "view_buffers.h"
+#include "view/grid_space.h"
+#include "view/scaled_renderer.h"
+#include "view/surface_blocks.h"
+#include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace {

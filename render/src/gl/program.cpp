@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
-#include "embedded.h"
 #include "hpsdf/error.h"
+#include "image/embedded.h"
 
 namespace hpsdf::render {
 namespace {

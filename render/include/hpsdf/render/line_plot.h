@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "hpsdf/line.h"
+#include "hpsdf/detail/line.h"
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::render {

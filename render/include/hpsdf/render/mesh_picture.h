@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "hpsdf/mesh_defects.h"
+#include "hpsdf/mesh_report.h"
 #include "hpsdf/render/bodies.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/view.h"

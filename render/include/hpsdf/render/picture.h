@@ -12,7 +12,7 @@
 #include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
-#include "hpsdf/mesh_defects.h"
+#include "hpsdf/mesh_report.h"
 #include "hpsdf/render/bodies.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/renderer.h"
@@ -27,17 +27,17 @@ enum class ColorBy : std::uint8_t {
   depth,     ///< of the cell
   distance,  ///< f; not for surfaces
   // quantities: not negative, on a scale from dark to light
-  valueJump,     ///< greatest jump of f at the cell's faces; needs `Evidence::jumps`
+  valueJump,     ///< greatest jump of f at the cell's faces; needs `ReferenceData::jumps`
   gradientJump,  ///< the same of the gradient
   slope,         ///< how far |∇f| is from 1 at the point
-  error,         ///< |f − Φ| at the point; needs `Evidence::exact`
-  difference,    ///< |f − g| at the point; needs `Evidence::other`
+  error,         ///< |f − Φ| at the point; needs `ReferenceData::exact`
+  difference,    ///< |f − g| at the point; needs `ReferenceData::other`
   cellError,     ///< estimated RMS error of the cell: √(ε_e / its volume), without nearness
 };
 constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
 
 /// What some quantities are known by. What is referred to must live while a picture is drawn.
-struct Evidence {
+struct ReferenceData {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;
   const Field* other = nullptr;  ///< g; outside its domain its continuation counts
@@ -132,13 +132,13 @@ struct SurfacePicture {
 /// Draws the view beside its legend or colour bar and above its caption. Levels in the legend are those that occur in
 /// the whole field, so that colours keep their meaning from slice to slice.
 /// Throws `Error` for a size or sample count out of range (16 to 16384 pixels; 1 to 8; no more than 64 Mi samples in
-/// all), before memory is taken; for colours that are not for such a view or whose evidence is missing; for limits that
-/// make no scale; for a plane that misses the domain; for arrows out of range.
+/// all), before memory is taken; for colours that are not for such a view or whose reference data is missing; for
+/// limits that make no scale; for a plane that misses the domain; for arrows out of range.
 ///
 /// What is in a surface's picture hides what lies behind it: surface, section, plane and boxes in the buffers, lines
 /// over them. A clipping plane cuts all of it but bodies.
-Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
+Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference = {});
+Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const ReferenceData& reference = {});
 
 /// What the colours of a picture mean: as it stands in the picture, or for a legend of one's own beside a bare one.
 struct Legend {
@@ -175,8 +175,10 @@ struct Drawn {
   ScaleOptions scale = {};  ///< as drawn, with what was chosen: the same for another picture gives it the same colours
   std::array<int, 2> corner = {0, 0};  ///< of the view in the picture, pixels from the upper left
 };
-Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const Evidence& evidence = {});
-Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture, const Evidence& evidence = {});
+Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture,
+                const ReferenceData& reference = {});
+Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
+                  const ReferenceData& reference = {});
 
 /// What a pixel of a picture shows, at its middle sample.
 struct Pick {
@@ -194,9 +196,9 @@ std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y)
 
 /// The quantity at each pixel of a view's buffers; NaN where there is nothing. Throws as `draw` does.
 std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
-                              const Evidence& evidence);
+                              const ReferenceData& reference);
 std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
-                              const Evidence& evidence);
+                              const ReferenceData& reference);
 
 /// Whether the surface f = offset meets the walls of the domain, where tracing cuts it off. Judged by the sign at
 /// 40 × 40 points of each wall: a piece that is smaller than their distance may pass for none.

@@ -1,0 +1,379 @@
+#include "check/check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <sstream>
+#include <utility>
+
+#include "check/baseline.h"
+#include "console/failed.h"
+#include "files/data_table.h"
+#include "files/output_folder.h"
+#include "hpsdf/detail/nearest_name.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/render/compare.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kWorstPixels = 10;
+
+void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) {
+  item.verdict = verdict;
+  item.problem = problem;
+}
+
+// Comparing one file
+
+std::string colorText(const render::Color& color) {
+  return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
+}
+
+void makeParentFolder(const fs::path& file) { fs::create_directories(file.parent_path()); }
+
+void describeDifference(CheckedItem& item, const render::Image& baseline, const render::Image& actual) {
+  for (const render::PixelDifference& pixel : render::worstPixels(baseline, actual, kWorstPixels))
+    item.worst.push_back({fmt::format("x {}, y {}", pixel.x, pixel.y), colorText(pixel.baseline),
+                          colorText(pixel.actual), std::to_string(pixel.difference)});
+  makeParentFolder(item.difference);
+  savePng(render::differencePicture(baseline, actual), item.difference);
+}
+
+void judgePicture(CheckedItem& item) {
+  const render::Image baseline = render::loadPng(item.baseline);
+  const render::Image actual = render::loadPng(item.actual);
+  const render::Comparison comparison = render::compare(baseline, actual);
+  item.compared = comparison.compared;
+  item.differing = comparison.differing;
+  item.largest = comparison.largest;
+  const std::string problem = render::problem(comparison, item.budget);
+  if (problem.empty()) return;
+  setVerdict(item, comparison.sameSize() ? Verdict::differs : Verdict::otherSize, problem);
+  if (comparison.sameSize() && !item.difference.empty()) describeDifference(item, baseline, actual);
+}
+
+void judgeData(CheckedItem& item, double bound) {
+  item.difference.clear();
+  const DataTable baseline = loadData(item.baseline);
+  const DataComparison comparison = compare(baseline, loadData(item.actual), bound);
+  item.compared = comparison.compared;
+  item.differing = comparison.differing;
+  item.largest = comparison.largest;
+  const std::string problem = app::problem(comparison, bound, item.budget);
+  if (problem.empty()) return;
+  setVerdict(item, comparison.sameShape ? Verdict::differs : Verdict::otherSize, problem);
+  for (const DataDifference& worst : comparison.worst)
+    item.worst.push_back({fmt::format("row {}, column {}", worst.row + 1, worst.column + 1),
+                          fmt::format("{}", worst.baseline), fmt::format("{}", worst.actual),
+                          fmt::format("{:.3g}", worst.difference)});
+}
+
+/// Compares the item's two files, of which either may be missing.
+void judge(CheckedItem& item) {
+  if (!fs::exists(item.actual))
+    return setVerdict(item, Verdict::noPicture,
+                      "no script writes it: remove the baseline, or mend the script that should");
+  if (!fs::exists(item.baseline))
+    return setVerdict(item, Verdict::noBaseline, "it has no baseline: look at it, then 'hpsdf accept' it");
+  try {
+    const BaselineFacts facts = loadFacts(item.baseline);
+    item.baselineRenderer = facts.renderer;
+    item.budget = facts.budget.value_or(render::kPixelBudget);
+    isDataFile(item.picture) ? judgeData(item, facts.bound.value_or(kDataBound)) : judgePicture(item);
+  } catch (const Error& error) {
+    setVerdict(item, Verdict::unreadable, error.what());
+  }
+  if (item.verdict != Verdict::differs || isDataFile(item.picture)) item.difference.clear();
+}
+
+/// Of a negative control: it passes when its comparison fails as stated.
+void turnAround(CheckedItem& item, Verdict stated) {
+  if (item.verdict == stated)
+    setVerdict(item, Verdict::passed, "");
+  else if (item.verdict == Verdict::passed)
+    setVerdict(item, Verdict::notNoticed, "it is meant to be wrong, and agrees with the baseline");
+  else if (item.verdict == Verdict::differs || item.verdict == Verdict::otherSize)
+    setVerdict(item, Verdict::otherReason,
+               fmt::format("it is meant to fail with '{}', but: {}", verdictText(stated), item.problem));
+}
+
+// Negative controls
+
+using Controls = std::map<int, Verdict>;  ///< by line, what they are to fail with
+
+/// Turns comments "# wrong REASON: COMMAND" into commands where they stand; columns stay what they were.
+Controls enableControls(const std::string& file, std::string& text) {
+  Controls controls;
+  std::size_t begin = 0;
+  for (int line = 1; begin < text.size(); ++line) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::size_t hash = text.find_first_not_of(" \t", begin);
+    std::istringstream words(text.substr(begin, end - begin));
+    std::string first, second, reason;
+    words >> first >> second >> reason;
+    if (hash < end && (first == "#wrong" || (first == "#" && (second == "wrong" || second == "wrong:")))) {
+      if (reason != "pixels:" && reason != "values:" && reason != "size:")
+        throw Error(
+            fmt::format("{}:{}:{}: expected '# wrong pixels: COMMAND', '# wrong values: COMMAND' or "
+                        "'# wrong size: COMMAND'",
+                        file, line, hash - begin + 1));
+      controls[line] = reason == "size:" ? Verdict::otherSize : Verdict::differs;
+      std::fill(text.begin() + std::ptrdiff_t(hash), text.begin() + std::ptrdiff_t(text.find(':', hash)) + 1, ' ');
+    }
+    begin = end + 1;
+  }
+  return controls;
+}
+
+// One script
+
+/// Names of the files that can be compared, sorted.
+std::set<std::string> comparableFiles(const fs::path& folder) {
+  std::set<std::string> names;
+  if (!fs::is_directory(folder)) return names;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && isComparable(entry.path())) names.insert(entry.path().filename().string());
+  return names;
+}
+
+class ScriptCheck {
+ public:
+  ScriptCheck(const CheckRequest& request, std::string name)
+      : request_(request),
+        name_(std::move(name)),
+        file_((request.folder / "scripts" / (name_ + ".hps")).string()),
+        baselines_(request.folder / "baselines" / name_),
+        actual_(request.output / "actual" / name_),
+        wrong_(request.output / "wrong" / name_) {}
+
+  std::vector<CheckedItem> run(const Registry& registry, const Console& console) {
+    fs::create_directories(actual_);
+    bool completed = true;
+    const auto brokenOff = [&](Verdict verdict, const Error& error) {
+      completed = false;
+      CheckedItem item{.script = name_, .where = file_};
+      setVerdict(item, verdict, error.what());
+      items_.push_back(item);
+    };
+    try {
+      runCalls(registry, console);
+    } catch (const Failed& failed) {
+      brokenOff(Verdict::expected, failed);
+    } catch (const Error& error) {
+      brokenOff(Verdict::scriptFailed, error);
+    }
+    judgePictures(completed);
+    return std::move(items_);
+  }
+
+ private:
+  struct Origin {
+    fs::file_time_type time;
+    std::string where;
+    std::string renderer;
+  };
+
+  void runCalls(const Registry& registry, const Console& console) {
+    std::string text = readTextFile(file_);
+    const Controls controls = enableControls(file_, text);
+    Variables variables = request_.variables;
+    variables["out"] = actual_.string();
+    variables["wrong"] = wrong_.string();
+    variables["here"] = fs::path(file_).parent_path().string();
+    const std::vector<Call> calls = parseScript(registry, file_, text, variables);
+    for (const auto& [line, stated] : controls)
+      if (std::ranges::find(calls, line, &Call::line) == calls.end())
+        throw Error(fmt::format("{}:{}: expected a command after the colon", file_, line));
+    if (!controls.empty()) fs::create_directories(wrong_);
+    std::istringstream nothing;
+    std::ostringstream ignored;  // what commands report on standard output
+    Session session(registry, {nothing, ignored, console.err, console.redrawsProgress});
+    session.scriptDepth = 1;
+    for (std::size_t n = 0; n < calls.size(); ++n) {
+      runScript(session, std::span(calls).subspan(n, 1));
+      const auto control = controls.find(calls[n].line);
+      const bool lineEnds = n + 1 == calls.size() || calls[n + 1].line != calls[n].line;
+      if (control == controls.end())
+        notePictures(session, calls[n]);
+      else if (lineEnds)
+        judgeControl(session, calls[n], control->second);
+    }
+  }
+
+  /// Remembers which command wrote which file.
+  void notePictures(const Session& session, const Call& call) {
+    for (const std::string& picture : comparableFiles(actual_)) {
+      const auto time = fs::last_write_time(actual_ / picture);
+      const auto known = origins_.find(picture);
+      if (known == origins_.end() || known->second.time != time)
+        origins_[picture] = {time, call.where, session.lastRenderer()};
+    }
+  }
+
+  /// Compares what a control has just written with the baselines of the same names.
+  void judgeControl(const Session& session, const Call& call, Verdict stated) {
+    const fs::path kept = wrong_ / std::to_string(call.line);
+    const auto pictures = comparableFiles(wrong_);
+    if (pictures.empty()) throw Error(call.where + ": expected a control to write a picture into $wrong");
+    fs::create_directories(kept);
+    for (const std::string& picture : pictures) {
+      fs::rename(wrong_ / picture, kept / picture);
+      CheckedItem item{.script = name_,
+                       .picture = picture,
+                       .controlLine = call.line,
+                       .renderer = session.lastRenderer(),
+                       .where = call.where,
+                       .baseline = baselines_ / picture,
+                       .actual = kept / picture};
+      judge(item);
+      turnAround(item, stated);
+      items_.push_back(item);
+    }
+  }
+
+  /// All that were written and all that should have been; of a script that failed only the former.
+  void judgePictures(bool completed) {
+    const std::vector<CheckedItem> others = std::exchange(items_, {});
+    std::set<std::string> pictures = comparableFiles(actual_);
+    if (completed) pictures.merge(comparableFiles(baselines_));
+    for (const std::string& picture : pictures) {
+      CheckedItem item{.script = name_,
+                       .picture = picture,
+                       .renderer = origins_[picture].renderer,
+                       .where = origins_[picture].where,
+                       .baseline = baselines_ / picture,
+                       .actual = actual_ / picture,
+                       .difference = request_.output / "difference" / name_ / picture};
+      judge(item);
+      items_.push_back(item);
+    }
+    items_.insert(items_.end(), others.begin(), others.end());
+    if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // so that it is listed
+  }
+
+  const CheckRequest& request_;
+  std::string name_;
+  std::string file_;
+  fs::path baselines_, actual_, wrong_;
+  std::map<std::string, Origin> origins_;
+  std::vector<CheckedItem> items_;
+};
+
+// The folder
+
+std::vector<std::string> scriptNames(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder / "scripts", ignored))
+    if (entry.path().extension() == ".hps") names.push_back(entry.path().stem().string());
+  std::ranges::sort(names);
+  if (names.empty())
+    throw Error(
+        fmt::format("{}: has no scripts: expected {}", folder.string(), (folder / "scripts" / "NAME.hps").string()));
+  return names;
+}
+
+void refuseUnknown(const std::vector<std::string>& names, const std::vector<std::string>& only) {
+  for (const std::string& name : only) {
+    if (std::ranges::find(names, name) != names.end()) continue;
+    const std::string near = nearestName(name, names);
+    throw Error(fmt::format(
+        "no script is named '{}'{}", name,
+        near.empty() ? "; give the name of its file without .hps" : fmt::format("; did you mean '{}'?", near)));
+  }
+}
+
+/// Baselines whose script is gone.
+std::vector<CheckedItem> strayBaselines(const CheckRequest& request, const std::vector<std::string>& scripts) {
+  std::vector<CheckedItem> items;
+  std::error_code ignored;
+  std::set<std::string> folders;
+  for (const auto& entry : fs::directory_iterator(request.folder / "baselines", ignored))
+    folders.insert(entry.path().filename().string());
+  for (const std::string& name : scripts) folders.erase(name);
+  for (const std::string& folder : folders)
+    for (const std::string& picture : comparableFiles(request.folder / "baselines" / folder)) {
+      items.push_back(
+          {.script = folder, .picture = picture, .baseline = request.folder / "baselines" / folder / picture});
+      judge(items.back());
+    }
+  return items;
+}
+
+void prepareOutput(const fs::path& path) {
+  OutputFolder folder(path);
+  folder.requireOwn(kCheckResults);
+  folder.startAnew(kCheckResults, [](const std::string& name) {
+    return name == "actual" || name == "difference" || name == "wrong" || name == "index.html";
+  });
+}
+
+}  // namespace
+
+std::string verdictText(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::passed:
+      return "ok";
+    case Verdict::differs:
+      return "differs";
+    case Verdict::otherSize:
+      return "another size";
+    case Verdict::noBaseline:
+      return "no baseline";
+    case Verdict::noPicture:
+      return "no picture";
+    case Verdict::unreadable:
+      return "unreadable";
+    case Verdict::expected:
+      return "expected otherwise";
+    case Verdict::scriptFailed:
+      return "script failed";
+    case Verdict::notNoticed:
+      return "wrong, not noticed";
+    case Verdict::otherReason:
+      break;
+  }
+  return "wrong otherwise";
+}
+
+std::string CheckedItem::pictureText() const {
+  if (picture.empty()) return "(script)";
+  return controlLine == 0 ? picture : fmt::format("{}, wrong in line {}", picture, controlLine);
+}
+
+std::size_t CheckOutcome::failures() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(items, [](const CheckedItem& item) { return item.verdict != Verdict::passed; }));
+}
+
+bool CheckOutcome::scriptFailed() const {
+  return std::ranges::find(items, Verdict::scriptFailed, &CheckedItem::verdict) != items.end();
+}
+
+CheckOutcome check(const Registry& registry, const Console& console, const CheckRequest& request) {
+  const std::vector<std::string> scripts = scriptNames(request.folder);
+  refuseUnknown(scripts, request.only);
+  for (const char* own : {"out", "wrong", "here"})
+    if (request.variables.contains(own)) throw Error(fmt::format("{}: this variable is set by check itself", own));
+  prepareOutput(request.output);
+  if (!request.junit.empty()) checkWritable(request.junit);
+  CheckOutcome outcome;
+  for (const std::string& name : scripts) {
+    if (!request.only.empty() && std::ranges::find(request.only, name) == request.only.end()) continue;
+    console.err << "hpsdf: checking " << name << std::endl;
+    const auto start = Clock::now();
+    auto items = ScriptCheck(request, name).run(registry, console);
+    outcome.seconds[name] = std::chrono::duration<double>(Clock::now() - start).count();
+    std::ranges::move(items, std::back_inserter(outcome.items));
+  }
+  if (request.only.empty()) std::ranges::move(strayBaselines(request, scripts), std::back_inserter(outcome.items));
+  return outcome;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,293 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "check/baseline.h"
+#include "check/check.h"
+#include "check/check_page.h"
+#include "commands/commands.h"
+#include "console/failed.h"
+#include "files/data_table.h"
+#include "hpsdf/detail/nearest_name.h"
+#include "hpsdf/render/image.h"
+#include "language/summaries.h"
+#include "session/session.h"
+#include "version.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// By which a check and the `accept` after it know the same folder.
+std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folder).string(); }
+
+// check
+
+Json itemJson(const CheckedItem& item) {
+  return {{"script", item.script},
+          {"picture", item.picture},
+          {"control_line", item.controlLine == 0 ? Json() : Json(item.controlLine)},
+          {"result", verdictText(item.verdict)},
+          {"passed", item.verdict == Verdict::passed},
+          {"problem", item.problem},
+          {"compared", item.compared},
+          {"differing", item.differing},
+          {"largest_difference", item.largest},
+          {"budget", item.budget},
+          {"renderer", item.renderer},
+          {"baseline_renderer", item.baselineRenderer},
+          {"written_by", item.where}};
+}
+
+Json outcomeJson(const CheckOutcome& outcome, const CheckRequest& request) {
+  Json items = Json::array();
+  for (const CheckedItem& item : outcome.items) items.push_back(itemJson(item));
+  return {{"folder", folderId(request.folder)},
+          {"page", (request.output / "index.html").string()},
+          {"version", versionText()},
+          {"failures", outcome.failures()},
+          {"items", items}};
+}
+
+std::string tableText(const CheckOutcome& outcome) {
+  std::size_t script = 6, picture = 7;
+  for (const CheckedItem& item : outcome.items) {
+    script = std::max(script, item.script.size());
+    picture = std::max(picture, item.pictureText().size());
+  }
+  const auto row = [&](const std::string& a, const std::string& b, const std::string& c, const std::string& d,
+                       const std::string& e) {
+    return fmt::format("{:<{}}  {:<{}}  {:<18}  {:>10}  {:>8}\n", a, script, b, picture, c, d, e);
+  };
+  std::string text = row("script", "picture", "result", "differing", "largest");
+  for (const CheckedItem& item : outcome.items)
+    text += row(item.script, item.pictureText(), verdictText(item.verdict), grouped(item.differing),
+                fmt::format("{:.3g}", item.largest));
+  for (const CheckedItem& item : outcome.items)
+    if (item.verdict != Verdict::passed) text += fmt::format("{}: {}\n", item.title(), item.problem);
+  return text;
+}
+
+std::string checkCommandLine(const CheckRequest& request) {
+  std::string line = "hpsdf check " + shellWord(request.folder.string());
+  for (const auto& [name, value] : request.variables) line += " " + shellWord(name + "=" + value);
+  return line + " --out " + shellWord(request.output.string());
+}
+
+CheckPage checkPage(const CheckRequest& request) {
+  return {.title = "Check of " + request.folder.string(),
+          .checkCommand = checkCommandLine(request),
+          .acceptCommand = fmt::format("hpsdf accept {} --from {}", shellWord(request.folder.string()),
+                                       shellWord(request.output.string())),
+          .footer = versionText()};
+}
+
+void refuseInScripts(const Session& session, const char* verb) {
+  if (session.scriptDepth > 0) throw Error(fmt::format("{}: is for the command line; a script cannot run it", verb));
+}
+
+void runCheck(Session& session, const Arguments& arguments) {
+  refuseInScripts(session, "check");
+  const CheckRequest request{.folder = arguments.text("folder"),
+                             .output = arguments.text("out"),
+                             .only = arguments.texts("only"),
+                             .variables = parseVariables(arguments.texts("variables")),
+                             .junit = arguments.given("junit") ? arguments.text("junit") : ""};
+  const CheckOutcome outcome = check(session.registry(), session.console(), request);
+  const Json json = outcomeJson(outcome, request);
+  const fs::path page = request.output / "index.html";
+  writeTextFile(page, checkHtml(outcome, checkPage(request)));
+  if (!request.junit.empty()) writeTextFile(request.junit, junitXml(outcome));
+  writeTextFile(request.output / kCheckResults, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  std::ostream& out = session.console().out;
+  if (session.wantsJson(arguments))
+    printJson(out, json);
+  else
+    out << tableText(outcome) << page.string() << "\n";
+  if (outcome.failures() == 0) return;
+  const std::string summary = fmt::format("{} of {} comparisons failed; {} shows them", outcome.failures(),
+                                          outcome.items.size(), page.string());
+  if (outcome.scriptFailed()) throw Error(summary);
+  throw Failed(summary);
+}
+
+// accept
+
+Json lastResults(const fs::path& folder, const fs::path& from) {
+  const std::string file = (from / kCheckResults).string();
+  const std::string again = fmt::format("run 'hpsdf check {}' first", shellWord(folder.string()));
+  if (!fs::exists(file)) throw Error(fmt::format("{}: no such file; {}, or name its folder with --from", file, again));
+  Json json = Json::parse(readTextFile(file), nullptr, false);
+  if (!json.is_object() || !json.contains("items"))
+    throw Error(fmt::format("{}: is not the result of a whole check; {}", file, again));
+  if (json.value("folder", "") != folderId(folder))
+    throw Error(fmt::format("{}: is the result of a check of {}; {}", file, json.value("folder", ""), again));
+  return json;
+}
+
+struct Candidate {
+  std::string name = {};  ///< SCRIPT/PICTURE
+  std::string script = {};
+  std::string picture = {};
+  std::string renderer = {};
+};
+
+/// What the last check's scripts wrote, wrong pictures left out.
+std::vector<Candidate> candidates(const Json& results, const fs::path& from) {
+  std::vector<Candidate> found;
+  for (const Json& item : results.at("items")) {
+    if (!item.at("control_line").is_null()) continue;
+    Candidate candidate{.script = item.at("script"), .picture = item.at("picture"), .renderer = item.at("renderer")};
+    candidate.name = candidate.script + "/" + candidate.picture;
+    const bool written = fs::is_regular_file(from / "actual" / candidate.script / candidate.picture);
+    if (written) found.push_back(std::move(candidate));
+  }
+  return found;
+}
+
+const Candidate& candidate(const std::vector<Candidate>& all, const std::string& name) {
+  const auto found = std::ranges::find(all, name, &Candidate::name);
+  if (found != all.end()) return *found;
+  std::vector<std::string> names;
+  for (const Candidate& other : all) names.push_back(other.name);
+  const std::string near = nearestName(name, names);
+  throw Error(fmt::format("the last check wrote no picture '{}'; {}", name,
+                          near.empty() ? "expected SCRIPT/PICTURE.png" : fmt::format("did you mean '{}'?", near)));
+}
+
+std::array<std::size_t, 2> sizeOf(const fs::path& file) {
+  if (isDataFile(file)) {
+    const DataTable table = loadData(file);
+    return {table.columns, table.rows};
+  }
+  const render::Image image = render::loadPng(file);
+  return {std::size_t(image.width), std::size_t(image.height)};
+}
+
+/// What is known of the baseline so far; nothing where there is none, or no more than its bytes.
+std::optional<BaselineFacts> olderFacts(const fs::path& baseline) {
+  if (!fs::exists(baseline) || !fs::exists(factsFile(baseline))) return std::nullopt;
+  return loadFacts(baseline);
+}
+
+Json acceptOne(const Candidate& taken, const fs::path& folder, const fs::path& from, const Arguments& arguments) {
+  const fs::path actual = from / "actual" / taken.script / taken.picture;
+  const fs::path baseline = folder / "baselines" / taken.script / taken.picture;
+  const auto older = olderFacts(baseline);
+  BaselineFacts facts{.size = sizeOf(actual), .renderer = taken.renderer, .version = versionText()};
+  if (older) facts.budget = older->budget;
+  if (older) facts.bound = older->bound;
+  if (arguments.given("budget")) facts.budget = arguments.number("budget");
+  if (arguments.given("bound")) facts.bound = arguments.number("bound");
+  fs::create_directories(baseline.parent_path());
+  writeTextFile(baseline, readWholeFile(actual.string()));
+  saveFacts(facts, baseline);
+  return {{"name", taken.name},
+          {"baseline", baseline.string()},
+          {"renderer", taken.renderer},
+          {"renderer_before", older ? Json(older->renderer) : Json()}};
+}
+
+std::string acceptedText(const Json& accepted) {
+  const Json& before = accepted.at("renderer_before");
+  const auto shown = [](const std::string& renderer) { return renderer.empty() ? "none" : renderer; };
+  return fmt::format("{}\n  renderer now     {}\n  renderer before  {}\n", accepted.at("baseline").get<std::string>(),
+                     shown(accepted.at("renderer")),
+                     before.is_null() ? "none: a new baseline" : shown(before.get<std::string>()));
+}
+
+void runAccept(Session& session, const Arguments& arguments) {
+  refuseInScripts(session, "accept");
+  const fs::path folder = arguments.text("folder");
+  const fs::path from = arguments.text("from");
+  const auto all = candidates(lastResults(folder, from), from);
+  std::vector<Candidate> taken;  // all names are known before the first is written
+  for (const std::string& name : arguments.texts("names")) taken.push_back(candidate(all, name));
+  Json accepted = Json::array();
+  for (const Candidate& one : taken) accepted.push_back(acceptOne(one, folder, from, arguments));
+  if (session.wantsJson(arguments)) return printJson(session.console().out, accepted);
+  for (const Json& one : accepted) session.console().out << acceptedText(one);
+}
+
+Parameter folderParameter() {
+  return {.name = "folder",
+          .type = ParameterType::path,
+          .help = "Holds scripts/NAME.hps and baselines/NAME/PICTURE.png.",
+          .valueName = "FOLDER",
+          .positional = true,
+          .need = Need::always};
+}
+
+}  // namespace
+
+void addCheckCommands(Registry& registry) {
+  registry.add(
+      {.name = "check",
+       .summary = "Run a folder's scripts and compare their pictures with its baselines.",
+       .help =
+           "Each script of FOLDER/scripts runs in a session of its own and writes pictures (.png) and raw values "
+           "(.csv, .pfm) into $out; each is compared with its baseline in FOLDER/baselines/SCRIPT. Another size, too "
+           "many pixels that differ, a missing baseline, a baseline that nothing writes, a script that fails, and a "
+           "wrong picture that passes are failures.\n"
+           "\n"
+           "The output folder receives all that was written, the differences, and one page that shows the failures "
+           "and can be mailed. docs/check.md tells more.\n"
+           "\n"
+           "Exit status: 0 all as it should be, 1 a comparison failed, 2 a script failed or bad input.",
+       .examples = {"hpsdf check screenshots mesh=bunny.obj",
+                    "hpsdf check pictures --only gallery --out /tmp/check --junit check.xml"},
+       .parameters = {folderParameter(),
+                      {.name = "variables",
+                       .type = ParameterType::text,
+                       .help = "Variables of the scripts.",
+                       .valueName = "name=value",
+                       .positional = true,
+                       .repeatable = true},
+                      {.name = "out",
+                       .type = ParameterType::outputPath,
+                       .help = "The folder for the results; those of an earlier check in it are removed.",
+                       .defaultText = "check-results",
+                       .valueName = "FOLDER"},
+                      {.name = "only",
+                       .type = ParameterType::text,
+                       .help = "A script to run, rather than all: its file's name without .hps.",
+                       .valueName = "SCRIPT",
+                       .repeatable = true},
+                      {.name = "junit", .type = ParameterType::outputPath, .help = "XML file for CI."}},
+       .action = runCheck,
+       .takesVariables = true});
+  registry.add({.name = "accept",
+                .summary = "Take pictures of the last check as new baselines, one by one.",
+                .help = "Look at them first. Each NAME is SCRIPT/PICTURE.png as the check's table has it; its picture "
+                        "and a small JSON file with size, renderer and version go to FOLDER/baselines/SCRIPT.",
+                .examples = {"hpsdf accept screenshots gallery/degree.png",
+                             "hpsdf accept pictures lines/cracks.png --from /tmp/check --budget 0.005"},
+                .parameters = {folderParameter(),
+                               {.name = "names",
+                                .type = ParameterType::text,
+                                .help = "Which pictures to take.",
+                                .valueName = "SCRIPT/PICTURE",
+                                .positional = true,
+                                .repeatable = true,
+                                .need = Need::always},
+                               {.name = "from",
+                                .type = ParameterType::path,
+                                .help = "The folder that check wrote its results to.",
+                                .defaultText = "check-results",
+                                .valueName = "FOLDER"},
+                               {.name = "budget",
+                                .type = ParameterType::number,
+                                .help = "Share of the pixels or values that may differ, from now on. When left out, "
+                                        "that of the older baseline, or 0.002.",
+                                .minimum = 0,
+                                .maximum = 1},
+                               {.name = "bound",
+                                .type = ParameterType::number,
+                                .help = "By how much raw values may differ, from now on. When left out, that of the "
+                                        "older baseline, or 1e-6.",
+                                .minimum = 0}},
+                .action = runAccept});
+}
+
+}  // namespace hpsdf::app

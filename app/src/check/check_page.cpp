@@ -1,0 +1,186 @@
+#include "check/check_page.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+
+#include "files/html_page.h"
+#include "language/script.h"
+#include "language/summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kStyle = R"(
+table.items th, table.items td { padding-right: 1.2rem; }
+table.items tr.failed td { font-weight: 600; }
+td.number { text-align: right; }
+h2.failure { margin-top: 3.5rem; padding-top: 1rem; border-top: 3px solid var(--bar); overflow-wrap: anywhere; }
+.trio { display: grid; grid-template-columns: repeat(auto-fit, minmax(18rem, 1fr)); gap: 0 1rem; }
+.trio figure { margin-bottom: 1rem; }
+.trio img { cursor: zoom-in; }
+.trio figure.wide { grid-column: 1 / -1; }
+.trio figure.wide img { width: 100%; cursor: zoom-out; image-rendering: pixelated; }
+.slider { position: relative; display: none; margin: .5rem 0 1rem; }
+.slider img { display: block; width: 100%; border: 1px solid var(--line); border-radius: 4px; box-sizing: border-box; }
+.slider img.over { position: absolute; top: 0; left: 0; clip-path: inset(0 0 0 50%); }
+.slider input { width: 100%; margin: .5rem 0 0; }
+.ends { display: flex; justify-content: space-between; color: var(--quiet); font-size: .9rem; }
+i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; border: 1px solid var(--line);
+          vertical-align: -.15em; }
+)";
+
+/// The slider takes its pictures from those above it, so that the page holds each once.
+constexpr std::string_view kScript = R"(<script>
+for (const slider of document.querySelectorAll('.slider')) {
+  const [under, over] = slider.querySelectorAll('img');
+  const images = slider.previousElementSibling.querySelectorAll('img');
+  under.src = images[0].src;
+  over.src = images[1].src;
+  slider.style.display = 'block';
+  slider.querySelector('input').oninput = (event) => {
+    over.style.clipPath = 'inset(0 0 0 ' + event.target.value + '%)';
+  };
+}
+for (const image of document.querySelectorAll('.trio img'))
+  image.onclick = () => image.parentElement.classList.toggle('wide');
+</script>
+)";
+
+constexpr std::string_view kSlider =
+    "<div class=\"slider\"><img alt=\"baseline\"><img class=\"over\" alt=\"actual\">"
+    "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" value=\"50\" aria-label=\"how much of the baseline is "
+    "seen\"><div class=\"ends\"><span>left of the knob the baseline</span><span>right of it the actual picture</span>"
+    "</div></div>\n";
+
+std::string figureOf(const std::string& title, const fs::path& file) {
+  return fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
+                     htmlPng(readWholeFile(file.string())), htmlEscaped(title));
+}
+
+bool isPicture(const fs::path& file) { return lowerExtension(file) == ".png" && fs::exists(file); }
+
+std::string pictures(const CheckedItem& item) {
+  std::string html = "<div class=\"trio\">\n";
+  if (isPicture(item.baseline)) html += figureOf("Baseline", item.baseline);
+  if (isPicture(item.actual)) html += figureOf("Actual", item.actual);
+  if (isPicture(item.difference))
+    html += figureOf("Difference: dark grey is free, from mid grey to white counts", item.difference);
+  html += "</div>\n";
+  return isPicture(item.difference) ? html + std::string(kSlider) : html;
+}
+
+std::string swatch(const std::string& value) {
+  const std::string color = value.starts_with('#')
+                                ? fmt::format("<i class=\"color\" style=\"background:{}\"></i>", htmlEscaped(value))
+                                : std::string();
+  return color + htmlEscaped(value);
+}
+
+std::string worstPlaces(const CheckedItem& item) {
+  if (item.worst.empty()) return {};
+  std::string html =
+      "<table>\n<tr><th>The worst, from the top left</th><th>baseline</th><th>actual</th><th>difference</th></tr>\n";
+  for (const WorstPlace& worst : item.worst)
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", htmlEscaped(worst.place),
+                        swatch(worst.baseline), swatch(worst.actual), htmlEscaped(worst.difference));
+  return html + "</table>\n";
+}
+
+std::string fact(const std::string& name, const std::string& value) {
+  if (value.empty()) return {};
+  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", name, htmlEscaped(value));
+}
+
+std::string shareText(const CheckedItem& item) {
+  if (item.compared == 0) return {};
+  return fmt::format("{} of {} ({:.3g} %), of which {:.3g} % are free; the largest difference is {:.3g}",
+                     grouped(item.differing), grouped(item.compared),
+                     100 * double(item.differing) / double(item.compared), 100 * item.budget, item.largest);
+}
+
+std::string failure(const CheckedItem& item, const CheckPage& page) {
+  std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
+                                 verdictText(item.verdict), htmlEscaped(item.problem));
+  html += pictures(item) + worstPlaces(item);
+  html += "<table>\n" + fact("Differing", shareText(item)) + fact("Written by", item.where) +
+          fact("Renderer of the baseline", item.baselineRenderer) + fact("Renderer now", item.renderer) + "</table>\n";
+  html +=
+      fmt::format("<code>{} --only {}</code>\n", htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
+  const bool canBeTaken = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
+  if (canBeTaken)
+    html += fmt::format("<p>If it is right now:</p>\n<code>{} {}</code>\n", htmlEscaped(page.acceptCommand),
+                        htmlEscaped(shellWord(item.name())));
+  return html;
+}
+
+std::string overview(const CheckOutcome& outcome) {
+  std::string html =
+      "<table class=\"items\">\n<tr><th>Script</th><th>Picture</th><th>Result</th><th>Differing</th><th>Largest "
+      "difference</th></tr>\n";
+  for (const CheckedItem& item : outcome.items)
+    html += fmt::format(
+        "<tr{}><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{:.3g}</td></tr>\n",
+        item.verdict == Verdict::passed ? "" : " class=\"failed\"", htmlEscaped(item.script),
+        htmlEscaped(item.pictureText()), verdictText(item.verdict), grouped(item.differing), item.largest);
+  return html + "</table>\n";
+}
+
+/// XML knows no control characters and no broken UTF-8.
+std::string xmlText(const std::string& text) {
+  std::string plain = text;
+  for (char& c : plain)
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  const std::string mended = Json(plain).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return htmlEscaped(Json::parse(mended).get<std::string>());
+}
+
+std::string junitCase(const CheckedItem& item) {
+  const std::string begin =
+      fmt::format("    <testcase classname=\"{}\" name=\"{}\"", xmlText(item.script), xmlText(item.pictureText()));
+  if (item.verdict == Verdict::passed) return begin + "/>\n";
+  const char* kind = item.verdict == Verdict::scriptFailed ? "error" : "failure";
+  return fmt::format("{}>\n      <{} type=\"{}\" message=\"{}\"/>\n    </testcase>\n", begin, kind,
+                     verdictText(item.verdict), xmlText(item.problem));
+}
+
+}  // namespace
+
+std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page) {
+  const std::size_t failures = outcome.failures();
+  const std::string subtitle = failures == 0
+                                   ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
+                                   : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
+  std::string html = htmlHead(page.title, subtitle, kStyle);
+  html += "<h2>All comparisons</h2>\n" + overview(outcome);
+  html += fmt::format("<code>{}</code>\n", htmlEscaped(page.checkCommand));
+  for (const CheckedItem& item : outcome.items)
+    if (item.verdict != Verdict::passed) html += failure(item, page);
+  return html + std::string(kScript) + htmlFoot(page.footer);
+}
+
+std::string junitXml(const CheckOutcome& outcome) {
+  std::map<std::string, std::vector<const CheckedItem*>> suites;
+  for (const auto& [script, seconds] : outcome.seconds) suites[script];
+  for (const CheckedItem& item : outcome.items) suites[item.script].push_back(&item);
+  std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"hpsdf check\">\n";
+  for (const auto& [script, items] : suites) {
+    std::string cases;
+    std::size_t failures = 0, errors = 0;
+    for (const CheckedItem* item : items) {
+      cases += junitCase(*item);
+      errors += item->verdict == Verdict::scriptFailed ? 1 : 0;
+      failures += item->verdict != Verdict::passed && item->verdict != Verdict::scriptFailed ? 1 : 0;
+    }
+    const auto seconds = outcome.seconds.find(script);
+    xml += fmt::format(
+        "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\">\n{}"
+        "  </testsuite>\n",
+        xmlText(script), items.size(), failures, errors, seconds == outcome.seconds.end() ? 0 : seconds->second, cases);
+  }
+  return xml + "</testsuites>\n";
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,176 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "commands/commands.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/jumps.h"
+#include "language/summaries.h"
+#include "session/session.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr double kBarLength = 40;
+
+JumpKind jumpKind(const Arguments& arguments) {
+  return arguments.text("by") == "gradient" ? JumpKind::gradient : JumpKind::value;
+}
+
+std::string kindName(JumpKind kind) { return kind == JumpKind::value ? "value" : "gradient"; }
+
+Json jumpJson(const Jump& jump) { return {{"rms", jump.rms}, {"max", jump.max}}; }
+
+Json interfaceJson(const Interface& face) {
+  return {{"cells", face.cells},
+          {"degrees", face.degrees},
+          {"depths", face.depths},
+          {"axis", face.axis},
+          {"area", face.area},
+          {"center", vectorJson(face.center)},
+          {"worst", vectorJson(face.worst)},
+          {"value", jumpJson(face.value)},
+          {"gradient", jumpJson(face.gradient)}};
+}
+
+struct Row {
+  std::string label;
+  double from;
+  JumpBin bin;
+};
+
+/// The histogram's bins, before them the interfaces that match exactly, if there are any.
+std::vector<Row> histogramRows(const Jumps& jumps, JumpKind kind) {
+  Row exact{"0", 0, {jumps.interfaces.size(), jumps.area}};
+  std::vector<Row> rows;
+  for (const auto& [decade, bin] : jumpHistogram(jumps, kind)) {
+    rows.push_back({fmt::format("1e{} to 1e{}", decade, decade + 1), std::pow(10.0, decade), bin});
+    exact.bin.interfaces -= bin.interfaces;
+    exact.bin.area -= bin.area;
+  }
+  if (exact.bin.interfaces > 0) rows.insert(rows.begin(), exact);
+  return rows;
+}
+
+Json histogramJson(const Jumps& jumps, JumpKind kind) {
+  Json json = Json::array();
+  for (const Row& row : histogramRows(jumps, kind))
+    json.push_back({{"from", row.from}, {"interfaces", row.bin.interfaces}, {"area", row.bin.area}});
+  return json;
+}
+
+Json jumpsJson(const Jumps& jumps, JumpKind by, std::size_t count) {
+  Json worst = Json::array();
+  for (const std::size_t n : worstInterfaces(jumps, by, count)) worst.push_back(interfaceJson(jumps.interfaces[n]));
+  return {{"interfaces", jumps.interfaces.size()},
+          {"hanging", jumps.hanging},
+          {"area", jumps.area},
+          {"value", jumpJson(jumps.value)},
+          {"gradient", jumpJson(jumps.gradient)},
+          {"value_histogram", histogramJson(jumps, JumpKind::value)},
+          {"gradient_histogram", histogramJson(jumps, JumpKind::gradient)},
+          {"worst_by", kindName(by)},
+          {"worst", worst}};
+}
+
+std::string histogramText(const Jumps& jumps, JumpKind kind) {
+  std::string text = fmt::format("\n  {:<22} {:>8} {:>12}\n", kindName(kind) + " jump", "area", "interfaces");
+  for (const Row& row : histogramRows(jumps, kind)) {
+    const double share = row.bin.area / jumps.area;
+    std::string bar;
+    for (double length = 0; length < share * kBarLength; ++length) bar += "▇";
+    text += fmt::format("  {:<22} {:>6.2f} % {:>12}  {}\n", row.label, 100 * share, grouped(row.bin.interfaces), bar);
+  }
+  return text;
+}
+
+std::string worstText(const Jumps& jumps, JumpKind by, std::size_t count) {
+  std::string text = fmt::format("\n  {:>4} {:>10} {:>10}  {:<34} {:>4}  {:<16} {}\n", "", "value", "gradient", "at",
+                                 "axis", "degrees, depths", "cells");
+  int rank = 0;
+  for (const std::size_t n : worstInterfaces(jumps, by, count)) {
+    const Interface& face = jumps.interfaces[n];
+    text += fmt::format("  {:>4} {:>10} {:>10}  {:<34} {:>4}  {:<16} {}\n", ++rank, shortNumber(face.value.max),
+                        shortNumber(face.gradient.max), vectorText(face.worst), "xyz"[face.axis],
+                        fmt::format("{}|{}, {}|{}", face.degrees[0], face.degrees[1], face.depths[0], face.depths[1]),
+                        fmt::format("{}|{}", face.cells[0], face.cells[1]));
+  }
+  return text;
+}
+
+std::string jumpsText(const std::string& name, const Jumps& jumps, JumpKind by, std::size_t count) {
+  std::string text = name + "\n";
+  text += summaryRow("interfaces", fmt::format("{}, {} of them between cells of different size",
+                                               grouped(jumps.interfaces.size()), grouped(jumps.hanging)));
+  text += summaryRow("value jump",
+                     fmt::format("RMS {}, greatest {}", shortNumber(jumps.value.rms), shortNumber(jumps.value.max)));
+  text += summaryRow("gradient jump", fmt::format("RMS {}, greatest {}", shortNumber(jumps.gradient.rms),
+                                                  shortNumber(jumps.gradient.max)));
+  if (jumps.interfaces.empty()) return text;
+  text += histogramText(jumps, JumpKind::value) + histogramText(jumps, JumpKind::gradient);
+  if (count > 0) text += worstText(jumps, by, count);
+  return text;
+}
+
+void writeTable(const Jumps& jumps, const std::string& file) {
+  OutputFile out(file);
+  out.write(
+      "cell0,cell1,degree0,degree1,depth0,depth1,axis,area,x,y,z,value_rms,value_max,gradient_rms,gradient_max,"
+      "worst_x,worst_y,worst_z\n");
+  for (const Interface& face : jumps.interfaces)
+    out.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", face.cells[0], face.cells[1],
+                          face.degrees[0], face.degrees[1], face.depths[0], face.depths[1], face.axis, face.area,
+                          face.center.x(), face.center.y(), face.center.z(), face.value.rms, face.value.max,
+                          face.gradient.rms, face.gradient.max, face.worst.x(), face.worst.y(), face.worst.z()));
+  out.commit();
+}
+
+void runJumps(Session& session, const Arguments& arguments) {
+  useField(session, arguments);
+  const bool writes = arguments.has("output");
+  if (writes) checkWritable(arguments.text("output"));
+  const Jumps& jumps = session.jumps();
+  const auto count = static_cast<std::size_t>(arguments.whole("worst"));
+  if (writes) writeTable(jumps, arguments.text("output"));
+  if (session.wantsJson(arguments))
+    return printJson(session.console().out, jumpsJson(jumps, jumpKind(arguments), count));
+  session.console().out << jumpsText(session.current().name, jumps, jumpKind(arguments), count);
+}
+
+}  // namespace
+
+void addJumpsCommand(Registry& registry) {
+  registry.add({.name = "jumps",
+                .summary = "Measure where a field is not continuous.",
+                .help =
+                    "Leaves meet without matching. For each interface between two of them: the jump of the value and "
+                    "that of the gradient, as RMS over the face (exact) and as the greatest at the quadrature's "
+                    "points, along the edges and at the corners. Reported are totals, a histogram by powers of ten "
+                    "and the worst interfaces with their places. Lengths are in the field's units; a gradient has "
+                    "none.\n"
+                    "\n"
+                    "With -o, a table of all interfaces as CSV: cells, degrees and depths on the side of smaller "
+                    "and of greater coordinates, the axis across (0, 1, 2), area, centre, jumps, and where the "
+                    "value jumps most.",
+                .examples = {"hpsdf jumps bunny.hpsdf", "hpsdf jumps bunny.hpsdf --by gradient --worst 3",
+                             "hpsdf jumps bunny.hpsdf -o interfaces.csv --json"},
+                .parameters = {fieldParameter(),
+                               {.name = "worst",
+                                .type = ParameterType::wholeNumber,
+                                .help = "How many of the worst interfaces to list.",
+                                .defaultText = "10",
+                                .minimum = 0,
+                                .maximum = 1000000},
+                               {.name = "by",
+                                .type = ParameterType::choice,
+                                .help = "What makes an interface bad.",
+                                .defaultText = "value",
+                                .choices = {"value", "gradient"}},
+                               {.name = "output",
+                                .type = ParameterType::outputPath,
+                                .help = "CSV file for all interfaces.",
+                                .alias = 'o'}},
+                .action = runJumps});
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,190 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "commands/commands.h"
+#include "hpsdf/detail/line.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/render/line_plot.h"
+#include "language/summaries.h"
+#include "session/session.h"
+
+namespace hpsdf::app {
+namespace {
+
+bool isPicture(const std::string& file) {
+  const std::string kind = lowerExtension(file);
+  if (kind != ".png" && kind != ".csv")
+    throw Error(
+        fmt::format("{}: unknown kind of output '{}'; expected .png for a plot or .csv for the samples", file, kind));
+  return kind == ".png";
+}
+
+Vector3 pointOf(const Arguments& arguments, std::string_view name) {
+  const auto numbers = arguments.numbers(name);
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+Line lineOf(const Field& field, const Arguments& arguments) {
+  const Vector3 from = pointOf(arguments, "from"), to = pointOf(arguments, "to");
+  if (from == to) throw Error(fmt::format("from and to are both {}: give two points", vectorText(from)));
+  Line line = sampleLine(field, from, to, arguments.whole("samples"));
+  if (std::ranges::none_of(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }))
+    throw Error(fmt::format("the line from {} to {} does not meet the field's domain, {}: give other points",
+                            vectorText(from), vectorText(to), boxText(field.domain())));
+  return line;
+}
+
+/// At the line's samples; empty where the exact distance is not at hand.
+std::vector<double> exactValues(Session& session, const Arguments& arguments, const Line& line) {
+  const std::string mesh = arguments.textOr("mesh", "");
+  if (mesh.empty() && !session.knowsExact()) return {};
+  std::vector<Vector3> points;
+  for (const LineSample& sample : line.samples) points.push_back(sample.point);
+  std::vector<double> values(points.size());
+  session.exact(mesh)(points, values);
+  return values;
+}
+
+/// A row a sample; empty fields for what is not there.
+void writeTable(const Line& line, std::span<const double> exact, const std::string& file) {
+  OutputFile out(file);
+  out.write("t,s,x,y,z,cell,degree,depth,value,exact,error,gx,gy,gz,slope_along\n");
+  for (std::size_t i = 0; i < line.samples.size(); ++i) {
+    const LineSample& sample = line.samples[i];
+    const auto& cell = line.pieces[sample.piece].cell;
+    const Vector3 &x = sample.point, &g = sample.gradient;
+    out.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", sample.t, sample.t * line.length(), x.x(), x.y(),
+                          x.z(), cell ? fmt::format("{},{},{}", cell->id, cell->degree, cell->depth) : ",,",
+                          sample.value, exact.empty() ? "," : fmt::format("{},{}", exact[i], sample.value - exact[i]),
+                          g.x(), g.y(), g.z(), line.slopeAlong(sample)));
+  }
+  out.commit();
+}
+
+std::size_t cellCount(const Line& line) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }));
+}
+
+LineJump greatestJump(const Line& line) {
+  LineJump greatest{0, 0};
+  for (const LineJump& jump : jumpsAlong(line))
+    if (std::abs(jump.value) > std::abs(greatest.value)) greatest = jump;
+  return greatest;
+}
+
+double greatestError(const Line& line, std::span<const double> exact) {
+  double greatest = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i)
+    greatest = std::max(greatest, std::abs(line.samples[i].value - exact[i]));
+  return greatest;
+}
+
+void report(Session& session, const Arguments& arguments, const Line& line, std::span<const double> exact) {
+  const std::string file = arguments.text("output");
+  const LineJump jump = greatestJump(line);
+  const std::size_t cells = cellCount(line);
+  if (session.wantsJson(arguments)) {
+    Json json = {{"output", file},
+                 {"length", line.length()},
+                 {"samples", line.samples.size()},
+                 {"cells", cells},
+                 {"greatest_jump", {{"value", jump.value}, {"t", jump.t}}}};
+    if (!exact.empty()) json["greatest_error"] = greatestError(line, exact);
+    return printJson(session.console().out, json);
+  }
+  std::string text = fmt::format("{}: {} samples, {} {}", file, grouped(line.samples.size()), grouped(cells),
+                                 cells == 1 ? "cell" : "cells");
+  if (jump.value != 0)
+    text += fmt::format(", greatest jump {} at t = {:.4g}", shortNumber(std::abs(jump.value)), jump.t);
+  if (!exact.empty()) text += fmt::format(", greatest error {}", shortNumber(greatestError(line, exact)));
+  session.console().out << text << "\n";
+}
+
+void runProbe(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  const bool picture = isPicture(file);
+  if (!picture && arguments.given("size")) throw Error(fmt::format("{}: a table has no size; leave it out", file));
+  checkWritable(file);
+  useField(session, arguments);
+  const Field& field = session.current().field;
+  const Line line = lineOf(field, arguments);
+  const std::vector<double> exact = exactValues(session, arguments, line);
+  if (picture) {
+    const auto [width, height] = arguments.size("size");
+    savePng(render::drawLine(field, line, exact, width, height), file);
+  } else {
+    writeTable(line, exact, file);
+  }
+  report(session, arguments, line, exact);
+}
+
+}  // namespace
+
+void addProbeCommand(Registry& registry) {
+  registry.add(
+      {.name = "probe",
+       .summary = "Follow a field along a line: distance, error, gradient, cells.",
+       .help =
+           "The clearest view of a jump. As a picture, curves over the distance along the line: f and the exact "
+           "distance; the error f − exact on a scale of its own, or, where the exact distance is not at hand, the "
+           "jumps of f at the borders of cells; the gradient's length and its component along the line; bands of the "
+           "cells' degrees and depths. Borders of cells are thin lines through all of them, and jumps are upright "
+           "steps: each leaf's own polynomial is followed up to both of its ends.\n"
+           "\n"
+           "As CSV, a row a sample: t from 0 to 1, the distance s along the line, the point, its cell, degree and "
+           "depth, f, the exact distance, the error, the gradient, and its component along the line. At the border "
+           "of two cells there are two rows of one t, the limits from either side. Where the line is outside of the "
+           "domain, f is the field's continuation and the cell's columns are empty; so are those of the exact "
+           "distance where it is not known.",
+       .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
+                    "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
+                    "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
+       .parameters = {fieldParameter(),
+                      {.name = "from",
+                       .type = ParameterType::numbers,
+                       .help = "Where the line begins.",
+                       .valueName = "X,Y,Z",
+                       .unit = "world units",
+                       .counts = {3},
+                       .need = Need::always},
+                      {.name = "to",
+                       .type = ParameterType::numbers,
+                       .help = "Where it ends.",
+                       .valueName = "X,Y,Z",
+                       .unit = "world units",
+                       .counts = {3},
+                       .need = Need::always},
+                      {.name = "output",
+                       .type = ParameterType::outputPath,
+                       .help = "*.png or *.csv.",
+                       .alias = 'o',
+                       .need = Need::always},
+                      {.name = "samples",
+                       .type = ParameterType::wholeNumber,
+                       .help = "Evenly spaced ones, the ends among them; two more at each border of cells.",
+                       .defaultText = "1000",
+                       .minimum = 2,
+                       .maximum = 1000000},
+                      {.name = "mesh",
+                       .type = ParameterType::text,
+                       .help = "What the field was made from, for the exact distance. A built-in or analytic shape "
+                               "and a mesh that was built in the same script are known; without, there is none.",
+                       .defaultText = "",
+                       .valueName = "MESH"},
+                      {.name = "size",
+                       .type = ParameterType::size,
+                       .help = "Of the whole picture.",
+                       .defaultText = "1280x720",
+                       .unit = "pixels",
+                       .minimum = 16,
+                       .maximum = 16384,
+                       .whole = true,
+                       .counts = {2}}},
+       .action = runProbe});
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "console/interrupt.h"
+#include "console/progress_line.h"
+#include "hpsdf/error.h"
+#include "session/session.h"
+
+namespace hpsdf::app {
+
+/// Runs work(progress) with a progress line on the console; Ctrl-C or the console's listener cancels it. Throws
+/// `Cancelled` then.
+template <typename Work>
+auto withProgress(const Console& console, const Work& work) {
+  const InterruptGuard guard;
+  ProgressLine line(console.err, console.redrawsProgress);
+  WorkListener* const listener = console.listener;
+  struct AtEnd {
+    WorkListener* listener;
+    ~AtEnd() {
+      if (listener != nullptr) listener->ended();
+    }
+  } const atEnd{listener};
+  const Progress progress{
+      .report =
+          [&line, &console, listener](std::string_view task, double fraction) {
+            line.report(console.work + std::string(task), fraction);
+            if (listener != nullptr) listener->report(task, fraction);
+          },
+      .cancelled =
+          [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
+  };
+  auto result = work(progress);
+  progress.pause();  // asked for in the very last moment
+  return result;
+}
+
+inline double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,122 @@
+#include "files/data_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include "hpsdf/error.h"
+#include "language/script.h"
+#include "language/summaries.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// The numbers of a line, NaN and infinity included; nothing where one of its cells is none.
+std::optional<std::vector<double>> numbersOf(const std::string& line) {
+  std::vector<double> numbers;
+  for (const char* at = line.data();; ++at) {
+    const char* const end = line.data() + line.size();
+    double number = 0;
+    const auto [after, error] = std::from_chars(at, end, number);
+    if (error != std::errc()) return std::nullopt;
+    numbers.push_back(number);
+    if (after == end) return numbers;
+    if (*after != ',') return std::nullopt;
+    at = after;
+  }
+}
+
+DataTable readCsv(const std::string& file, const std::string& text) {
+  DataTable table;
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const auto numbers = numbersOf(line);
+    if (!numbers && number == 1) {
+      table.header = line;
+      table.columns = static_cast<std::size_t>(std::ranges::count(line, ',')) + 1;
+      continue;
+    }
+    if (number == 1) table.columns = numbers->size();
+    if (!numbers || numbers->size() != table.columns)
+      throw Error(fmt::format("{}:{}: expected {} numbers with commas between them", file, number, table.columns));
+    table.values.insert(table.values.end(), numbers->begin(), numbers->end());
+    ++table.rows;
+  }
+  return table;
+}
+
+/// As `hpsdf slice` writes it: one channel, little-endian.
+DataTable readPfm(const std::string& file, const std::string& text) {
+  std::istringstream stream(text);
+  std::string kind;
+  DataTable table;
+  double scale = 0;
+  stream >> kind >> table.columns >> table.rows >> scale;
+  const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
+  // more of either than bytes: their product may be anything
+  const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
+  const std::size_t count = table.columns * table.rows;
+  if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||
+      (text.size() - begin) / sizeof(float) != count || (text.size() - begin) % sizeof(float) != 0)
+    throw Error(file + ": is no whole .pfm file of one little-endian channel; write it anew with 'hpsdf slice'");
+  table.values.resize(count);
+  for (std::size_t n = 0; n < count; ++n) {
+    float value = 0;
+    std::memcpy(&value, text.data() + begin + n * sizeof value, sizeof value);
+    table.values[n] = value;
+  }
+  return table;
+}
+
+/// Two that are no numbers agree, and so do equal infinities.
+double difference(double a, double b) {
+  if (a == b || (std::isnan(a) && std::isnan(b))) return 0;
+  const double apart = std::abs(a - b);
+  return std::isnan(apart) ? std::numeric_limits<double>::infinity() : apart;
+}
+
+}  // namespace
+
+bool isDataFile(const std::filesystem::path& file) {
+  return lowerExtension(file) == ".csv" || lowerExtension(file) == ".pfm";
+}
+
+DataTable loadData(const std::filesystem::path& file) {
+  const std::string text = readWholeFile(file.string());
+  return lowerExtension(file) == ".pfm" ? readPfm(file.string(), text) : readCsv(file.string(), text);
+}
+
+DataComparison compare(const DataTable& baseline, const DataTable& actual, double bound) {
+  DataComparison result{.sameShape = baseline.header == actual.header && baseline.columns == actual.columns &&
+                                     baseline.rows == actual.rows};
+  if (!result.sameShape) return result;
+  result.compared = baseline.values.size();
+  std::vector<DataDifference> beyond;
+  for (std::size_t n = 0; n < baseline.values.size(); ++n) {
+    const double here = difference(baseline.values[n], actual.values[n]);
+    result.largest = std::max(result.largest, here);
+    if (here > bound)
+      beyond.push_back({n / baseline.columns, n % baseline.columns, baseline.values[n], actual.values[n], here});
+  }
+  result.differing = beyond.size();
+  std::ranges::stable_sort(beyond, std::ranges::greater(), &DataDifference::difference);
+  if (beyond.size() > kWorstData) beyond.resize(kWorstData);
+  result.worst = std::move(beyond);
+  return result;
+}
+
+std::string problem(const DataComparison& comparison, double bound, double budget) {
+  if (!comparison.sameShape) return "the tables have other rows or columns";
+  if (double(comparison.differing) <= budget * double(comparison.compared)) return {};
+  return fmt::format("{} of {} values differ by more than {}, at most by {:.3g}", comparison.differing,
+                     comparison.compared, shortNumber(bound), comparison.largest);
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,99 @@
+#include "files/film.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/error.h"
+#include "language/script.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAbout = "frames.json";  // by which a folder of frames is known again
+constexpr const char* kMovie = "film.mp4";
+constexpr const char* kLog = "ffmpeg.txt";
+
+bool isFrameName(std::string_view name) {
+  constexpr std::string_view kBefore = "frame-", kAfter = ".png";
+  if (!name.starts_with(kBefore) || !name.ends_with(kAfter) || name.size() < kBefore.size() + 4 + kAfter.size())
+    return false;
+  const auto digits = name.substr(kBefore.size(), name.size() - kBefore.size() - kAfter.size());
+  return std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readWholeFile(from.string())); }
+
+fs::path requireFfmpeg(const std::string& output) {
+  if (const auto found = findProgram("ffmpeg")) return *found;
+  throw Error(output + ": an MP4 takes the program ffmpeg, which PATH does not have; install it, or give a folder");
+}
+
+}  // namespace
+
+std::string Film::frameName(std::size_t frame) { return fmt::format("frame-{:04}.png", frame); }
+
+Film::Film(const std::string& output) : output_(output) {
+  constexpr std::array kOthers = {".png", ".gif", ".webm", ".mkv", ".mov", ".avi"};
+  const std::string kind = lowerExtension(output_);
+  if (std::ranges::find(kOthers, kind) != kOthers.end())
+    throw Error(fmt::format("{}: expected a folder for the frames, or a name that ends in .mp4", output));
+  if (kind == ".mp4") {
+    ffmpeg_ = requireFfmpeg(output);
+    checkWritable(output_);
+    return;
+  }
+  folder_ = std::make_unique<OutputFolder>(output_);
+  folder_->requireOwn(kAbout);
+  checkWritable(output_ / kAbout);
+}
+
+void Film::add(const render::Image& image) { savePng(image, work_.path() / frameName(frames_++)); }
+
+void Film::encode(double framesPerSecond, const Progress& progress) {
+  if (folder_) return;
+  if (progress.report) progress.report("encoding", 0);
+  // the usual 4:2:0 colours, which every player knows, come in pairs of pixels
+  const int status =
+      runOtherProgram(ffmpeg_,
+                      {"-hide_banner", "-loglevel", "error", "-y", "-framerate", fmt::format("{}", framesPerSecond),
+                       "-start_number", "0", "-i", "frame-%04d.png", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt",
+                       "yuv420p", "-movflags", "+faststart", kMovie},
+                      work_.path(), work_.path() / kLog, progress.cancelled);
+  if (status == 0 && fs::exists(work_.path() / kMovie)) return;
+  throw Error(fmt::format("{}: ffmpeg failed with status {} ({}); give a folder instead", output_.string(), status,
+                          lastLine(readTextFile((work_.path() / kLog).string()))));
+}
+
+Json Film::about(const render::Image& last, const std::string& renderer, Json rows) const {
+  for (std::size_t frame = 0; frame < rows.size(); ++frame) rows[frame]["file"] = frameName(frame);
+  return {{"output", output_.string()},
+          {"width", last.width},
+          {"height", last.height},
+          {"renderer", renderer},
+          {"frames", std::move(rows)}};
+}
+
+std::string Film::line(const Json& about) {
+  return fmt::format("{}: {} frames, {}x{}, {}\n", about["output"].get<std::string>(), about["frames"].size(),
+                     about["width"].get<int>(), about["height"].get<int>(), about["renderer"].get<std::string>());
+}
+
+void Film::publish(const Json& about) {
+  if (folder_) return publishFolder(about);
+  copyFile(work_.path() / kMovie, output_);
+}
+
+void Film::publishFolder(const Json& about) {
+  folder_->keep();
+  folder_->startAnew(kAbout, isFrameName);
+  for (std::size_t frame = 0; frame < frames_; ++frame)
+    copyFile(work_.path() / frameName(frame), output_ / frameName(frame));
+  writeTextFile(output_ / kAbout, about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace hpsdf::app

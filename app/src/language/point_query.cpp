@@ -1,0 +1,143 @@
+#include "language/point_query.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <vector>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::size_t kBatch = 16384;
+constexpr std::string_view kBlanks = " \t\r\v\f";
+
+bool isSeparator(char c) { return c == ',' || c == ';' || kBlanks.find(c) != std::string_view::npos; }
+bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
+std::string_view trimmed(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return line.substr(first, line.find_last_not_of(kBlanks) - first + 1);
+}
+
+/// Exactly three numbers with blanks, and at most one comma or semicolon, between them. Finite or not.
+std::optional<Vector3> parsePoint(std::string_view text) {
+  Vector3 point;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const char* const before = at;
+    int commas = 0;
+    for (; at != end && isSeparator(*at); ++at) commas += kBlanks.find(*at) == std::string_view::npos;
+    if (commas > (axis == 0 ? 0 : 1) || (axis > 0 && at == before)) return std::nullopt;
+    if (at != end && *at == '+') ++at;
+    const auto [next, error] = std::from_chars(at, end, point[axis]);
+    if (error != std::errc()) return std::nullopt;
+    at = next;
+  }
+  return at == end ? std::optional(point) : std::nullopt;
+}
+
+/// A line of column names: they begin with letters and are not numbers such as nan.
+bool isHeader(std::string_view text) {
+  return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
+}
+
+class Query {
+ public:
+  Query(const Field& field, std::string name, PointFormat format, const std::function<void(std::string_view)>& write)
+      : field_(field), name_(std::move(name)), format_(format), write_(write) {}
+
+  std::size_t run(std::istream& in) {
+    text_ = format_ == PointFormat::csv ? "x,y,z,distance,gx,gy,gz\n" : "[";
+    std::string line;
+    for (std::size_t number = 1; std::getline(in, line); ++number) {
+      std::string_view text = line;
+      if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
+      take(trimmed(text), number);
+      if (in.rdbuf()->in_avail() <= 0) flush();  // who writes a point and waits gets its answer
+    }
+    if (in.bad()) throw Error(name_ + ": cannot be read");
+    flush();
+    if (format_ == PointFormat::json) write_(count_ == 0 ? "]\n" : "\n]\n");
+    return count_;
+  }
+
+ private:
+  void take(std::string_view line, std::size_t number) {
+    if (const std::size_t comment = line.find('#'); comment != std::string_view::npos)
+      line = trimmed(line.substr(0, comment));
+    if (line.empty()) return;
+    const bool first = std::exchange(first_, false);
+    const auto point = parsePoint(line);
+    if (!point && first && isHeader(line)) return;
+    if (!point || !point->allFinite()) refuse(line, number);
+    points_.push_back(*point);
+    if (points_.size() == kBatch) flush();
+  }
+
+  /// JSON knows no infinity.
+  static std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
+
+  [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
+    constexpr std::size_t kShown = 60;
+    const std::string shown(line.substr(0, kShown));
+    throw Error(fmt::format("{}:{}: expected three finite numbers x,y,z, found '{}{}'", name_, number, shown,
+                            line.size() > kShown ? "…" : ""));
+  }
+
+  void flush() {
+    answers_.resize(points_.size());
+    field_.valuesAndGradients(points_, answers_);
+    auto out = std::back_inserter(text_);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const Vector3& x = points_[i];
+      const auto& [value, g] = answers_[i];
+      if (format_ == PointFormat::csv)
+        fmt::format_to(out, "{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), value, g.x(), g.y(), g.z());
+      else
+        fmt::format_to(out, R"({}{{"x":{},"y":{},"z":{},"distance":{},"gx":{},"gy":{},"gz":{}}})",
+                       count_ + i == 0 ? "\n" : ",\n", x.x(), x.y(), x.z(), number(value), number(g.x()), number(g.y()),
+                       number(g.z()));
+    }
+    count_ += points_.size();
+    points_.clear();
+    write_(text_);
+    text_.clear();
+  }
+
+  const Field& field_;
+  std::string name_;
+  PointFormat format_;
+  const std::function<void(std::string_view)>& write_;
+  bool first_ = true;
+  std::size_t count_ = 0;
+  std::vector<Vector3> points_;
+  std::vector<ValueAndGradient> answers_;
+  std::string text_;
+};
+
+}  // namespace
+
+std::ifstream openPoints(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) throw Error(file.string() + ": is a folder; give a file of points");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw Error(file.string() + (std::filesystem::exists(file, ignored) ? ": cannot be read; check its permissions"
+                                                                        : ": no such file; check the name"));
+  return stream;
+}
+
+std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
+                        const std::function<void(std::string_view)>& write) {
+  return Query(field, name, format, write).run(in);
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,366 @@
+#include "language/script.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <istream>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "console/failed.h"
+#include "hpsdf/detail/nearest_name.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::size_t kDeepestInclude = 16;  // as deep as `run` goes
+// A few lines can ask for any amount of memory, by variables made of variables and by files that include others twice.
+constexpr std::size_t kMostCalls = 100'000;
+constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // put in for $name, altogether
+
+bool isLower(char c) { return c >= 'a' && c <= 'z'; }
+bool isDigit(char c) { return c >= '0' && c <= '9'; }
+bool isLetter(char c) { return isLower(c) || (c >= 'A' && c <= 'Z') || c == '_'; }
+
+/// Of a variable: letters, digits and _, not first a digit.
+bool isIdentifier(std::string_view name) {
+  return !name.empty() && isLetter(name[0]) &&
+         std::ranges::all_of(name, [](char c) { return isLetter(c) || isDigit(c); });
+}
+
+/// Where a `=` ends a name of an option or a variable; npos for any other word, such as builtin:torus,major=0.7.
+std::size_t equalsAfterName(std::string_view word) {
+  const std::size_t equals = word.find('=');
+  if (equals == std::string_view::npos || equals == 0) return std::string_view::npos;
+  const auto name = word.substr(0, equals);
+  const bool plain =
+      isLetter(name[0]) && std::ranges::all_of(name, [](char c) { return isLetter(c) || isDigit(c) || c == '-'; });
+  return plain ? equals : std::string_view::npos;
+}
+
+struct Statement {
+  int line;
+  std::vector<Word> words;
+};
+
+/// Splits a script into statements and words.
+class Scanner {
+ public:
+  /// `includedFrom` ends every message: see `Call`. `variableBytes` counts what is put in for variables.
+  Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
+      : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
+
+  /// The next statement that has words; an empty one at the end of the text.
+  Statement next(const Variables& variables) {
+    Statement statement{line_, {}};
+    while (position_ < text_.size()) {
+      const char c = text_[position_];
+      if (c == '\n' || c == ';') {
+        advance();
+        if (!statement.words.empty()) return statement;
+        statement.line = line_;
+      } else if (c == ' ' || c == '\t' || c == '\r') {
+        advance();
+      } else if (c == '#') {
+        while (position_ < text_.size() && text_[position_] != '\n') advance();
+      } else {
+        statement.line = statement.words.empty() ? line_ : statement.line;
+        statement.words.push_back(word(variables));
+      }
+    }
+    return statement;
+  }
+
+  [[noreturn]] void fail(int line, int column, const std::string& message) const {
+    throw Error(fmt::format("{}:{}:{}: {}{}", name_, line, column, message, includedFrom_));
+  }
+
+ private:
+  void advance() {
+    if (text_[position_] == '\n') {
+      ++line_;
+      column_ = 1;
+    } else if ((static_cast<unsigned char>(text_[position_]) & 0xc0) != 0x80) {  // a UTF-8 character is one column
+      ++column_;
+    }
+    ++position_;
+  }
+
+  bool atWordEnd() const {
+    constexpr std::string_view kEnds = " \t\r\n;";
+    return position_ == text_.size() || kEnds.find(text_[position_]) != std::string_view::npos;
+  }
+
+  Word word(const Variables& variables) {
+    Word word{.column = column_};
+    std::size_t literal = std::string::npos;  // length of the part before the first quote or variable
+    while (!atWordEnd()) {
+      const char c = text_[position_];
+      if (c == '"' || c == '$') literal = std::min(literal, word.text.size());
+      if (c == '"') {
+        quoted(word.text, variables);
+      } else if (c == '$') {
+        variable(word.text, variables);
+      } else {
+        word.text += c;
+        advance();
+      }
+    }
+    word.equals = equalsAfterName(std::string_view(word.text).substr(0, literal));
+    return word;
+  }
+
+  void quoted(std::string& out, const Variables& variables) {
+    const int line = line_;
+    const int column = column_;
+    advance();
+    while (position_ < text_.size() && text_[position_] != '\n') {
+      const char c = text_[position_];
+      const char after = position_ + 1 < text_.size() ? text_[position_ + 1] : '\0';
+      if (c == '"') return advance();
+      if (c == '$') {
+        variable(out, variables);
+        continue;
+      }
+      if (c == '\\' && (after == '"' || after == '\\')) advance();
+      out += text_[position_];
+      advance();
+    }
+    fail(line, column, "this quote is not closed on its line; expected another \"");
+  }
+
+  void variable(std::string& out, const Variables& variables) {
+    const int column = column_;
+    advance();
+    if (position_ < text_.size() && text_[position_] == '$') {
+      out += '$';
+      return advance();
+    }
+    const bool braced = position_ < text_.size() && text_[position_] == '{';
+    if (braced) advance();
+    std::string name;
+    while (position_ < text_.size() && (isLetter(text_[position_]) || isDigit(text_[position_]))) {
+      name += text_[position_];
+      advance();
+    }
+    if (braced && (position_ == text_.size() || text_[position_] != '}'))
+      fail(line_, column, "expected } after ${" + name);
+    if (braced) advance();
+    if (!isIdentifier(name)) fail(line_, column, "expected a variable's name after $; a plain dollar sign is $$");
+    const auto found = variables.find(name);
+    if (found == variables.end()) fail(line_, column, unknownVariable(name, variables));
+    variableBytes_ += found->second.size();
+    if (variableBytes_ > kMostVariableBytes)
+      fail(line_, column,
+           fmt::format("the script's variables make more than {} characters; take some out", kMostVariableBytes));
+    out += found->second;
+  }
+
+  static std::string unknownVariable(const std::string& name, const Variables& variables) {
+    std::vector<std::string> known;
+    for (const auto& [other, value] : variables) known.push_back(other);
+    const std::string near = nearestName(name, known);
+    return fmt::format("unknown variable ${}; {}", name,
+                       near.empty() ? fmt::format("give {}=VALUE after the script, or 'set {}=VALUE'", name, name)
+                                    : fmt::format("did you mean ${}?", near));
+  }
+
+  std::string_view name_;
+  std::string_view text_;
+  std::string_view includedFrom_;
+  std::size_t& variableBytes_;
+  std::size_t position_ = 0;
+  int line_ = 1;
+  int column_ = 1;
+};
+
+/// Reads a script and, in their places, those that it includes.
+class ScriptReader {
+ public:
+  ScriptReader(const Registry& registry, Variables variables) : registry_(registry), variables_(std::move(variables)) {}
+
+  std::vector<Call> read(std::string_view name, std::string_view text) {
+    add(name, text);
+    return std::move(calls_);
+  }
+
+ private:
+  /// A script that is being read, and where it includes the next.
+  struct Open {
+    std::string name;
+    std::string where = {};
+    int line = 0;
+  };
+
+  void add(std::string_view name, std::string_view text) {
+    const std::string includedFrom = includedFromText();
+    open_.push_back({std::string(name)});
+    Scanner scanner(name, text, includedFrom, variableBytes_);
+    for (;;) {
+      const Statement statement = scanner.next(variables_);
+      if (statement.words.empty()) break;
+      const std::optional<Included> included = addCall(scanner, statement, includedFrom);
+      if (included) add(included->name, included->text);
+    }
+    open_.pop_back();
+  }
+
+  struct Included {
+    std::string name, text;
+  };
+
+  /// Checks the statement; what it includes, if it does.
+  std::optional<Included> addCall(const Scanner& scanner, const Statement& statement, const std::string& includedFrom) {
+    const Word& verb = statement.words.front();
+    const auto rest = std::span(statement.words).subspan(1);
+    std::optional<Included> included;
+    try {
+      if (calls_.size() == kMostCalls)
+        throw Error(
+            fmt::format("more than {} commands, those of included scripts among them; take some out", kMostCalls));
+      const Command& command = registry_.command(verb.text);
+      if (command.commandLineOnly)
+        throw Error(fmt::format("'{}' is a command of the command line: hpsdf {} …", verb.text, verb.text));
+      Arguments arguments = parseArguments(command, rest, Origin::script);
+      if (command.definesVariables)
+        for (auto& [key, value] : parseVariables(arguments.texts("assignments"))) variables_[key] = value;
+      open_.back().where = fmt::format("{}:{}:{}", open_.back().name, statement.line, verb.column);
+      open_.back().line = statement.line;
+      if (command.includesScript) included = readIncluded(arguments.text("script"));
+      calls_.push_back({&command, std::move(arguments), open_.back().where, includedFrom, open_.front().line});
+    } catch (const ArgumentError& error) {
+      scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what());
+    } catch (const Error& error) {
+      scanner.fail(statement.line, verb.column, error.what());
+    }
+    return included;
+  }
+
+  /// A relative name starts at the folder of the script that includes it.
+  Included readIncluded(const std::string& file) const {
+    const auto path = (std::filesystem::path(open_.back().name).parent_path() / file).lexically_normal();
+    const auto isThat = [&](const Open& other) {
+      std::error_code missing;
+      return std::filesystem::equivalent(path, other.name, missing);
+    };
+    if (std::ranges::any_of(open_, isThat))
+      throw Error(
+          fmt::format("{}: includes itself, directly or by others; take one of the includes out", path.string()));
+    if (std::error_code missing; std::filesystem::exists(path, missing) &&
+                                 !std::filesystem::is_regular_file(path, missing) &&
+                                 !std::filesystem::is_directory(path, missing))
+      throw Error(path.string() + ": is not a regular file; include a script");  // a device may have no end
+    if (open_.size() > kDeepestInclude)
+      throw Error(
+          fmt::format("{}: more than {} scripts include each other; take some apart", path.string(), kDeepestInclude));
+    return {path.string(), readTextFile(path.string())};
+  }
+
+  std::string includedFromText() const {
+    if (open_.empty()) return {};
+    std::string text = " (included from ";
+    for (auto from = open_.rbegin(); from != open_.rend(); ++from)
+      text += (from == open_.rbegin() ? "" : ", ") + from->where;
+    return text + ")";
+  }
+
+  const Registry& registry_;
+  Variables variables_;
+  std::vector<Open> open_;  // the script itself first
+  std::vector<Call> calls_;
+  std::size_t variableBytes_ = 0;
+};
+
+std::ifstream openFile(const std::string& file) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::is_directory(status)) throw Error(file + ": is a folder; give a file");
+  if (std::filesystem::is_character_file(status) || std::filesystem::is_block_file(status))
+    throw Error(file + ": is a device; give a file");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw Error(file + (std::filesystem::exists(status) ? ": cannot be read; check its permissions"
+                                                        : ": no such file; check the name"));
+  return stream;
+}
+
+std::string readAll(std::istream& in, const std::string& name, std::size_t mostBytes) {
+  std::string text;
+  std::vector<char> piece(std::size_t{1} << 16);
+  while (in) {
+    in.read(piece.data(), std::streamsize(piece.size()));
+    text.append(piece.data(), std::size_t(in.gcount()));
+    if (text.size() > mostBytes)
+      throw Error(fmt::format("{}: is longer than {} bytes; check that it is the right one", name, mostBytes));
+  }
+  if (in.bad()) throw Error(name + ": cannot be read to its end; check where it lies");
+  return text;
+}
+
+}  // namespace
+
+std::string readText(std::istream& in, const std::string& name) { return readAll(in, name, kMostTextBytes); }
+
+std::string readTextFile(const std::string& file) {
+  std::ifstream stream = openFile(file);
+  return readText(stream, file);
+}
+
+std::string readWholeFile(const std::string& file) {
+  std::ifstream stream = openFile(file);
+  return readAll(stream, file, std::numeric_limits<std::size_t>::max());
+}
+
+std::string lastLine(const std::string& text) {
+  std::istringstream lines(text);
+  std::string last;
+  for (std::string line; std::getline(lines, line);)
+    if (!line.empty()) last = line;
+  return last;
+}
+
+void writeTextFile(const std::filesystem::path& file, std::string_view text) {
+  OutputFile out(file);
+  out.write(text);
+  out.commit();
+}
+
+bool isVariableAssignment(std::string_view word) {
+  const std::size_t equals = word.find('=');
+  return equals != std::string_view::npos && isIdentifier(word.substr(0, equals));
+}
+
+Variables parseVariables(const std::vector<std::string>& words) {
+  Variables variables;
+  for (const std::string& word : words) {
+    if (!isVariableAssignment(word)) throw Error(fmt::format("expected name=value, found '{}'", word));
+    variables[word.substr(0, word.find('='))] = word.substr(word.find('=') + 1);
+  }
+  return variables;
+}
+
+std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
+                              Variables variables) {
+  return ScriptReader(registry, std::move(variables)).read(name, text);
+}
+
+void runScript(Session& session, std::span<const Call> calls) {
+  for (const Call& call : calls) {
+    try {
+      perform(*call.command, session, call.arguments);
+    } catch (const Failed& error) {
+      throw Failed(call.where + ": " + error.what() + call.includedFrom, error.status());
+    } catch (const Error& error) {
+      throw Error(call.where + ": " + error.what() + call.includedFrom);
+    }
+  }
+}
+
+}  // namespace hpsdf::app

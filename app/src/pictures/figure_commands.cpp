@@ -1,0 +1,179 @@
+// pick and expect: figures of the current field and of the last picture.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "commands/commands.h"
+#include "console/failed.h"
+#include "hpsdf/detail/nearest_name.h"
+#include "language/expectation.h"
+#include "language/summaries.h"
+#include "pictures/readout.h"
+#include "session/session.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// What the last picture shows at a pixel; null where that is nothing of the field. With what takes longer to find:
+/// the exact distance, where it is known, and the jumps at the cell's nearest face.
+Json pickJson(Session& session, int x, int y, bool withAll) {
+  const auto pick = render::pickAt(session.current().field, session.picture(), x, y);
+  if (!pick) return {};
+  const Vector3 gradient = session.current().field.valueAndGradient(pick->position).gradient;
+  Json json = {{"position", vectorJson(pick->position)},
+               {"value", pick->value},
+               {"cell", pick->cell},
+               {"degree", pick->degree},
+               {"depth", pick->depth},
+               {"gradient", vectorJson(gradient)},
+               {"slope", gradient.norm()}};
+  if (!withAll) return json;
+  const Readout readout = readoutAt(session, *pick);
+  json["jump"] = {{"value", readout.valueJump.max}, {"gradient", readout.gradientJump.max}};
+  if (readout.exact) json["exact"] = *readout.exact, json["error"] = readout.value - *readout.exact;
+  return json;
+}
+
+Json pointJson(Session& session, const Vector3& x, bool withExact) {
+  const Field& field = session.current().field;
+  const auto [value, gradient] = field.valueAndGradient(x);
+  const Cell cell = field.cellAt(x);
+  Json json = {{"position", vectorJson(x)}, {"value", value},      {"cell", cell.id},
+               {"degree", cell.degree},     {"depth", cell.depth}, {"gradient", vectorJson(gradient)},
+               {"slope", gradient.norm()}};
+  if (!withExact) return json;
+  double exact = 0;
+  session.exact("")(std::span(&x, 1), std::span(&exact, 1));
+  json["exact"] = exact;
+  json["error"] = value - exact;
+  return json;
+}
+
+Json jumpFigures(const Jumps& jumps) {
+  return {{"interfaces", jumps.interfaces.size()},
+          {"hanging", jumps.hanging},
+          {"area", jumps.area},
+          {"max", jumps.value.max},
+          {"rms", jumps.value.rms},
+          {"gradient_max", jumps.gradient.max},
+          {"gradient_rms", jumps.gradient.rms}};
+}
+
+Json figuresOf(Session& session, const Expectation& expectation) {
+  const auto& n = expectation.arguments;
+  if (expectation.source == "stats") return fieldJson(session.current());
+  if (expectation.source == "jumps") return jumpFigures(session.jumps());
+  if (expectation.source == "at") {
+    const bool withExact = expectation.path[0] == "exact" || expectation.path[0] == "error";
+    return pointJson(session, {n[0], n[1], n[2]}, withExact);
+  }
+  const std::string& figure = expectation.path[0];
+  const bool withAll = figure == "jump" || figure == "exact" || figure == "error";
+  Json pick = pickJson(session, static_cast<int>(n[0]), static_cast<int>(n[1]), withAll);
+  if (pick.is_null()) throw Failed(fmt::format("pixel {},{} shows no part of the field", n[0], n[1]));
+  return pick;
+}
+
+/// The element that a path leads to. Throws `Error` with the nearest known name.
+double followed(Json json, const Expectation& expectation) {
+  std::string way = expectation.source;
+  for (const std::string& key : expectation.path) {
+    const bool isElement = json.is_array() && parseNumber(key) && json.size() > std::size_t(*parseNumber(key));
+    if (!isElement && !(json.is_object() && json.contains(key))) {
+      std::vector<std::string> known;
+      for (const auto& [name, value] : json.items()) known.push_back(name);
+      const std::string near = nearestName(key, known);
+      throw Error(fmt::format(
+          "{} has no '{}'; {}", way, key,
+          near.empty() ? fmt::format("it has {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near)));
+    }
+    json = isElement ? Json(json[std::size_t(*parseNumber(key))]) : Json(json[key]);
+    way += "." + key;
+  }
+  if (!json.is_number()) throw Error(fmt::format("{} is no number", way));
+  return json.get<double>();
+}
+
+void runPick(Session& session, const Arguments& arguments) {
+  const auto pixel = arguments.numbers("pixel");
+  const Json pick = pickJson(session, static_cast<int>(pixel[0]), static_cast<int>(pixel[1]), false);
+  std::ostream& out = session.console().out;
+  if (session.wantsJson(arguments)) return printJson(out, pick);
+  if (pick.is_null()) {
+    out << fmt::format("pixel {},{}: no part of the field\n", pixel[0], pixel[1]);
+    return;
+  }
+  const auto& p = pick["position"];
+  out << fmt::format(
+      "pixel {},{}: ({:.6g}, {:.6g}, {:.6g}), value {:.6g}, cell {}, degree {}, depth {}, slope {:.6g}\n", pixel[0],
+      pixel[1], p[0].get<double>(), p[1].get<double>(), p[2].get<double>(), pick["value"].get<double>(),
+      pick["cell"].get<std::uint32_t>(), pick["degree"].get<int>(), pick["depth"].get<int>(),
+      pick["slope"].get<double>());
+}
+
+std::string expressionOf(const Arguments& arguments) {
+  return fmt::format("{}", fmt::join(arguments.texts("expression"), " "));
+}
+
+void runExpect(Session& session, const Arguments& arguments) {
+  const std::string text = expressionOf(arguments);
+  const Expectation expectation = parseExpectation(text);
+  const double found = followed(figuresOf(session, expectation), expectation);
+  if (!expectation.holds(found)) throw Failed(fmt::format("expected {}, found {}", text, found));
+  if (session.wantsJson(arguments)) printJson(session.console().out, {{"expected", text}, {"found", found}});
+}
+
+}  // namespace
+
+void addFigureCommands(Registry& registry) {
+  registry.add({.name = "pick",
+                .summary = "Tell what a pixel of the last picture shows.",
+                .help =
+                    "Position, value as it was drawn, cell, degree and depth, and the field's gradient there. Pixels "
+                    "are counted from the upper left corner of the whole picture; of several samples the middle "
+                    "one is taken.",
+                .examples = {"pick 640,360", "pick 100,200 json=true"},
+                .parameters = {{.name = "pixel",
+                                .type = ParameterType::numbers,
+                                .help = "Column and row.",
+                                .valueName = "X,Y",
+                                .minimum = 0,
+                                .maximum = 16383,
+                                .whole = true,
+                                .counts = {2},
+                                .positional = true,
+                                .need = Need::always}},
+                .action = runPick,
+                .scriptOnly = true});
+  registry.add(
+      {.name = "expect",
+       .summary = "Check a figure: the script ends with status 1 where it does not hold.",
+       .help =
+           "EXPRESSION is FIGURE OPERATOR NUMBER, the operator ==, !=, <, <=, > or >=; with == and !=, 'within' and a "
+           "tolerance may follow. Figures are\n"
+           "\n"
+           "stats.NAME: what 'info --json' says, e.g. stats.leaves, stats.rms_estimate, stats.degree_volume.3;\n"
+           "\n"
+           "jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;\n"
+           "\n"
+           "pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, "
+           "gradient.0, slope; exact and error where the exact distance is known; jump.value and jump.gradient at the "
+           "nearest face of its cell;\n"
+           "\n"
+           "at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is "
+           "known.",
+       .examples = {"expect stats.leaves < 60000", "expect jumps.max < 1e-2", "expect pick(640,360).degree == 4",
+                    "expect at(0,0,0.5).value == 0.1 within 1e-5"},
+       .parameters = {{.name = "expression",
+                       .type = ParameterType::text,
+                       .help = "What should hold.",
+                       .valueName = "EXPRESSION",
+                       .positional = true,
+                       .repeatable = true,
+                       .need = Need::always}},
+       .action = runExpect,
+       .check = [](const Arguments& arguments) { parseExpectation(expressionOf(arguments)); },
+       .scriptOnly = true});
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,272 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <ostream>
+
+#include "commands/commands.h"
+#include "console/long_work.h"
+#include "construction/building.h"
+#include "files/film.h"
+#include "language/script.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
+#include "session/session.h"
+
+namespace hpsdf::app {
+namespace {
+
+std::vector<Parameter> filmParameters(const std::string& frames, const std::string& help) {
+  return {{.name = "output",
+           .type = ParameterType::outputPath,
+           .help = "A folder, which receives frame-0000.png, frame-0001.png …; or *.mp4, for which ffmpeg must be "
+                   "installed. Frames of an earlier run are removed from the folder; one that holds other things is "
+                   "refused.",
+           .valueName = "FOLDER|FILE.mp4",
+           .alias = 'o',
+           .need = Need::always},
+          {.name = "frames",
+           .type = ParameterType::wholeNumber,
+           .help = help,
+           .defaultText = frames,
+           .minimum = 2,
+           .maximum = 10000},
+          {.name = "fps",
+           .type = ParameterType::number,
+           .help = "Frames a second of an .mp4.",
+           .defaultText = "12",
+           .minimum = 0.1,
+           .maximum = 240}};
+}
+
+/// Those of another command, without what is the caller's own.
+std::vector<Parameter> parametersOf(const Registry& registry, std::string_view command,
+                                    std::initializer_list<std::string_view> without) {
+  std::vector<Parameter> parameters = registry.command(command).parameters;
+  std::erase_if(parameters, [&](const Parameter& parameter) {
+    return parameter.name == "json" || std::ranges::find(without, parameter.name) != without.end();
+  });
+  return parameters;
+}
+
+void append(std::vector<Parameter>& parameters, std::vector<Parameter> more) {
+  std::ranges::move(more, std::back_inserter(parameters));
+}
+
+void step(const Progress& progress, std::size_t done, std::size_t all) {
+  progress.at("drawing frames", double(done) / double(all));
+}
+
+/// What the commands report, and a folder's frames.json holds; a frame a row of `rows`.
+void publish(Session& session, const Arguments& arguments, Film& film, const render::Image& image, Json rows) {
+  const Json about = film.about(image, session.lastRenderer(), std::move(rows));
+  film.publish(about);
+  if (session.wantsJson(arguments)) return printJson(session.console().out, about);
+  session.console().out << Film::line(about);
+}
+
+// turntable
+
+void runTurntable(Session& session, const Arguments& arguments) {
+  render::SurfacePicture picture = surfacePicture(arguments);
+  const Backend chosen = backend(arguments);
+  const int frames = arguments.whole("frames");
+  Film film(arguments.text("output"));
+  useField(session, arguments);
+  const InterruptGuard guard;  // until all is in its place
+  const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
+  render::Renderer& renderer = session.renderer(chosen);
+  const Field& field = session.current().field;
+  picture = surfacePicture(arguments, field.domain());
+  const double first = picture.camera.azimuthDegrees;
+  Json rows = Json::array();
+  bool seen = false;
+  const render::Image last = withProgress(session.console(), [&](const Progress& progress) {
+    render::Image image;
+    for (int frame = 0; frame < frames; ++frame) {
+      step(progress, film.frames(), std::size_t(frames));
+      picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
+      render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
+      picture.scale = drawn.scale;  // that of the first frame, so that no colour changes its meaning
+      seen |= drawn.seen;
+      image = std::move(drawn.image);
+      film.add(image);
+      rows.push_back({{"file", ""}, {"azimuth", picture.camera.azimuthDegrees}});
+    }
+    film.encode(arguments.number("fps"), progress);
+    return image;
+  });
+  noteOddSurface(session.console(), field, picture, seen);
+  publish(session, arguments, film, last, rows);
+}
+
+// frames
+
+/// `slice` and `render` without field and output: what --of takes.
+Registry looks(const Registry& registry) {
+  Registry result;
+  for (const char* name : {"slice", "render"}) {
+    Command command = registry.command(name);
+    command.parameters = parametersOf(registry, name, {"field", "output"});
+    result.add(std::move(command));
+  }
+  return result;
+}
+
+/// The one command of --of. Throws `Error` "of:line:column: …".
+Call lookOf(const Registry& looks, const Arguments& arguments) {
+  std::vector<Call> calls = parseScript(looks, "of", arguments.text("of"), {});
+  if (calls.size() != 1) throw Error("of: expected one command, slice or render");
+  return std::move(calls.front());
+}
+
+bool isSlice(const Call& look) { return look.command->name == "slice"; }
+
+render::ColorBy colorOf(const Call& look) {
+  return isSlice(look) ? slicePicture(look.arguments).color : surfacePicture(look.arguments).color;
+}
+
+void checkFrames(const Registry& looks, const Arguments& arguments) {
+  const Call look = lookOf(looks, arguments);
+  colorOf(look);
+  backend(look.arguments);
+}
+
+/// Draws the session's current field, on a scale that is given, if one is.
+render::Drawn drawLook(Session& session, const Call& look, const std::optional<render::ScaleOptions>& scale) {
+  const Arguments& arguments = look.arguments;
+  const auto drawn = [&](auto picture, auto draw) {
+    if (scale) picture.scale = *scale;
+    const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
+    return draw(session.renderer(backend(arguments)), session.current().field, picture, reference);
+  };
+  const Box& domain = session.current().field.domain();
+  if (!isSlice(look)) return drawn(surfacePicture(arguments, domain), render::drawSurface);
+  return drawn(slicePicture(arguments, domain), render::drawSlice);
+}
+
+/// The steps after which a frame is drawn: none, then 1 growing by an even factor to all, each more than the one
+/// before. As many as are asked for, or one for each step where there are fewer.
+std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
+  frames = std::min<std::uint64_t>(frames, all + 1);
+  std::vector<std::uint64_t> steps = {0};
+  for (std::size_t frame = 1; frame < frames; ++frame) {
+    const double share = frames == 2 ? 1 : double(frame - 1) / double(frames - 2);
+    const auto wanted = static_cast<std::uint64_t>(std::llround(std::pow(double(all), share)));
+    steps.push_back(std::clamp(wanted, steps.back() + 1, all - (frames - 1 - frame)));
+  }
+  return steps;
+}
+
+/// All levels from the lowest of the base cells to the highest of the finished field: each that a frame between them
+/// can have.
+void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
+  if (scale.levels.empty()) return;
+  const FieldStatistics figures = statistics(base);
+  const auto& levels = color == render::ColorBy::degree ? figures.degreeLeaves : figures.depthLeaves;
+  const int first = std::min(levels.begin()->first, scale.levels.front());
+  scale.levels.resize(std::size_t(scale.levels.back() - first + 1));
+  std::iota(scale.levels.begin(), scale.levels.end(), first);
+}
+
+Json frameRow(const Field& field) {
+  return {{"file", ""}, {"steps", *field.metadata().steps}, {"leaves", statistics(field).leaves}};
+}
+
+void runFrames(Session& session, const Registry& looks, const Arguments& arguments) {
+  const Call look = lookOf(looks, arguments);
+  const std::string surface = arguments.text("mesh");
+  Film film(arguments.text("output"));
+  const InterruptGuard guard;  // until all is in its place
+  BuiltField built = buildField(session.console(), surface, arguments);
+  const std::shared_ptr<const DistanceFunction> exact = built.exact;
+  session.setField({std::move(built.field), surface});
+  session.setExact(exact);
+  const Field& finished = session.current().field;
+  const auto steps = frameSteps(std::size_t(arguments.whole("frames")), *finished.metadata().steps);
+  render::ScaleOptions scale = drawLook(session, look, std::nullopt).scale;
+
+  Json rows = Json::array();
+  std::ostream silent(nullptr);  // of what is done for each frame
+  const auto addStage = [&](Field field) {
+    if (film.frames() == 0) widenLevels(scale, field, colorOf(look));
+    rows.push_back(frameRow(field));
+    Session stage(session.registry(), {session.console().in, silent, silent});
+    stage.setField({std::move(field), surface});
+    stage.setExact(exact);
+    film.add(drawLook(stage, look, scale).image);
+  };
+  const render::Image last = withProgress(session.console(), [&](const Progress& progress) {
+    buildStages(*exact, finished.domain(), buildOptions(arguments), std::span(steps).first(steps.size() - 1),
+                [&](Field field) {
+                  step(progress, film.frames(), steps.size());
+                  addStage(std::move(field));
+                },
+                {.report = {}, .cancelled = progress.cancelled});
+    rows.push_back(frameRow(finished));
+    render::Image image = drawLook(session, look, scale).image;
+    film.add(image);
+    film.encode(arguments.number("fps"), progress);
+    return image;
+  });
+  publish(session, arguments, film, last, rows);
+}
+
+Command turntableCommand(const Registry& registry) {
+  Command command{
+      .name = "turntable",
+      .summary = "Draw a field's surface from all around, as frames or an MP4.",
+      .help =
+          "The camera circles its target once, by even angles, from the azimuth that camera or view gives; the first "
+          "frame is what 'hpsdf render' draws with the same options. Where a quantity's scale is chosen from what is "
+          "shown, that of the first frame holds for all.",
+      .examples = {"hpsdf turntable bunny.hpsdf -o bunny.mp4 --size 960x540 --samples 2",
+                   "hpsdf turntable bunny.hpsdf -o turn --frames 36 --color degree"},
+      .parameters = {fieldParameter()},
+      .action = runTurntable};
+  append(command.parameters, filmParameters("72", "How many, for the whole circle."));
+  append(command.parameters, parametersOf(registry, "render", {"field", "output"}));
+  return command;
+}
+
+Command framesCommand(const Registry& registry) {
+  const auto shared = std::make_shared<const Registry>(looks(registry));
+  Command command{
+      .name = "frames",
+      .summary = "Draw how a field refines itself, as frames or an MP4.",
+      .help =
+          "The first frame has the base cells, the last the finished field; those between have a number of "
+          "refinement steps that grows by an even factor from 1. Takes the options of 'hpsdf build', and in 'of' the "
+          "command that draws each frame. Legend and scale are those of the finished field in all frames. The "
+          "surface's distances are taken twice: once to know the number of steps, once for the frames. In a script "
+          "the finished field becomes the current one.",
+      .examples = {"hpsdf frames bunny.obj -o refinement.mp4",
+                   "hpsdf frames builtin:gear -o steps --frames 12 --of 'render color=depth size=960x540'"},
+      .parameters = {{.name = "mesh",
+                      .type = ParameterType::text,
+                      .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
+                      .valueName = "MESH",
+                      .positional = true,
+                      .need = Need::always}},
+      .action = [shared](Session& session, const Arguments& arguments) { runFrames(session, *shared, arguments); },
+      .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); }};
+  append(command.parameters, filmParameters("30", "How many; fewer where the construction has fewer steps."));
+  command.parameters.push_back({.name = "of",
+                                .type = ParameterType::text,
+                                .help = "What draws each frame: slice or render with options of theirs, as a line of a "
+                                        "script.",
+                                .defaultText = "slice",
+                                .valueName = "COMMAND"});
+  append(command.parameters, buildParameters());
+  return command;
+}
+
+}  // namespace
+
+void addMotionCommands(Registry& registry) {
+  registry.add(turntableCommand(registry));
+  registry.add(framesCommand(registry));
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,227 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+
+#include "commands/commands.h"
+#include "construction/building.h"
+#include "files/html_page.h"
+#include "files/output_folder.h"
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/render/picture.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
+#include "session/session.h"
+#include "version.h"
+
+namespace hpsdf::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
+  std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
+  for (const Parameter& parameter : buildParameters()) {
+    if (!arguments.given(parameter.name)) continue;
+    const std::string text = arguments.text(parameter.name);
+    line += parameter.type == ParameterType::flag && arguments.flag(parameter.name)
+                ? fmt::format(" --{}", parameter.name)
+                : fmt::format(" --{}={}", parameter.name, text);
+  }
+  return line;
+}
+
+/// Mean seconds a frame of the surface's buffers, field resident: after one frame to warm up, some frames, or as many
+/// as fit into two seconds.
+double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int kFrames = 8;
+  constexpr std::chrono::seconds kEnough(2);
+  const render::SurfaceView view{render::cameraOf(picture.camera, field.domain(), picture.width, picture.height), 0};
+  renderer.surface(view, picture.width, picture.height);
+  const auto start = Clock::now();
+  int frames = 0;
+  while (frames < kFrames && (frames == 0 || Clock::now() - start < kEnough)) {
+    renderer.surface(view, picture.width, picture.height);
+    ++frames;
+  }
+  return std::chrono::duration<double>(Clock::now() - start).count() / frames;
+}
+
+struct Drawing {
+  std::string file;
+  std::string title;
+  std::string caption;
+  std::string command;  ///< what follows the field's file
+  bool slice;
+  render::ColorBy color;
+};
+
+std::vector<Drawing> drawings() {
+  using render::ColorBy;
+  return {
+      {"surface.png", "Surface", "Sphere-traced, lit by the field's own gradient.", "render {} -o surface.png", false,
+       ColorBy::normal},
+      {"degree.png", "Degree", "The polynomial degree of each cell in the plane through the middle.",
+       "slice {} --color degree -o degree.png", true, ColorBy::degree},
+      {"depth.png", "Depth", "How often the octree has halved the base cells, in the same plane.",
+       "slice {} --color depth -o depth.png", true, ColorBy::depth},
+      {"distance.png", "Distance",
+       "The signed distance: iso-lines, and the surface as the heavy line where it is zero.",
+       "slice {} --color distance -o distance.png", true, ColorBy::distance},
+      {"surface-degree.png", "Degree on the surface", "The degree of the cells that hold the surface.",
+       "render {} --color degree -o surface-degree.png", false, ColorBy::degree},
+  };
+}
+
+ReportPicture drawInto(const fs::path& folder, Session& session, render::Renderer& renderer,
+                       const std::string& fieldFile, const Drawing& drawing, int samples) {
+  const Field& field = session.current().field;
+  std::string command = "hpsdf " + fmt::format(fmt::runtime(drawing.command), fieldFile);
+  render::Image image;
+  if (drawing.slice) {
+    const double offset = defaultOffset(field.domain(), 2);
+    if (offset != 0) command += fmt::format(" --offset={}", offset);
+    image = render::draw(
+        renderer, field,
+        render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = drawing.color, .samples = samples});
+  } else {
+    render::SurfacePicture picture;
+    picture.color = drawing.color;
+    picture.samples = samples;
+    image = render::draw(renderer, field, picture);
+  }
+  if (samples != 1) command += fmt::format(" --samples={}", samples);
+  savePng(image, folder / drawing.file);
+  return {drawing.file, drawing.title, drawing.caption, command};
+}
+
+std::vector<ReportBar> bars(const std::map<int, double>& volume) {
+  std::vector<ReportBar> result;
+  for (const auto& [level, share] : volume) result.push_back({level, share});
+  return result;
+}
+
+std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
+                                                         const BuiltField* built) {
+  const FieldMetadata& metadata = field.metadata();
+  const double rms = metadata.rmsEstimate(field.domain());
+  std::vector<std::pair<std::string, std::string>> rows;
+  if (metadata.source.faces > 0)
+    rows.emplace_back("Mesh", fmt::format("{}: {} vertices, {} faces", metadata.source.name,
+                                          grouped(metadata.source.vertices), grouped(metadata.source.faces)));
+  else
+    rows.emplace_back("Source", metadata.source.name);
+  if (built != nullptr && built->mesh) rows.emplace_back("Surface", closednessText(*built->mesh));
+  if (metadata.source.insideTest != InsideTest::automatic)
+    rows.emplace_back("Sign by", insideTestName(metadata.source.insideTest));
+  rows.emplace_back("Leaf cells", grouped(counts.leaves));
+  rows.emplace_back("Coefficients",
+                    fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
+  rows.emplace_back("Memory", bytesText(double(counts.bytes)));
+  rows.emplace_back("Target error τ", shortNumber(metadata.targetError));
+  rows.emplace_back("Total error ε",
+                    fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.nearness));
+  rows.emplace_back("Estimated RMS error", fmt::format("{} in mesh units, {} of the mesh's longest side",
+                                                       shortNumber(rms), shortNumber(rms / metadata.referenceLength)));
+  rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
+  if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));
+  return rows;
+}
+
+bool isFieldFile(const std::string& source) { return fs::path(source).extension() == ".hpsdf"; }
+
+void runReport(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const Backend chosen = backend(arguments);
+  OutputFolder folder(arguments.text("output"));
+  checkWritable(folder.path() / "index.html");
+  std::optional<BuiltField> built;
+  if (arguments.has("source") && !isFieldFile(arguments.text("source"))) {
+    built = buildField(console, arguments.text("source"), arguments);
+    session.setField({std::move(built->field), arguments.text("source")});
+  } else if (arguments.has("source")) {
+    loadField(session, arguments.text("source"));
+  }
+  const CurrentField& current = session.current();
+  const Field& field = current.field;
+  render::Renderer& renderer = session.renderer(chosen);
+  const std::string fieldFile = plainName(current.name) + ".hpsdf";
+  folder.keep();
+  save(field, folder.path() / fieldFile);
+
+  const FieldStatistics counts = statistics(field);
+  ReportPage page{.title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
+                  .subtitle = fmt::format("{} leaf cells, {}, estimated RMS error {}", grouped(counts.leaves),
+                                          bytesText(double(counts.bytes)),
+                                          shortNumber(field.metadata().rmsEstimate(field.domain()))),
+                  .figures = figures(field, counts, built ? &*built : nullptr),
+                  .degrees = bars(counts.degreeVolume),
+                  .depths = bars(counts.depthVolume),
+                  .buildCommand = built ? buildCommandLine(arguments.text("source"), fieldFile, arguments) : "",
+                  .footer = fmt::format("{}; {}", versionText(), renderer.description())};
+  for (const Drawing& drawing : drawings())
+    page.pictures.push_back(drawInto(folder.path(), session, renderer, fieldFile, drawing, arguments.whole("samples")));
+  const render::SurfacePicture traced;  // one sample a pixel, whatever the pictures above have
+  const double seconds = frameSeconds(renderer, field, traced);
+  page.figures.emplace_back("Traced frame", fmt::format("{:.3f} s for {}x{}, one sample a pixel, field resident",
+                                                        seconds, traced.width, traced.height));
+  page.figures.emplace_back("Renderer", renderer.description());
+
+  const fs::path index = folder.path() / "index.html";
+  OutputFile out(index);
+  out.write(reportHtml(page));
+  out.commit();
+  if (session.wantsJson(arguments)) {
+    Json files = Json::array();
+    for (const ReportPicture& picture : page.pictures) files.push_back((folder.path() / picture.file).string());
+    return printJson(console.out, {{"page", index.string()},
+                                   {"field_file", (folder.path() / fieldFile).string()},
+                                   {"pictures", files},
+                                   {"build_seconds", built ? Json(built->seconds) : Json()},
+                                   {"frame_seconds", seconds},
+                                   {"renderer", renderer.description()},
+                                   {"field", fieldJson(current)}});
+  }
+  console.out << fmt::format("{}\ntraced frame {:.3f} s, {}\n{}\n", fieldLine(field), seconds, renderer.description(),
+                             index.string());
+}
+
+}  // namespace
+
+void addReportCommand(Registry& registry) {
+  Command command{
+      .name = "report",
+      .summary = "Write one offline page: pictures and figures of a field.",
+      .help =
+          "SOURCE is a field's file (*.hpsdf) or anything that 'hpsdf build' takes, with the same options. The folder "
+          "receives index.html, its pictures, each with the command that makes it, and the field itself.",
+      .examples = {"hpsdf report bunny.hpsdf -o report", "hpsdf report builtin:torus -o torus --target-error 1e-7"},
+      .parameters = {{.name = "source",
+                      .type = ParameterType::text,
+                      .help = "A field's file, a mesh or a shape; in a script, the current field when left out.",
+                      .valueName = "SOURCE",
+                      .positional = true,
+                      .need = Need::onCommandLine},
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "The folder; made when it is not there.",
+                      .valueName = "FOLDER",
+                      .alias = 'o',
+                      .need = Need::always},
+                     {.name = "samples",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Samples a pixel of the pictures along each axis; the timed frame has one.",
+                      .defaultText = "2",
+                      .minimum = 1,
+                      .maximum = 8}},
+      .action = runReport};
+  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
+  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  registry.add(std::move(command));
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,162 @@
+#include "session/session.h"
+
+#include <algorithm>
+#include <ostream>
+#include <utility>
+
+#include "console/long_work.h"
+#include "console/printable.h"
+#include "construction/building.h"
+#include "explorer/explorer.h"
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+
+namespace hpsdf::app {
+namespace {
+
+std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
+  return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+}
+
+}  // namespace
+
+void note(const Console& console, std::string_view text) {
+  console.err << "hpsdf: note: " << printable(text) << std::endl;
+}
+
+void warn(const Console& console, std::string_view text) {
+  console.err << "hpsdf: warning: " << printable(text) << std::endl;
+}
+
+Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
+Session::~Session() = default;
+
+Explorer& Session::explorer() {
+  if (!explorer_) explorer_ = std::make_unique<Explorer>(*this);
+  return *explorer_;
+}
+
+void Session::setField(CurrentField field) {
+  renderer_.reset();
+  defects_.reset();
+  jumps_.reset();
+  exact_.reset();
+  given_.reset();
+  picture_.reset();
+  field_ = std::make_unique<CurrentField>(std::move(field));
+  if (explorer_) explorer_->fieldChanged();
+}
+
+void Session::changeField(CurrentField field) {
+  auto exact = std::move(exact_);
+  auto given = std::move(given_);
+  setField(std::move(field));
+  exact_ = std::move(exact);
+  given_ = std::move(given);
+}
+
+const CurrentField& Session::current() const {
+  if (!field_) throw Error("there is no field yet; 'build MESH' or 'load FIELD' comes first");
+  return *field_;
+}
+
+void Session::setFileBytes(std::uintmax_t bytes) { field_->fileBytes = bytes; }
+
+const Jumps& Session::jumps() {
+  const Field& field = current().field;
+  if (!jumps_) jumps_ = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
+  return *jumps_;
+}
+
+bool Session::knowsExact() const { return exact_ || given_ || isShape(current().field.metadata().source.name); }
+
+const DistanceFunction& Session::exact(const std::string& surface) {
+  const Source& source = current().field.metadata().source;
+  if (surface.empty()) {
+    if (!knowsExact())
+      throw Error("errors need the mesh that the field was made from: give mesh=" +
+                  (source.name.empty() ? "FILE" : source.name));
+    if (!exact_ && isShape(source.name)) exact_ = exactDistance(console_, source.name, source);
+    return exact_ ? *exact_ : *given_;
+  }
+  if (!given_ || surface != givenSurface_) {
+    given_ = exactDistance(console_, surface, source);
+    givenSurface_ = surface;
+  }
+  return *given_;
+}
+
+const render::Drawn& Session::picture() const {
+  if (!picture_) throw Error("there is no picture yet; 'slice' or 'render' comes first");
+  return *picture_;
+}
+
+render::ReferenceData Session::reference(render::ColorBy color, const std::string& surface, const std::string& other) {
+  render::ReferenceData reference;
+  if (color == render::ColorBy::valueJump || color == render::ColorBy::gradientJump) reference.jumps = &jumps();
+  if (color == render::ColorBy::error) reference.exact = &exact(surface);
+  if (color == render::ColorBy::difference) {
+    forgetChangedOthers();
+    reference.other = &this->other(other).field;
+  }
+  return reference;
+}
+
+const MeshDefects& Session::defects(const std::string& surface) {
+  if (!defects_ || surface != defectsOf_) {
+    const bool own = surface == "own";
+    defects_ =
+        meshDefects(console_, own ? surfaceOf(current(), "defects=MESH") : surface, current().field.metadata().source);
+    defectsOf_ = surface;
+  }
+  return *defects_;
+}
+
+Session::Other& Session::keptOther(const std::string& file) {
+  const auto found = std::ranges::find(others_, file, &Other::file);
+  if (found != others_.end()) {
+    std::rotate(others_.begin(), found, found + 1);
+  } else {
+    std::error_code unknown;
+    const auto written = std::filesystem::last_write_time(file, unknown);  // before: what is written since is seen
+    others_.insert(others_.begin(), std::make_unique<Other>(Other{file, load(file), written}));
+    if (others_.size() > 2) others_.pop_back();
+  }
+  return *others_.front();
+}
+
+const Session::Other& Session::other(const std::string& file) { return keptOther(file); }
+
+bool Session::forgetChangedOthers() {
+  return std::erase_if(others_, [](const std::unique_ptr<Other>& other) {
+           std::error_code missing;
+           const auto written = std::filesystem::last_write_time(other->file, missing);
+           return !missing && written != other->written;
+         }) > 0;
+}
+
+const Jumps& Session::otherJumps(const std::string& file) {
+  Other& other = keptOther(file);
+  if (!other.jumps)
+    other.jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(other.field, 0, progress); });
+  return *other.jumps;
+}
+
+render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
+  Other& other = keptOther(file);
+  if (!other.renderer || other.backend != backend) other.renderer = makeRenderer(other.field, backend);
+  other.backend = backend;
+  return *other.renderer;
+}
+
+render::Renderer& Session::renderer(const Backend& backend) {
+  const Field& field = current().field;
+  if (renderer_ && backend_ == backend) return *renderer_;
+  renderer_.reset();
+  renderer_ = makeRenderer(field, backend);
+  backend_ = backend;
+  lastRenderer_ = renderer_->description();
+  return *renderer_;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,372 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <iterator>
+#include <optional>
+
+#include "commands/commands.h"
+#include "console/long_work.h"
+#include "construction/building.h"
+#include "files/film.h"
+#include "hpsdf/detail/output_file.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
+#include "session/session.h"
+#include "simulate/scene_request.h"
+#include "simulate/simulation.h"
+
+namespace hpsdf::app {
+namespace {
+
+const SceneKind& kindOf(const Arguments& arguments) {
+  return *std::ranges::find(scenes(), arguments.text("scene"), &SceneKind::name);
+}
+
+/// What a scene has no use for is refused, rather than ignored.
+void refuse(const Arguments& arguments, const std::string& name, bool takes) {
+  if (arguments.given(name) && !takes)
+    throw Error(fmt::format("{}: is not for the scene {}", name, arguments.text("scene")));
+}
+
+SceneRequest requestOf(const Arguments& arguments) {
+  SceneRequest request = kindOf(arguments).defaults;
+  refuse(arguments, "bodies", request.bodies > 0);
+  refuse(arguments, "nodes", request.nodes > 0);
+  refuse(arguments, "ground", !request.ground.empty());
+  refuse(arguments, "body", !request.meshes.empty());
+  if (arguments.given("bodies")) request.bodies = std::size_t(arguments.whole("bodies"));
+  if (arguments.given("nodes")) request.nodes = std::size_t(arguments.whole("nodes"));
+  if (arguments.given("points")) request.samples = std::size_t(arguments.whole("points"));
+  if (arguments.given("ground")) request.ground = arguments.text("ground");
+  if (arguments.given("body")) request.meshes = arguments.texts("body");
+  if (arguments.has("cache")) request.cache = arguments.text("cache");
+  request.filesAreYUp = arguments.text("up") == "y";
+  if (arguments.given("target-error")) request.targetError = arguments.number("target-error");
+  request.seed = std::uint64_t(arguments.whole("seed"));
+  request.step = 1 / arguments.number("rate");
+  request.iterations = int(arguments.whole("iterations"));
+  return request;
+}
+
+Json jsonOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
+  const double steps = double(figures.steps);
+  const auto aStep = [&](const CountAStep& of) {
+    return Json{{"mean", of.sum / steps}, {"max", of.most}, {"last", of.last}};
+  };
+  return {{"scene", scene},
+          {"bodies", figures.bodies},
+          {"nodes", figures.nodes},
+          {"waiting", figures.waiting},
+          {"lost", figures.lost},
+          {"simulated_seconds", figures.simulated},
+          {"step_seconds", request.step},
+          {"steps", figures.steps},
+          {"contacts", aStep(figures.penetrating)},
+          {"touching", aStep(figures.touching)},
+          {"penetration",
+           {{"size", figures.size},
+            {"max", figures.deepest},
+            {"mean_of_deepest", figures.sumOfDeepest / steps},
+            {"last_second", figures.deepestAtEnd}}},
+          {"milliseconds_a_step",
+           {{"queries", 1e3 * figures.querySeconds / steps},
+            {"solver", 1e3 * figures.solverSeconds / steps},
+            {"rest", 1e3 * (figures.seconds - figures.querySeconds - figures.solverSeconds) / steps},
+            {"all", 1e3 * figures.seconds / steps},
+            {"longest_queries", 1e3 * figures.longestQuerySeconds}}},
+          {"set_up_seconds", figures.setUpSeconds},
+          {"state", fmt::format("{:016x}", figures.state)}};
+}
+
+std::string textOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
+  const double steps = double(figures.steps);
+  const auto milliseconds = [&](double seconds) { return fmt::format("{:.2f} ms", 1e3 * seconds / steps); };
+  std::string text = fmt::format("{}: {} bodies", scene, grouped(figures.bodies));
+  if (figures.nodes > 0) text += fmt::format(", {} nodes of soft bodies", grouped(figures.nodes));
+  text += fmt::format(", {:.4g} s in {} steps of 1/{:.4g} s\n", figures.simulated, grouped(figures.steps),
+                      1 / request.step);
+  if (figures.waiting > 0)
+    text += fmt::format("  still to come       {} bodies, which more --seconds let in\n", grouped(figures.waiting));
+  const auto aStep = [&](const CountAStep& of) {
+    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", of.sum / steps, grouped(of.most),
+                       grouped(of.last));
+  };
+  text += "  contacts a step     " + aStep(figures.penetrating) + "  touching a step     " + aStep(figures.touching);
+  text += fmt::format("  deepest             {} ({:.2g} % of {}), in the last second {} ({:.2g} %)\n",
+                      shortNumber(figures.deepest), 100 * figures.deepest / figures.size, shortNumber(figures.size),
+                      shortNumber(figures.deepestAtEnd), 100 * figures.deepestAtEnd / figures.size);
+  text += fmt::format("  lost bodies         {}\n", grouped(figures.lost));
+  text += fmt::format("  a step takes        {}: queries {}, solver {}, rest {}\n", milliseconds(figures.seconds),
+                      milliseconds(figures.querySeconds), milliseconds(figures.solverSeconds),
+                      milliseconds(figures.seconds - figures.querySeconds - figures.solverSeconds));
+  text += fmt::format("  state at the end    {:016x}\n", figures.state);
+  return text;
+}
+
+// Pictures
+
+bool isStill(const Arguments& arguments) { return lowerExtension(arguments.text("output")) == ".png"; }
+
+double framesPerSecond(const Arguments& arguments) { return isStill(arguments) ? 0 : arguments.number("fps"); }
+
+double secondsOf(const Arguments& arguments) {
+  return arguments.given("seconds") ? arguments.number("seconds") : kindOf(arguments).seconds;
+}
+
+void checkFilm(const Arguments& arguments) {
+  if (isStill(arguments)) {
+    if (arguments.given("fps")) throw Error("fps: is for films; a .png shows the end");
+    return;
+  }
+  constexpr double kMostFrames = 10000;
+  const double fps = arguments.number("fps"), rate = arguments.number("rate");
+  if (fps > rate)
+    throw Error(fmt::format("fps: {:g} frames a second need as many steps; there are {:g}: give rate", fps, rate));
+  if (secondsOf(arguments) * fps >= kMostFrames)
+    throw Error(fmt::format("fps: {:g} s of {:g} frames are more than {:g} frames: give fewer a second",
+                            secondsOf(arguments), fps, kMostFrames));
+}
+
+void checkSimulate(const Arguments& arguments) {
+  if (arguments.given("output")) {
+    cameraPicture(arguments);
+    backend(arguments);
+    return checkFilm(arguments);
+  }
+  if (arguments.given("fps")) throw Error("fps: is for pictures: give output");
+  for (const char* name : kLooks)
+    if (arguments.given(name)) throw Error(fmt::format("{}: is for pictures: give output", name));
+}
+
+SimulationFigures simulateAs(const Console& console, const Arguments& arguments, const SceneRequest& request,
+                             const SimulationCamera* camera = nullptr) {
+  return simulate(console, arguments.text("scene"), request, secondsOf(arguments), int(arguments.whole("threads")),
+                  camera);
+}
+
+/// The scene's own camera where nothing else is said.
+SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
+  render::SurfacePicture look = cameraPicture(arguments);
+  const auto& [azimuth, elevation] = kindOf(arguments).view;
+  if (!arguments.given("camera")) look.camera.distance = 1;
+  if (!arguments.given("camera") && !arguments.given("view")) {
+    look.camera.azimuthDegrees = azimuth;
+    look.camera.elevationDegrees = elevation;
+  }
+  return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
+}
+
+/// What came of a simulation and its pictures.
+struct Outcome {
+  SimulationFigures figures;
+  Json pictures = {};     // null without any
+  std::string line = {};  // the same
+};
+
+/// The field that it shows becomes the current one, of which it is the picture.
+Outcome runStill(Session& session, const Arguments& arguments, const SceneRequest& request) {
+  const std::string file = arguments.text("output");
+  checkWritable(file);
+  std::optional<CurrentField> shown;
+  std::optional<render::Drawn> drawn;
+  const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
+    shown = CurrentField{shot.field, shot.field.metadata().source.name};
+    drawn = std::move(shot.drawn);
+    session.setLastRenderer(shot.renderer);
+  });
+  const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
+  const int width = drawn->image.width, height = drawn->image.height;
+  savePng(drawn->image, file);
+  session.setField(std::move(*shown));
+  session.setPicture(std::move(*drawn));
+  return {figures,
+          {{"output", file}, {"width", width}, {"height", height}, {"renderer", session.lastRenderer()}},
+          fmt::format("{}: {}x{}, {}\n", file, width, height, session.lastRenderer())};
+}
+
+Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
+  Film film(arguments.text("output"));
+  const InterruptGuard guard;  // until all is in its place
+  Json rows = Json::array();
+  render::Image last;
+  const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
+    last = std::move(shot.drawn.image);
+    film.add(last);
+    rows.push_back({{"file", ""}, {"seconds", shot.seconds}, {"contacts", shot.contacts}});
+    session.setLastRenderer(shot.renderer);
+  });
+  const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
+  withProgress(session.console(), [&](const Progress& progress) {
+    film.encode(framesPerSecond(arguments), progress);
+    return true;
+  });
+  const Json about = film.about(last, session.lastRenderer(), std::move(rows));
+  film.publish(about);
+  return {figures, about, Film::line(about)};
+}
+
+Outcome runScene(Session& session, const Arguments& arguments, const SceneRequest& request) {
+  if (!arguments.given("output")) return {simulateAs(session.console(), arguments, request)};
+  return isStill(arguments) ? runStill(session, arguments, request) : runFilm(session, arguments, request);
+}
+
+void runSimulate(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const SceneRequest request = requestOf(arguments);
+  const Outcome outcome = runScene(session, arguments, request);
+  const std::string scene = arguments.text("scene");
+  if (!session.wantsJson(arguments)) {
+    console.out << textOf(scene, request, outcome.figures) << outcome.line;
+    return;
+  }
+  Json json = jsonOf(scene, request, outcome.figures);
+  if (!outcome.pictures.is_null()) json["pictures"] = outcome.pictures;
+  printJson(console.out, json);
+}
+
+/// Those of `render` that simulations take too.
+/// As of `render`, but for what camera and target mean.
+std::vector<Parameter> sceneLookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters = lookParameters(registry);
+  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  camera.help =
+      "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
+      "view, which is the default; each scene has its own direction.";
+  camera.defaultText.clear();
+  Parameter& target = *std::ranges::find(parameters, "target", &Parameter::name);
+  target.help =
+      "The point in the picture's middle, in the scene's coordinates, z up; when left out, all of the scene is in the "
+      "middle.";
+  return parameters;
+}
+
+Command simulateCommand(const Registry& registry) {
+  std::string kinds;
+  std::vector<std::string> names;
+  for (const SceneKind& kind : scenes()) {
+    names.push_back(kind.name);
+    kinds +=
+        fmt::format("{}: {}{}; {:g} s.\n", kind.name, kind.help,
+                    kind.defaults.bodies > 1 ? fmt::format(", {} by default", kind.defaults.bodies) : "", kind.seconds);
+  }
+  Command command{
+      .name = "simulate",
+      .summary = "Let things fall onto each other, their fields as colliders: the paper's scenes, by Bullet.",
+      .help = "SCENE is one of\n" + kinds +
+              "\n"
+              "Each body's surface is sampled, and the samples are looked up in the fields of the bodies around, which "
+              "tell depth and direction; Bullet's solver does the rest. Bodies have a size of 1 or so, gravity is "
+              "9.81. Tells how many samples lay in other bodies, how deep, and what a step took. The same scene, "
+              "settings and seed end in the same state, whatever the number of threads.\n"
+              "\n"
+              "With --output it is drawn, which changes nothing of it: bodies in colours of their own, what stands in "
+              "clay, what has yet to come not at all. The field of one standing body is traced; in a script a still is "
+              "its picture, and it becomes the current field. All else are meshes, whose vertices within a pixel of "
+              "each other are drawn as one. Without a graphics card a frame takes some tenths of a second, with "
+              "hundreds of bodies of 100,000 triangles several seconds.\n"
+              "\n"
+              "The paper's meshes are not part of the program: give your own with --body and --ground.",
+      .examples = {"hpsdf simulate bowl", "hpsdf simulate poles --body bunny.obj --body dragon.obj --cache fields",
+                   "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json",
+                   "hpsdf simulate bowl --bodies 300 --seconds 2 -o bowl.png --samples 2",
+                   "hpsdf simulate slope -o slope.mp4 --view front --size 960x540"},
+      .parameters = {{.name = "scene",
+                      .type = ParameterType::choice,
+                      .help = "Which scene.",
+                      .choices = names,
+                      .positional = true,
+                      .need = Need::always},
+                     {.name = "seconds",
+                      .type = ParameterType::number,
+                      .help = "How long, in simulated time; each scene has its own default.",
+                      .unit = "seconds",
+                      .minimum = 0,
+                      .maximum = 3600,
+                      .minimumExcluded = true},
+                     {.name = "bodies",
+                      .type = ParameterType::wholeNumber,
+                      .help = "How many bodies move.",
+                      .minimum = 1,
+                      .maximum = 20000},
+                     {.name = "nodes",
+                      .type = ParameterType::wholeNumber,
+                      .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
+                      .minimum = 4,
+                      .maximum = 1e6},
+                     {.name = "points",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Points on the surface of each kind of body.",
+                      .minimum = 1,
+                      .maximum = 1e6},
+                     {.name = "body",
+                      .type = ParameterType::text,
+                      .help =
+                          "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope.",
+                      .valueName = "MESH",
+                      .repeatable = true},
+                     {.name = "ground",
+                      .type = ParameterType::text,
+                      .help =
+                          "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where "
+                          "it is as large as it is: 2 wide suits the marbles.",
+                      .valueName = "MESH"},
+                     {.name = "up",
+                      .type = ParameterType::choice,
+                      .help = "The axis that points up in mesh files. In shapes it is z.",
+                      .defaultText = "y",
+                      .choices = {"y", "z"}},
+                     {.name = "target-error",
+                      .type = ParameterType::number,
+                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, "
+                              "and 1e-8 in the bowl.",
+                      .minimum = 0,
+                      .minimumExcluded = true},
+                     {.name = "cache",
+                      .type = ParameterType::outputPath,
+                      .help = "A folder in which fields are kept, and taken from the next time.",
+                      .valueName = "FOLDER"},
+                     {.name = "rate",
+                      .type = ParameterType::number,
+                      .help = "Steps a second. Fast or small things need more.",
+                      .defaultText = "240",
+                      .minimum = 1,
+                      .maximum = 100000},
+                     {.name = "iterations",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Of Bullet's solver, in each step.",
+                      .defaultText = "20",
+                      .minimum = 1,
+                      .maximum = 1000},
+                     {.name = "seed",
+                      .type = ParameterType::wholeNumber,
+                      .help = "Which random places and directions bodies start with.",
+                      .defaultText = "1",
+                      .minimum = 0,
+                      .maximum = 1e9},
+                     threadsParameter("The simulation is"),
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as "
+                              "'turntable' has it; or *.mp4, for which ffmpeg must be installed. Without it nothing is "
+                              "drawn.",
+                      .valueName = "FILE.png|FOLDER|FILE.mp4",
+                      .alias = 'o'},
+                     {.name = "fps",
+                      .type = ParameterType::number,
+                      .help = "Frames a simulated second, at which an .mp4 plays.",
+                      .defaultText = "30",
+                      .minimum = 0.1,
+                      .maximum = 10000}},
+      .action = runSimulate,
+      .check = checkSimulate};
+  std::ranges::move(sceneLookParameters(registry), std::back_inserter(command.parameters));
+  return command;
+}
+
+}  // namespace
+
+void addSimulateCommand(Registry& registry) { registry.add(simulateCommand(registry)); }
+
+}  // namespace hpsdf::app

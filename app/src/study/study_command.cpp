@@ -1,0 +1,168 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "commands/commands.h"
+#include "construction/building.h"
+#include "language/summaries.h"
+#include "session/session.h"
+#include "study/study.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// All kinds; what a new one adds to the verb is said here alone.
+const std::vector<Study>& studies() {
+  static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy()};
+  return list;
+}
+
+/// nullptr where it takes none of that name.
+const Parameter* parameterOf(const Study& study, const std::string& name) {
+  const auto found = std::ranges::find(study.parameters, name, &Parameter::name);
+  return found == study.parameters.end() ? nullptr : &*found;
+}
+
+bool takes(const Study& study, const std::string& name) { return parameterOf(study, name) != nullptr; }
+
+std::vector<const Study*> studiesThatTake(const std::string& name) {
+  std::vector<const Study*> takers;
+  for (const Study& study : studies())
+    if (takes(study, name)) takers.push_back(&study);
+  return takers;
+}
+
+std::vector<std::string> namesOf(const std::vector<const Study*>& studies) {
+  std::vector<std::string> names;
+  for (const Study* study : studies) names.push_back(study->name);
+  return names;
+}
+
+const Study& studyOf(const Arguments& arguments) {
+  return *std::ranges::find(studies(), arguments.text("kind"), &Study::name);
+}
+
+/// The parameters of all kinds, each once. One whose default depends on the kind is left without: see `buildArguments`.
+std::vector<Parameter> kindParameters() {
+  std::vector<Parameter> all;
+  for (const Study& study : studies())
+    for (Parameter parameter : study.parameters) {
+      if (std::ranges::find(all, parameter.name, &Parameter::name) != all.end()) continue;
+      const std::vector<const Study*> takers = studiesThatTake(parameter.name);
+      if (takers.size() < studies().size())
+        parameter.help += fmt::format(" For {}.", fmt::join(namesOf(takers), " and "));
+      const auto sameDefault = [&](const Study* other) {
+        return parameterOf(*other, parameter.name)->defaultText == parameter.defaultText;
+      };
+      if (!std::ranges::all_of(takers, sameDefault)) {
+        for (const Study* taker : takers)
+          parameter.help += fmt::format(" {} takes {}.", taker->name, parameterOf(*taker, parameter.name)->defaultText);
+        parameter.defaultText.clear();
+      }
+      all.push_back(std::move(parameter));
+    }
+  return all;
+}
+
+void checkStudy(const Arguments& arguments) {
+  const Study& study = studyOf(arguments);
+  for (const Parameter& parameter : kindParameters())
+    if (arguments.given(parameter.name) && !takes(study, parameter.name))
+      throw Error(fmt::format("{}: is for 'study {}', not for 'study {}'", parameter.name,
+                              fmt::join(namesOf(studiesThatTake(parameter.name)), "' and 'study "), study.name));
+}
+
+}  // namespace
+
+std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names) {
+  std::vector<Parameter> parameters = buildParameters();
+  std::erase_if(parameters, [&](const Parameter& p) { return std::ranges::find(names, p.name) != names.end(); });
+  for (Parameter& parameter : parameters) parameter.repeatable = parameter.type != ParameterType::flag;
+  return parameters;
+}
+
+std::vector<Parameter> samplingParameters() {
+  return {pointsParameter("Random points in the domain at which errors are measured.", "200000", 1), seedParameter()};
+}
+
+SampleOptions sampleOptions(const Arguments& arguments, int threads) {
+  return {.count = static_cast<std::size_t>(arguments.number("points")),
+          .seed = static_cast<std::uint64_t>(arguments.number("seed")),
+          .threads = threads};
+}
+
+Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh) {
+  const std::vector<std::string> meshes = arguments.texts("mesh");
+  const Command& build = session.registry().command("build");
+  std::vector<Word> words = {{.text = meshes[mesh]}};
+  const Study& study = studyOf(arguments);
+  for (const Parameter& parameter : build.parameters) {
+    const Parameter* own = parameterOf(study, parameter.name);
+    const bool hasOwnDefault = own != nullptr && own->defaultText != parameter.defaultText;
+    if (own == nullptr || !(arguments.given(parameter.name) || hasOwnDefault)) continue;
+    const std::vector<std::string> values =
+        arguments.given(parameter.name) ? arguments.texts(parameter.name) : std::vector{own->defaultText};
+    if (values.size() != 1 && values.size() != meshes.size())
+      throw Error(fmt::format("{}: given {} times for {} meshes; give it once for all, or once for each",
+                              parameter.name, values.size(), meshes.size()));
+    words.push_back({.text = fmt::format("--{}={}", parameter.name, values[values.size() == 1 ? 0 : mesh])});
+  }
+  return parseArguments(build, words, Origin::script);
+}
+
+std::vector<std::string> fileNames(const std::vector<std::string>& meshes) {
+  std::vector<std::string> names;
+  for (const std::string& mesh : meshes) {
+    const std::string plain = plainName(mesh);
+    std::string name = plain;
+    for (int number = 2; std::ranges::find(names, name) != names.end(); ++number)
+      name = fmt::format("{}-{}", plain, number);
+    names.push_back(name);
+  }
+  return names;
+}
+
+void addStudyCommand(Registry& registry) {
+  std::vector<std::string> kinds;
+  std::string help =
+      "Builds fields of each MESH and writes what they have to tell into a folder, as text for people "
+      "and JSON for programs. KIND says what is studied:";
+  for (const Study& study : studies()) {
+    kinds.push_back(study.name);
+    help += fmt::format("\n\n{}: {}", study.name, study.help);
+  }
+  Command command{
+      .name = "study",
+      .summary = "Study what fields of given meshes cost and how exact they are, as the paper does.",
+      .help = help,
+      .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
+                   "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error "
+                   "1e-7 --grid 6 --grid 10",
+                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
+      .parameters = {{.name = "kind",
+                      .type = ParameterType::choice,
+                      .help = "What is studied.",
+                      .choices = kinds,
+                      .positional = true,
+                      .need = Need::always},
+                     {.name = "mesh",
+                      .type = ParameterType::text,
+                      .help = "Mesh files, builtin:SHAPE or analytic:SHAPE.",
+                      .valueName = "MESH",
+                      .positional = true,
+                      .repeatable = true,
+                      .need = Need::always},
+                     {.name = "output",
+                      .type = ParameterType::outputPath,
+                      .help = "The folder; made when it is not there.",
+                      .valueName = "FOLDER",
+                      .alias = 'o',
+                      .need = Need::always}},
+      .action = [](Session& session, const Arguments& arguments) { studyOf(arguments).run(session, arguments); },
+      .check = checkStudy};
+  for (Parameter& parameter : kindParameters()) command.parameters.push_back(std::move(parameter));
+  registry.add(std::move(command));
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,13 @@
+// Stands in for window.cpp where GLFW was not there at build time.
+
+#include "window/window.h"
+
+namespace hpsdf::app {
+
+std::size_t showWindow(Session&, const WindowOptions&) {
+  throw Error(
+      "view: this program was built without a window: install libglfw3-dev and build it with -D HPSDF_WINDOW=ON; "
+      "'shot' in a script writes the same frames without one");
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,92 @@
+// view: the explorer in a window.
+
+#include <fmt/format.h>
+
+#include "commands/commands.h"
+#include "construction/building.h"
+#include "explorer/view_state.h"
+#include "hpsdf/detail/output_file.h"
+#include "language/summaries.h"
+#include "pictures/picture_arguments.h"
+#include "window/window.h"
+
+namespace hpsdf::app {
+namespace {
+
+void runView(Session& session, const Arguments& arguments) {
+  const std::string field = arguments.text("field");
+  WindowOptions options;
+  const bool made = !isShape(field) && lowerExtension(field) == ".hpsdf";
+  options.opening = (made ? "load " : "build ") + scriptWord(field);
+  options.backend = backend(arguments);
+  options.width = arguments.size("size")[0];
+  options.height = arguments.size("size")[1];
+  options.title = field + " - hpsdf";
+  for (const auto& [name, file] : {std::pair("record", &options.record), std::pair("shot", &options.shot)})
+    if (arguments.has(name)) checkWritable(file->emplace(arguments.text(name)));
+  const std::size_t lines = showWindow(session, options);
+  std::ostream& out = session.console().out;
+  if (session.wantsJson(arguments))
+    return printJson(out, {{"record", options.record ? Json(*options.record) : Json()},
+                           {"lines", lines},
+                           {"shot", options.shot ? Json(*options.shot) : Json()}});
+  if (options.record) out << fmt::format("{}: {} lines\n", *options.record, lines);
+  if (options.shot) out << *options.shot << '\n';
+}
+
+void checkView(const Arguments& arguments) {
+  if (arguments.has("shot") && lowerExtension(arguments.text("shot")) != ".png")
+    throw Error(fmt::format("{}: pictures are written as .png", arguments.text("shot")));
+}
+
+}  // namespace
+
+void addViewCommand(Registry& registry) {
+  Command command{
+      .name = "view",
+      .summary = "Look at a field in a window: turn it, cut it, colour it, build it anew.",
+      .help =
+          "FIELD is a field's file (*.hpsdf), or what 'build' takes: a mesh, builtin:SHAPE or analytic:SHAPE, from "
+          "which a field is built with the default settings first.\n"
+          "\n"
+          "Mouse over the picture: drag to turn the surface or move the slice, drag with the right button to move the "
+          "surface, wheel to go nearer or farther, hover to read out what is there. In the panels: Ctrl+click a "
+          "slider to type its number, Enter to set it; click one of the worst interfaces to fly there.\n"
+          "\n"
+          "Keys: Ctrl+Z undo, Ctrl+Y redo, Ctrl+C copy the view as lines of script, F12 write the frame as "
+          "hpsdf-0001.png or the next free number, Escape cancel a construction, Ctrl+Q close the window.\n"
+          "\n"
+          "Whatever is done is a command of scripts: with --record the whole session is one, and 'hpsdf run' does it "
+          "again without a window, to the same pixels. Open lists and texts that were not entered yet are put away "
+          "before a frame is written.",
+      .examples = {"hpsdf view bunny.hpsdf", "hpsdf view builtin:torus --record session.hps --shot last.png"},
+      .parameters = {{.name = "field",
+                      .type = ParameterType::text,
+                      .help = "A field's file, a mesh, builtin:SHAPE or analytic:SHAPE.",
+                      .valueName = "FIELD|MESH",
+                      .positional = true,
+                      .need = Need::always},
+                     {.name = "size",
+                      .type = ParameterType::size,
+                      .help = "Of the window at first.",
+                      .defaultText = "1280x720",
+                      .unit = "pixels",
+                      .minimum = 64,
+                      .maximum = 8192,
+                      .whole = true,
+                      .counts = {2}},
+                     {.name = "record",
+                      .type = ParameterType::outputPath,
+                      .help = "Write what was done as a script, at the end.",
+                      .valueName = "SCRIPT"},
+                     {.name = "shot",
+                      .type = ParameterType::outputPath,
+                      .help = "Write the last frame, *.png, at the end."}},
+      .action = runView,
+      .check = checkView,
+      .commandLineOnly = true};
+  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  registry.add(std::move(command));
+}
+
+}  // namespace hpsdf::app

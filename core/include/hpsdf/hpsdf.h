@@ -1,0 +1,20 @@
+#pragma once
+// The whole of hpsdf::core: meshes, exact distances, fields, their construction, queries and measures.
+
+#include "hpsdf/build.h"
+#include "hpsdf/build_options.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/distance_function.h"
+#include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/field.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/jumps.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/mesh_repair.h"
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/safe_distance.h"
+#include "hpsdf/shapes.h"
+#include "hpsdf/triangle_mesh.h"
+#include "hpsdf/types.h"
+#include "hpsdf/verify.h"

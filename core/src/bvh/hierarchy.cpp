@@ -1,0 +1,248 @@
+#include "bvh/hierarchy.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "bvh/float_box.h"
+#include "hpsdf/error.h"
+#include "mesh/message_prefix.h"
+
+namespace hpsdf::distance {
+namespace {
+
+using Corners = std::array<std::uint32_t, 3>;
+
+/// What nodes and blocks are made of, numbered: a branch before what is below it.
+struct Numbered {
+  std::vector<const Branch*> nodes;
+  std::vector<std::array<std::uint32_t, kWidth>> children;  ///< of each node, as in `Node`
+  std::vector<const Branch::Part*> blocks;
+
+  std::uint32_t add(const Branch& branch) {
+    const auto self = static_cast<std::uint32_t>(nodes.size());
+    nodes.push_back(&branch);
+    children.emplace_back().fill(kEmpty);
+    for (int i = 0; i < branch.count; ++i) {
+      const Branch::Part& part = branch.parts[i];
+      const std::uint32_t child = part.branch ? add(*part.branch) : addBlock(part);
+      children[self][i] = child;
+    }
+    return self;
+  }
+
+ private:
+  std::uint32_t addBlock(const Branch::Part& part) {
+    blocks.push_back(&part);
+    return kBlockBit | static_cast<std::uint32_t>(blocks.size() - 1);
+  }
+};
+
+/// A box whose axes are `axes`' columns.
+struct OrientedBox {
+  Eigen::Vector3f center = Eigen::Vector3f::Zero(), half = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f axes = Eigen::Matrix3f::Zero();
+
+  float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
+};
+
+/// Out of any reach: √kOutOfReach less than nothing along each axis.
+OrientedBox nothing() {
+  OrientedBox box;
+  box.half.setConstant(-2 * std::sqrt(kOutOfReach));
+  return box;
+}
+
+/// `extents`: along the axes.
+OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
+  // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
+  constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
+  const Eigen::Matrix3d asRounded = axes.cast<double>();
+  const Vector3 low = extents.lower.head<3>().cast<double>(), high = extents.upper.head<3>().cast<double>();
+  OrientedBox box;
+  box.axes = axes;
+  box.center = (asRounded * ((low + high) / 2)).cast<float>();
+  const Vector3 middle = asRounded.transpose() * box.center.cast<double>();
+  box.half = ((high - middle).cwiseMax(middle - low).array() + kRounding).cast<float>();
+  return box;
+}
+
+/// Fits the boxes of nodes to triangles that lie in the tree's order.
+class BoxFitter {
+ public:
+  /// `points`: in local coordinates, the fourth lane is 0.
+  BoxFitter(const std::vector<Corners>& triangles, const std::vector<Eigen::Array4f>& points)
+      : triangles_(triangles), points_(points) {}
+
+  void fit(Node& node, const Branch& branch) const {
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const OrientedBox box = lane < branch.count ? boxAround(branch.parts[lane]) : nothing();
+      for (int i = 0; i < 3; ++i) {
+        node.field[Node::center + i][lane] = box.center[i];
+        node.field[Node::half + i][lane] = box.half[i];
+        for (int k = 0; k < 3; ++k) node.field[Node::axes + 3 * i + k][lane] = box.axes(k, i);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kSamples = 128;
+
+  OrientedBox boxAround(const Branch::Part& part) const {
+    const Eigen::Matrix3f axes = axesOf(part).cast<float>();
+    std::array<Eigen::Array4f, 3> rows;
+    for (int i = 0; i < 3; ++i) rows[i] << axes.row(i).transpose().array(), 0;
+    FloatBox upright, leaning;
+    for (std::uint32_t slot = part.begin; slot < part.end; ++slot)
+      for (const std::uint32_t vertex : triangles_[slot]) {
+        const Eigen::Array4f point = points_[vertex];
+        upright.extend(point);
+        leaning.extend(Eigen::Array4f(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]));
+      }
+    const OrientedBox uprightBox = boxFrom(Eigen::Matrix3f::Identity(), upright);
+    const OrientedBox leaningBox = boxFrom(axes, leaning);
+    return leaningBox.area() < uprightBox.area() ? leaningBox : uprightBox;
+  }
+
+  /// The mean normal, the widest direction across it, and the third. Of large parts some triangles tell enough.
+  Eigen::Matrix3d axesOf(const Branch::Part& part) const {
+    const std::uint32_t step = 1 + (part.end - part.begin) / kSamples;
+    const Eigen::Vector4f reference = points_[triangles_[part.begin][0]];
+    Eigen::Vector4f doubledArea = Eigen::Vector4f::Zero(), sum = Eigen::Vector4f::Zero();
+    Eigen::Matrix4f products = Eigen::Matrix4f::Zero();
+    float count = 0;
+    for (std::uint32_t slot = part.begin; slot < part.end; slot += step) {
+      std::array<Eigen::Vector4f, 3> corners;
+      for (int k = 0; k < 3; ++k) {
+        corners[k] = points_[triangles_[slot][k]].matrix() - reference;
+        sum += corners[k];
+        products += corners[k] * corners[k].transpose();
+      }
+      doubledArea += (corners[1] - corners[0]).cross3(corners[2] - corners[0]);
+      count += 3;
+    }
+    const Eigen::Matrix4f covariance = products - sum * sum.transpose() / count;
+    Vector3 normal = doubledArea.head<3>().cast<double>();
+    normal = normal.squaredNorm() > 0 ? Vector3(normal.normalized()) : Vector3(Vector3::UnitZ());
+    Eigen::Matrix<double, 3, 2> across;
+    across.col(0) = normal.unitOrthogonal();
+    across.col(1) = normal.cross(across.col(0));
+    const Eigen::Matrix2d spread = across.transpose() * covariance.topLeftCorner<3, 3>().cast<double>() * across;
+    const double angle = std::atan2(2 * spread(0, 1), spread(0, 0) - spread(1, 1)) / 2;
+    const Vector3 widest = across * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    Eigen::Matrix3d axes;
+    axes << normal, widest, normal.cross(widest);
+    return axes;
+  }
+
+  const std::vector<Corners>& triangles_;
+  const std::vector<Eigen::Array4f>& points_;
+};
+
+std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::vector<Vector3>& vertices) {
+  std::vector<Eigen::Array4f> points(vertices.size());
+  tbb::parallel_for(std::size_t{0}, points.size(),
+                    [&](std::size_t v) { points[v] << hierarchy.local(vertices[v]).cast<float>().array(), 0; });
+  return points;
+}
+
+}  // namespace
+
+void requireSurface(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty())
+    throw Error(messagePrefix(mesh.name) + "no faces; a distance needs at least one triangle");
+  if (mesh.triangles.size() > Hierarchy::kMaxTriangles)
+    throw Error(messagePrefix(mesh.name) + std::to_string(mesh.triangles.size()) + " faces are more than the " +
+                std::to_string(Hierarchy::kMaxTriangles) + " that a distance takes; simplify the mesh first");
+  requireValidIndices(mesh);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    if (!mesh.vertices[v].allFinite())
+      throw Error(messagePrefix(mesh.name) + "vertex " + std::to_string(v + 1) +
+                  " has a coordinate that is not a finite number; repair or export the mesh again");
+}
+
+Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
+  // halved first: the box of any finite mesh has a finite center, size and scale
+  center_ = box.min() / 2 + box.max() / 2;
+  const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
+  scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
+
+  const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
+  frames_ = Array<TriangleFrame>(mesh.triangles.size());
+  Numbered numbered;
+  tbb::parallel_invoke(
+      [&] {
+        sortSurface(mesh, tree.order);
+        numbered.add(*tree.root);
+      },
+      [&] {
+        tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t slot) {
+          const auto& [a, b, c] = mesh.triangles[tree.order[slot]];
+          frames_[slot] = makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, tree.order[slot]);
+        });
+      });
+
+  const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
+  const BoxFitter fitter(triangles_, points);
+  nodes_ = Array<Node>(numbered.nodes.size());
+  tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) {
+    fitter.fit(nodes_[n], *numbered.nodes[n]);
+    std::copy(numbered.children[n].begin(), numbered.children[n].end(), nodes_[n].child);
+  });
+  blocks_ = Array<Block>(numbered.blocks.size());
+  tbb::parallel_for(std::size_t{0}, blocks_.size(),
+                    [&](std::size_t b) { fill(blocks_[b], numbered.blocks[b]->begin, numbered.blocks[b]->end); });
+}
+
+void Hierarchy::sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order) {
+  constexpr std::uint32_t kUnused = ~std::uint32_t{0};
+  std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
+  vertices_.reserve(mesh.vertices.size());
+  triangles_.reserve(order.size());
+  for (const std::uint32_t triangle : order) {
+    Corners corners = mesh.triangles[triangle];
+    for (std::uint32_t& corner : corners) {
+      std::uint32_t& number = numbers[corner];
+      if (number == kUnused) {
+        number = static_cast<std::uint32_t>(vertices_.size());
+        vertices_.push_back(mesh.vertices[corner]);
+      }
+      corner = number;
+    }
+    triangles_.push_back(corners);
+  }
+}
+
+void Hierarchy::fill(Block& block, std::uint32_t begin, std::uint32_t end) const {
+  block.first = begin;
+  block.count = end - begin;
+  for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+    const TriangleFrame& frame = frames_[std::min(begin + lane, end - 1)];
+    const Vector3 origin = local(frame.origin);
+    const auto set = [&](int field, double value) { block.field[field][lane] = static_cast<float>(value); };
+    for (int i = 0; i < 3; ++i) {
+      set(Block::origin + i, origin[i]);
+      set(Block::along + i, frame.along[i]);
+      set(Block::across + i, frame.across[i]);
+    }
+    set(Block::length, frame.length * scale_);
+    set(Block::apexAlong, frame.apexAlong * scale_);
+    set(Block::apexAcross, frame.apexAcross * scale_);
+    set(Block::inverseLeft, frame.inverseSquaredLeft / (scale_ * scale_));
+    set(Block::inverseRight, frame.inverseSquaredRight / (scale_ * scale_));
+  }
+}
+
+std::size_t Hierarchy::bytes() const {
+  const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  return sizeOf(frames_) + sizeOf(nodes_) + sizeOf(blocks_) + sizeOf(triangles_) + sizeOf(vertices_);
+}
+
+}  // namespace hpsdf::distance

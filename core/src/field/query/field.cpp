@@ -1,0 +1,204 @@
+#include "hpsdf/field.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <string>
+
+#include "basis/projection.h"
+#include "field/query/blend.h"
+#include "field/query/blend_extent.h"
+#include "field/query/evaluate.h"
+#include "field/query/evaluate_batch.h"
+#include "field/query/visit_nodes.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+[[noreturn]] void notAField(const std::string& what) { throw Error("not a valid field: " + what); }
+
+void checkDomain(const FieldData& data) {
+  if (data.domain.isEmpty() || !data.domain.min().allFinite() || !data.domain.max().allFinite() ||
+      !((data.domain.max() - data.domain.min()).minCoeff() > 0) || !(data.domain.max() - data.domain.min()).allFinite())
+    notAField("its domain is empty or not finite");
+}
+
+/// Number of base cells; the nodes must at least hold them.
+std::size_t checkGrid(const FieldData& data) {
+  std::size_t cells = 1;
+  for (const std::uint32_t n : data.grid) {
+    if (n == 0 || cells > data.nodes.size() / n) notAField("its base grid does not fit its nodes");
+    cells *= n;
+  }
+  if (data.nodes.size() > 0xffffffffu) notAField("it has more than 2^32 nodes");
+  return cells;
+}
+
+/// Every group of children belongs to exactly one node that comes before it, so that the nodes form trees.
+void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
+  const auto& nodes = data.nodes;
+  if ((nodes.size() - baseCells) % 8 != 0) notAField("its nodes do not come in groups of eight");
+  std::vector<std::uint8_t> depth(nodes.size(), 0xff);
+  std::fill_n(depth.begin(), baseCells, std::uint8_t{0});
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (depth[n] == 0xff) notAField("node " + std::to_string(n) + " is nobody's child");
+    if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
+    if (node::isLeaf(nodes[n])) {
+      const int degree = node::degree(nodes[n]);
+      if (degree > kMaxDegree) notAField("a cell has degree " + std::to_string(degree));
+      if (std::size_t(node::offset(nodes[n])) + coefficientCount(degree) > coefficients)
+        notAField("a cell's coefficients lie beyond the end");
+      continue;
+    }
+    const std::size_t first = node::firstChild(nodes[n]);
+    if (first <= n || first < baseCells || (first - baseCells) % 8 != 0 || first + 8 > nodes.size() ||
+        depth[first] != 0xff)
+      notAField("node " + std::to_string(n) + " has bad children");
+    if (depth[n] == kMaxDepth) notAField("it is deeper than " + std::to_string(kMaxDepth) + " levels");
+    std::fill_n(depth.begin() + first, 8, std::uint8_t(depth[n] + 1));
+  }
+}
+
+void checkBlendAndBounds(const FieldData& data) {
+  if (!(data.blend >= 0 && data.blend <= kMaxBlend)) notAField("its blended zones have a width out of range");
+  if (!data.bounds.empty() && data.bounds.size() != data.nodes.size()) notAField("its bounds do not fit its nodes");
+  for (const CellBound& bound : data.bounds)
+    if (!(bound.error >= 0) || !(bound.slope >= 0)) notAField("a bound is not a number above 0");
+}
+
+template <typename Answer>
+Answer answerOne(const FieldData& field, const LookupGrid& lookupGrid, const Vector3& x) {
+  if (!contains(lookupGrid.frame, x)) [[unlikely]] {
+    const Vector3 closest = closestWithin(lookupGrid.frame, x);
+    Answer result = answerOne<Answer>(field, lookupGrid, closest);
+    extend(x - closest, result);
+    return result;
+  }
+  const GridPoint at = gridPoint(lookupGrid.frame, x);
+  return answerWithin<Answer>(field, lookupGrid, at.coordinates, find(field, lookupGrid, at));
+}
+
+/// As deep as a sixteenth of the field's own size allows.
+LookupGrid makeLookupGrid(const FieldData& field) {
+  LookupGrid lookupGrid;
+  const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
+  const std::size_t bytes = std::visit([](const auto& c) { return c.size() * sizeof(c[0]); }, field.coefficients) +
+                            field.nodes.size() * sizeof(field.nodes[0]);
+  const std::size_t most = bytes / 16 / sizeof(lookupGrid.entries[0]);
+  while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= most) ++lookupGrid.depth;
+  lookupGrid.entries.resize(base << (3 * lookupGrid.depth));
+  if (field.blend > 0) {
+    lookupGrid.blendExtents = findBlendExtents(field);
+    lookupGrid.blendExtents.resize(field.nodes.size() + lookupGrid.entries.size());
+  }
+  lookupGrid.frame = gridFrame(field);
+  lookupGrid.row = std::int64_t{field.grid[0]} << lookupGrid.depth;
+  lookupGrid.slab = lookupGrid.row * (std::int64_t{field.grid[1]} << lookupGrid.depth);
+  visitNodes(field, [&](const Visited& at) {
+    if (!node::isLeaf(field.nodes[at.node]) && at.depth < lookupGrid.depth) return true;
+    const std::size_t width = std::size_t{1} << (lookupGrid.depth - at.depth);
+    std::array<std::size_t, 3> first;  // of the entries that the node covers
+    for (int axis = 0; axis < 3; ++axis) first[axis] = ((at.base[axis] << at.depth) + at.path[axis]) * width;
+    for (std::size_t z = first[2]; z < first[2] + width; ++z)
+      for (std::size_t y = first[1]; y < first[1] + width; ++y) {
+        const std::size_t row = z * lookupGrid.slab + y * lookupGrid.row + first[0];
+        std::fill_n(&lookupGrid.entries[row], width, LookupGrid::entry(field.nodes[at.node], at.depth));
+        if (field.blend > 0)
+          std::fill_n(&lookupGrid.blendExtents[field.nodes.size() + row], width, lookupGrid.blendExtents[at.node]);
+      }
+    return false;
+  });
+  return lookupGrid;
+}
+
+Cell makeCell(const FieldData& field, const GridFrame& frame, std::uint32_t id, int depth,
+              const std::array<std::int64_t, 3>& place) {
+  Cell cell;
+  cell.id = id;
+  cell.depth = depth;
+  cell.degree = node::degree(field.nodes[id]);
+  cell.box = boxOf(frame, depth, place);
+  const double volume = cellSize(field, depth).prod();
+  cell.error = std::visit(
+      [&](const auto& c) { return topDegreeError(c.data() + node::offset(field.nodes[id]), cell.degree, volume); },
+      field.coefficients);
+  return cell;
+}
+
+}  // namespace
+
+double FieldMetadata::rmsEstimate(const Box& domain) const {
+  const double volume = (domain.max() - domain.min()).prod();
+  return std::sqrt(totalError * std::pow(referenceLength / 2, 5) / volume);
+}
+
+Field::Field(FieldData data) : data_(std::move(data)) {
+  checkDomain(data_);
+  const std::size_t baseCells = checkGrid(data_);
+  std::visit(
+      [&](const auto& coefficients) {
+        checkNodes(data_, baseCells, coefficients.size());
+        for (const auto c : coefficients)
+          if (!std::isfinite(c)) notAField("a coefficient is not finite");
+      },
+      data_.coefficients);
+  checkBlendAndBounds(data_);
+  lookupGrid_ = makeLookupGrid(data_);
+}
+
+std::size_t Field::bytes() const {
+  const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(lookupGrid_.entries) + sizeOf(lookupGrid_.blendExtents) +
+         std::visit(sizeOf, data_.coefficients);
+}
+
+double Field::value(const Vector3& x) const { return answerOne<double>(data_, lookupGrid_, x); }
+
+ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
+  return answerOne<ValueAndGradient>(data_, lookupGrid_, x);
+}
+
+void Field::values(std::span<const Vector3> points, std::span<double> out) const {
+  assert(points.size() == out.size());
+  answerBatch(data_, lookupGrid_, points, out);
+}
+
+void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const {
+  assert(points.size() == out.size());
+  answerBatch(data_, lookupGrid_, points, out);
+}
+
+Cell Field::cellAt(const Vector3& x) const {
+  const GridPoint point = gridPoint(lookupGrid_.frame, closestWithin(lookupGrid_.frame, x));
+  const Location at = locate(data_, point);
+  return makeCell(data_, lookupGrid_.frame, at.node, at.depth,
+                  {point.cell(0, at.depth), point.cell(1, at.depth), point.cell(2, at.depth)});
+}
+
+void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
+  visitNodes(data_, [&](const Visited& at) {
+    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, lookupGrid_.frame, at.node, at.depth, placeOf(at)));
+    return true;
+  });
+}
+
+FieldStatistics statistics(const Field& field) {
+  FieldStatistics s;
+  const double domainVolume = (field.domain().max() - field.domain().min()).prod();
+  field.forEachCell([&](const Cell& cell) {
+    const double share = (cell.box.max() - cell.box.min()).prod() / domainVolume;
+    ++s.leaves;
+    ++s.degreeLeaves[cell.degree];
+    ++s.depthLeaves[cell.depth];
+    s.degreeVolume[cell.degree] += share;
+    s.depthVolume[cell.depth] += share;
+  });
+  s.nodes = field.data().nodes.size();
+  s.bytes = field.bytes();
+  s.coefficients = std::visit([](const auto& c) { return c.size(); }, field.data().coefficients);
+  return s;
+}
+
+}  // namespace hpsdf

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/triangle_mesh.h"
+
+namespace hpsdf {
+
+/// `cleaned` of mesh_file.h.
+ImportedMesh cleanMesh(TriangleMesh mesh);
+
+}  // namespace hpsdf

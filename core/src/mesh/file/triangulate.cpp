@@ -1,0 +1,228 @@
+#include "mesh/file/triangulate.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+namespace hpsdf {
+namespace {
+
+using Vector2 = Eigen::Vector2d;
+
+double cross(const Vector2& u, const Vector2& v) { return u.x() * v.y() - u.y() * v.x(); }
+
+/// The polygon as seen along the coordinate axis nearest to its normal, anticlockwise.
+std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
+  Vector3 normal = Vector3::Zero();
+  for (std::size_t i = 2; i < polygon.size(); ++i)
+    normal += (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]);
+  Eigen::Index axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  Eigen::Index right = (axis + 1) % 3;
+  Eigen::Index up = (axis + 2) % 3;
+  if (normal[axis] < 0) std::swap(right, up);
+  std::vector<Vector2> points;
+  for (const Vector3& corner : polygon)
+    points.emplace_back(corner[right] - polygon[0][right], corner[up] - polygon[0][up]);
+  return points;
+}
+
+/// Some of the corners, in the order of the polygon.
+class CornerSet {
+ public:
+  /// All of them.
+  explicit CornerSet(std::size_t corners) : words_((corners + 63) / 64, ~std::uint64_t{0}) {
+    if (corners % 64 != 0) words_.back() = (std::uint64_t{1} << corners % 64) - 1;
+  }
+
+  void add(std::uint32_t corner) { words_[corner / 64] |= bit(corner); }
+  void remove(std::uint32_t corner) { words_[corner / 64] &= ~bit(corner); }
+
+  /// The first of them that is met from `start` on, once around.
+  std::optional<std::uint32_t> next(std::uint32_t start) const {
+    std::uint64_t bits = words_[start / 64] & ~(bit(start) - 1);
+    for (std::size_t i = 0, word = start / 64; i <= words_.size(); ++i, bits = words_[word]) {
+      if (bits != 0) return static_cast<std::uint32_t>(64 * word + std::size_t(std::countr_zero(bits)));
+      word = (word + 1) % words_.size();
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static std::uint64_t bit(std::uint32_t corner) { return std::uint64_t{1} << corner % 64; }
+
+  std::vector<std::uint64_t> words_;
+};
+
+/// Which corners lie where: a grid of about as many cells.
+class CornerGrid {
+ public:
+  explicit CornerGrid(const std::vector<Vector2>& points)
+      : side_(static_cast<std::size_t>(std::sqrt(double(points.size())) / 2) + 1), starts_(side_ * side_ + 1) {
+    for (const Vector2& p : points) box_.extend(p);
+    for (const Vector2& p : points) ++starts_[cellOf(p) + 1];
+    for (std::size_t cell = 1; cell < starts_.size(); ++cell) starts_[cell] += starts_[cell - 1];
+    std::vector<std::uint32_t> ends(starts_.begin(), starts_.end() - 1);
+    corners_.resize(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) corners_[ends[cellOf(points[i])]++] = i;
+  }
+
+  /// One that `is` finds right, of the corners in the box and some around.
+  template <typename Predicate>
+  std::optional<std::uint32_t> find(const Eigen::AlignedBox2d& box, const Predicate& is) const {
+    const std::size_t lastX = column(0, box.max().x()), lastY = column(1, box.max().y());
+    for (std::size_t y = column(1, box.min().y()); y <= lastY; ++y) {
+      const std::size_t row = y * side_;
+      for (std::uint32_t i = starts_[row + column(0, box.min().x())]; i < starts_[row + lastX + 1]; ++i)
+        if (is(corners_[i])) return corners_[i];
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::size_t column(int axis, double x) const {
+    const double at = (x - box_.min()[axis]) / (box_.max()[axis] - box_.min()[axis]) * double(side_);
+    return at > 0 ? static_cast<std::size_t>(std::min(at, double(side_ - 1))) : 0;
+  }
+  std::size_t cellOf(const Vector2& p) const { return column(1, p.y()) * side_ + column(0, p.x()); }
+
+  std::size_t side_;
+  Eigen::AlignedBox2d box_;
+  std::vector<std::uint32_t> starts_;   ///< of each cell, row by row, in `corners_`
+  std::vector<std::uint32_t> corners_;  ///< cell by cell
+};
+
+/// Ear clipping: cuts off one convex corner after another that has no other corner in its triangle. Corners that were
+/// found not to be ears are passed over until a neighbour goes, or the corner that was in the way.
+class EarClipper {
+ public:
+  explicit EarClipper(std::span<const Vector3> polygon)
+      : points_(flattened(polygon)),
+        grid_(points_),
+        maybeClear_(points_.size()),
+        maybe_(points_.size()),
+        blocked_(points_.size()),
+        isLeft_(points_.size(), true),
+        left_(points_.size()) {
+    const auto n = static_cast<std::uint32_t>(left_);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      next_.push_back((i + 1) % n);
+      previous_.push_back((i + n - 1) % n);
+    }
+  }
+
+  std::vector<std::array<std::uint32_t, 3>> clip() {
+    // Positions come from float, where a corner on a straight side is off it by rounding: ears as thin as that, and
+    // ears whose cut runs past a corner as closely as that, would leave slivers with normals of noise. They come
+    // second.
+    constexpr double kRounding = 1e-4;
+    while (left_ > 3) {
+      std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
+      if (!ear) ear = findEar(0, maybe_);
+      cut(ear ? *ear : flattestCorner());
+    }
+    if (left_ == 3) cut(start_);
+    return std::move(triangles_);
+  }
+
+ private:
+  std::optional<std::uint32_t> findEar(double tolerance, CornerSet& candidates) {
+    std::optional<std::uint32_t> corner = candidates.next(start_);
+    for (; corner && !isEar(*corner, tolerance); corner = candidates.next(*corner)) candidates.remove(*corner);
+    return corner;
+  }
+
+  /// `tolerance`: how far from straight the corner is, and other corners from the triangle, relative to its sides.
+  bool isEar(std::uint32_t corner, double tolerance) {
+    const std::uint32_t before = previous_[corner], after = next_[corner];
+    const std::array<Vector2, 3> ear = {points_[before], points_[corner], points_[after]};
+    const Vector2 in = ear[1] - ear[0];
+    const Vector2 out = ear[2] - ear[1];
+    if (!(cross(in, out) > tolerance * in.norm() * out.norm())) return false;
+    const auto other = grid_.find(boxAround(ear, tolerance), [&](std::uint32_t p) {
+      return isLeft_[p] && p != before && p != corner && p != after && isNear(points_[p], ear, tolerance);
+    });
+    if (other) blocked_[*other].push_back(corner);
+    return !other;
+  }
+
+  /// Around all places that `isNear`: a triangle, too, with every side moved outwards.
+  static Eigen::AlignedBox2d boxAround(const std::array<Vector2, 3>& ear, double tolerance) {
+    Eigen::AlignedBox2d box;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector2 in = ear[i] - ear[(i + 2) % 3], out = ear[(i + 1) % 3] - ear[i];
+      box.extend(ear[i] + tolerance / cross(in, out) * (out.squaredNorm() * in - in.squaredNorm() * out));
+    }
+    return box;
+  }
+
+  /// Inside or on the border, but not at a corner: polygons with a slit pass through a point twice.
+  static bool isNear(const Vector2& p, const std::array<Vector2, 3>& ear, double tolerance) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector2 side = ear[(i + 1) % 3] - ear[i];
+      if (p == ear[i] || cross(side, p - ear[i]) < -tolerance * side.squaredNorm()) return false;
+    }
+    return true;
+  }
+
+  /// For what is left of a polygon that is flat to a line or crosses itself.
+  std::uint32_t flattestCorner() const {
+    std::uint32_t best = start_;
+    double least = std::numeric_limits<double>::infinity();
+    std::uint32_t corner = start_;
+    for (std::size_t i = 0; i < left_; ++i, corner = next_[corner]) {
+      const Vector2& p = points_[corner];
+      const double area = std::abs(cross(p - points_[previous_[corner]], points_[next_[corner]] - p));
+      if (area >= least) continue;
+      least = area;
+      best = corner;
+    }
+    return best;
+  }
+
+  void cut(std::uint32_t corner) {
+    const std::uint32_t before = previous_[corner];
+    const std::uint32_t after = next_[corner];
+    triangles_.push_back({before, corner, after});
+    next_[before] = after;
+    previous_[after] = before;
+    start_ = next_[after];  // not the neighbour: it would soon be the tip of a fan
+    --left_;
+    isLeft_[corner] = false;
+    maybeClear_.remove(corner);
+    maybe_.remove(corner);
+    lookAgain(before);
+    lookAgain(after);
+    for (const std::uint32_t other : blocked_[corner]) lookAgain(other);
+  }
+
+  void lookAgain(std::uint32_t corner) {
+    if (!isLeft_[corner]) return;
+    maybeClear_.add(corner);
+    maybe_.add(corner);
+  }
+
+  std::vector<Vector2> points_;
+  CornerGrid grid_;
+  CornerSet maybeClear_, maybe_;                     ///< what may be an ear, with tolerance and without
+  std::vector<std::vector<std::uint32_t>> blocked_;  ///< by each corner: those that are no ears for its sake
+  std::vector<bool> isLeft_;
+  std::vector<std::uint32_t> next_;
+  std::vector<std::uint32_t> previous_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::uint32_t start_ = 0;
+  std::size_t left_;  ///< corners not yet cut off
+};
+
+}  // namespace
+
+std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vector3> polygon) {
+  if (polygon.size() == 3) return {{0, 1, 2}};
+  return EarClipper(polygon).clip();
+}
+
+}  // namespace hpsdf

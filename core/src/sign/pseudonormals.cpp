@@ -1,0 +1,124 @@
+#include "sign/pseudonormals.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+namespace hpsdf::distance {
+namespace {
+
+/// The corners of all triangles by their vertex, as numbers 3·slot + k: those of v are [first[v], first[v + 1]), in the
+/// order of the mesh's triangles.
+struct CornersByVertex {
+  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> corners;
+};
+
+CornersByVertex groupCorners(const Hierarchy& hierarchy) {
+  const auto triangles = hierarchy.triangles();
+  std::vector<std::uint32_t> slots(triangles.size());  // of the mesh's triangles
+  tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t slot) {
+    slots[hierarchy.frames()[slot].triangle] = static_cast<std::uint32_t>(slot);
+  });
+  CornersByVertex grouped{std::vector<std::uint32_t>(hierarchy.vertices().size() + 1, 0),
+                          std::vector<std::uint32_t>(3 * triangles.size())};
+  for (const auto& triangle : triangles)
+    for (const std::uint32_t v : triangle) ++grouped.first[v];
+  for (std::size_t v = 1; v < grouped.first.size(); ++v) grouped.first[v] += grouped.first[v - 1];
+  // backwards, so that `first` ends up at each group's beginning
+  for (std::size_t t = slots.size(); t-- > 0;)
+    for (std::uint32_t k = 3; k-- > 0;) grouped.corners[--grouped.first[triangles[slots[t]][k]]] = 3 * slots[t] + k;
+  return grouped;
+}
+
+Vector3 unitNormal(const TriangleFrame& frame) { return hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()); }
+
+/// What happens at one vertex after another; keeps its memory from one to the next.
+class AtVertex {
+ public:
+  AtVertex(const Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
+      : frames_(hierarchy.frames()),
+        triangles_(hierarchy.triangles()),
+        vertices_(hierarchy.vertices()),
+        nextSide_(nextSide) {}
+
+  /// Returns the vertex's pseudonormal and links the sides that run from it to no lower vertex. `corners`: all at this
+  /// vertex.
+  Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
+    sides_.clear();
+    numbers_.clear();
+    Vector3 sum = Vector3::Zero();
+    for (const std::uint32_t corner : corners) {
+      const std::uint32_t slot = corner / 3, k = corner % 3, before = (k + 2) % 3;
+      const std::uint32_t next = triangles_[slot][(k + 1) % 3], previous = triangles_[slot][before];
+      const Vector3 toNext = vertices_[next] - vertices_[vertex];
+      const Vector3 toPrevious = vertices_[previous] - vertices_[vertex];
+      sum += std::atan2(toNext.cross(toPrevious).norm(), toNext.dot(toPrevious)) * unitNormal(frames_[slot]);
+      if (next >= vertex) addSide(next, corner);
+      if (previous > vertex) addSide(previous, 3 * slot + before);
+    }
+    linkSides();
+    return sum;
+  }
+
+ private:
+  void addSide(std::uint32_t otherVertex, std::uint32_t number) {
+    sides_.push_back(std::uint64_t{otherVertex} << 32 | numbers_.size());
+    numbers_.push_back(number);
+  }
+
+  void linkSides() {
+    std::sort(sides_.begin(), sides_.end());
+    std::size_t first = 0;  // of those at the same edge
+    for (std::size_t i = 0; i < sides_.size(); ++i) {
+      const bool last = i + 1 == sides_.size() || sides_[i + 1] >> 32 != sides_[i] >> 32;
+      nextSide_[numberOf(sides_[i])] = numberOf(sides_[last ? first : i + 1]);
+      if (last) first = i + 1;
+    }
+  }
+  std::uint32_t numberOf(std::uint64_t side) const { return numbers_[static_cast<std::uint32_t>(side)]; }
+
+  std::span<const TriangleFrame> frames_;
+  std::span<const std::array<std::uint32_t, 3>> triangles_;
+  std::span<const Vector3> vertices_;
+  std::vector<std::uint32_t>& nextSide_;
+  std::vector<std::uint64_t> sides_;  ///< other vertex, place in numbers_
+  std::vector<std::uint32_t> numbers_;
+};
+
+}  // namespace
+
+Pseudonormals::Pseudonormals(const Hierarchy& hierarchy)
+    : vertices_(hierarchy.vertices().size()), nextSide_(3 * hierarchy.triangles().size()) {
+  const CornersByVertex grouped = groupCorners(hierarchy);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size()), [&](const auto& range) {
+    AtVertex at(hierarchy, nextSide_);
+    for (std::size_t v = range.begin(); v < range.end(); ++v)
+      vertices_[v] =
+          at.visit(static_cast<std::uint32_t>(v),
+                   std::span(grouped.corners).subspan(grouped.first[v], grouped.first[v + 1] - grouped.first[v]));
+  });
+}
+
+Vector3 Pseudonormals::ofEdge(const Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const {
+  const auto rank = [&](std::uint32_t side) { return std::pair(hierarchy.frames()[side / 3].triangle, side); };
+  std::uint32_t side = 3 * slot + k;
+  while (rank(nextSide_[side]) > rank(side)) side = nextSide_[side];
+  const std::uint32_t last = side;
+  Vector3 sum = Vector3::Zero();
+  do {
+    side = nextSide_[side];
+    sum += unitNormal(hierarchy.frames()[side / 3]);
+  } while (side != last);
+  return sum;
+}
+
+std::size_t Pseudonormals::bytes() const {
+  return vertices_.size() * sizeof(vertices_[0]) + nextSide_.size() * sizeof(nextSide_[0]);
+}
+
+}  // namespace hpsdf::distance

@@ -1,0 +1,97 @@
+#include "util/checked_file.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <new>
+#include <system_error>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+constexpr std::uint32_t kLongestText = 4096;
+constexpr std::size_t kChecksumBytes = 8;
+
+}  // namespace
+
+void Checksum::Free::operator()(XXH3_state_s* state) const { XXH3_freeState(state); }
+
+Checksum::Checksum() : state_(XXH3_createState()) {
+  if (!state_) throw std::bad_alloc();
+  XXH3_64bits_reset(state_.get());
+}
+
+void Checksum::add(std::span<const std::byte> bytes) { XXH3_64bits_update(state_.get(), bytes.data(), bytes.size()); }
+
+std::uint64_t Checksum::value() const { return XXH3_64bits_digest(state_.get()); }
+
+void CheckedWriter::text(std::string_view value) {
+  const auto length = static_cast<std::uint32_t>(std::min<std::size_t>(value.size(), kLongestText));
+  item(length);
+  put(std::as_bytes(std::span(value.data(), length)));
+}
+
+void CheckedWriter::put(std::span<const std::byte> bytes) {
+  checksum_.add(bytes);
+  output_.write(bytes);
+}
+
+void CheckedWriter::finish() {
+  output_.write(bytesOf(checksum_.value()));
+  output_.commit();
+}
+
+CheckedReader::CheckedReader(const std::filesystem::path& file, const FileKind& kind) : file_(file), kind_(kind) {
+  std::error_code problem;
+  const auto status = std::filesystem::status(file, problem);
+  const std::string wanted = "; give " + std::string(kind.wanted);
+  if (!std::filesystem::exists(status)) refuse("no such file; check the path");
+  if (std::filesystem::is_directory(status)) refuse("is a folder" + wanted);
+  if (!std::filesystem::is_regular_file(status)) refuse("is not a regular file" + wanted);
+  stream_.open(file, std::ios::binary);
+  if (!stream_) refuse("cannot be opened; check its permissions");
+  size_ = std::filesystem::file_size(file, problem);
+  if (problem) size_ = 0;
+}
+
+void CheckedReader::flag(bool& value) {
+  std::uint8_t stored = 0;
+  item(stored);
+  if (stored > 1) damaged("a flag is neither 0 nor 1");
+  value = stored == 1;
+}
+
+void CheckedReader::text(std::string& value) {
+  std::uint32_t length = 0;
+  item(length);
+  if (length > kLongestText) damaged("its name is too long");
+  value.resize(length);
+  get(std::as_writable_bytes(std::span(value)));
+}
+
+void CheckedReader::get(std::span<std::byte> bytes) {
+  if (bytes.size() > remaining()) damaged("it ends too early");
+  stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!stream_) damaged("it cannot be read to its end");
+  checksum_.add(bytes);
+  position_ += bytes.size();
+}
+
+void CheckedReader::finish() {
+  const std::uint64_t expected = checksum_.value();
+  std::uint64_t stored = 0;
+  if (remaining() != kChecksumBytes)
+    damaged(remaining() < kChecksumBytes ? "it ends too early" : "it goes on too long");
+  item(stored);
+  if (stored != expected) damaged("its checksum is wrong");
+}
+
+void CheckedReader::damaged(const std::string& how) const {
+  refuse("the " + std::string(kind_.name) + " is damaged: " + how + "; " + std::string(kind_.remedy));
+}
+
+void CheckedReader::refuse(const std::string& why) const { throw Error(file_.string() + ": " + why); }
+
+}  // namespace hpsdf

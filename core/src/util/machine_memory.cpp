@@ -1,0 +1,58 @@
+#include "util/machine_memory.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <string>
+
+namespace hpsdf {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+/// Of a file that holds a number; "max" is none.
+double limitIn(const fs::path& file) {
+  std::ifstream text(file);
+  double bytes = 0;
+  return text >> bytes ? bytes : kNoLimit;
+}
+
+/// Of the files of this name from a group up to where the groups begin. Within a container the group's own folder may
+/// be out of sight, and what is seen as the topmost is the container's.
+double leastLimit(const fs::path& groups, fs::path group, const char* file) {
+  double least = kNoLimit;
+  for (;; group = group.parent_path()) {
+    least = std::min(least, limitIn(groups / group.relative_path() / file));
+    if (!group.has_relative_path()) return least;
+  }
+}
+
+}  // namespace
+
+double memoryOfControlGroups(const fs::path& root) {
+  const fs::path groups = root / "sys/fs/cgroup";
+  std::ifstream lines(root / "proc/self/cgroup");
+  double least = kNoLimit;
+  for (std::string line; std::getline(lines, line);) {  // number:controllers:group, the second empty in version 2
+    const std::size_t first = line.find(':'), second = line.find(':', first + 1);
+    if (first == std::string::npos || second == std::string::npos) continue;
+    const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+    const fs::path group = fs::path(line.substr(second + 1)).lexically_normal();
+    if (controllers == ",,") least = std::min(least, leastLimit(groups, group, "memory.max"));
+    if (controllers.find(",memory,") != std::string::npos)
+      least = std::min(least, leastLimit(groups / "memory", group, "memory.limit_in_bytes"));
+  }
+  return least;
+}
+
+double machineMemory() {
+  static const double bytes =
+      std::min(double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)), memoryOfControlGroups());
+  return bytes;
+}
+
+}  // namespace hpsdf

@@ -1,0 +1,186 @@
+#include "hpsdf/detail/output_file.h"
+
+#include <signal.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf {
+namespace {
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+constexpr std::string_view kTemporary = ".part-";  // a process and a number follow
+
+/// What the names of a file's temporary files begin with, without their path. Of a long name, which leaves no room for
+/// more, its beginning (of whole characters in UTF-8) and a hash of it all.
+std::string beginningOfTemporaries(const std::filesystem::path& file) {
+  constexpr std::size_t kLongest = 100, kKept = 60;
+  std::string name = file.filename();
+  if (name.size() > kLongest) {
+    const std::uint64_t hash = XXH3_64bits(name.data(), name.size());
+    std::size_t kept = kKept;
+    while (kept > 0 && (static_cast<unsigned char>(name[kept]) & 0xc0) == 0x80) --kept;
+    name.resize(kept);
+    name += '~' + std::to_string(hash);
+  }
+  return name + std::string(kTemporary);
+}
+
+/// Two writers of the same file, in one process or in two, must not share a temporary name.
+std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
+  static std::atomic<unsigned> counter = 0;
+  std::filesystem::path name = file;
+  name.replace_filename(beginningOfTemporaries(file) + std::to_string(getpid()) + "-" + std::to_string(counter++));
+  return name;
+}
+
+struct Opened {
+  std::filesystem::path name;
+  std::FILE* stream;
+};
+
+/// Another one where the name is taken: a process that was killed may have had our number.
+Opened openTemporary(const std::filesystem::path& file) {
+  constexpr int kTries = 100;
+  Opened opened;
+  for (int n = 0; n < kTries; ++n) {
+    opened = {temporaryBeside(file), nullptr};
+    opened.stream = std::fopen(opened.name.c_str(), "wbx");
+    if (opened.stream != nullptr || errno != EEXIST) break;
+  }
+  return opened;
+}
+
+/// What a symbolic link stands for, so that the rename replaces the file and keeps the link.
+std::filesystem::path resolved(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_symlink(file, ignored)) return file;
+  const auto target = std::filesystem::weakly_canonical(file, ignored);
+  return target.empty() ? file : target;
+}
+
+/// Names of the temporary files in existence, for `removeUnfinished`. More than these at once are not remembered.
+std::array<std::atomic<const char*>, 16> unfinished{};
+static_assert(std::atomic<const char*>::is_always_lock_free, "a signal handler reads these");
+
+void remember(const char* name) {
+  for (auto& slot : unfinished) {
+    const char* none = nullptr;
+    if (slot.compare_exchange_strong(none, name)) return;
+  }
+}
+
+void forget(const char* name) {
+  for (auto& slot : unfinished) {
+    const char* expected = name;
+    if (slot.compare_exchange_strong(expected, nullptr)) return;
+  }
+}
+
+/// A file of ours, by its name without its path.
+bool isOurs(const std::filesystem::path& name) {
+  return std::ranges::any_of(unfinished, [&](const auto& slot) {
+    const char* ours = slot.load();
+    return ours != nullptr && name == std::filesystem::path(ours).filename();
+  });
+}
+
+/// The process in the name of a temporary file of `file`; nothing for other files.
+std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
+  const std::string text = name.filename(), before = beginningOfTemporaries(file);
+  if (!text.starts_with(before)) return std::nullopt;
+  pid_t process = 0;
+  const auto [end, error] = std::from_chars(text.data() + before.size(), text.data() + text.size(), process);
+  if (error != std::errc() || process <= 0 || *end != '-') return std::nullopt;
+  return process;
+}
+
+bool isRunning(pid_t process) { return kill(process, 0) == 0 || errno != ESRCH; }
+
+}  // namespace
+
+void OutputFile::removeAbandoned(const std::filesystem::path& file, Writers writers) {
+  const std::filesystem::path target = resolved(file);
+  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
+  std::error_code ignored;
+  std::vector<std::filesystem::path> abandoned;
+  for (std::filesystem::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
+    const std::optional<pid_t> writer = writerOf(entry->path(), target);
+    if (!writer || isOurs(entry->path().filename())) continue;
+    if (writers == Writers::others || *writer == getpid() || !isRunning(*writer)) abandoned.push_back(entry->path());
+  }
+  for (const std::filesystem::path& name : abandoned) std::filesystem::remove(name, ignored);
+}
+
+void OutputFile::removeUnfinished() noexcept {
+  for (const auto& slot : unfinished)
+    if (const char* name = slot.load()) unlink(name);
+}
+
+OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)) {
+  if (file_.empty()) throw Error("the output file's name is empty; give a file name");
+  std::error_code error;
+  const auto status = std::filesystem::status(file_, error);
+  const auto refuse = [&](int why) {
+    throw Error(file.string() + ": cannot be written (" + reason(why) + "); check the folder");
+  };
+  if (error == std::errc::filename_too_long) refuse(error.value());  // that of the temporary file is not
+  if (std::filesystem::is_directory(status)) throw Error(file.string() + ": is a folder; give a file name");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    throw Error(file.string() + ": is not a regular file; give another name");
+  if (!file_.has_filename()) throw Error(file.string() + ": names a folder; give a file name");
+  Opened opened = openTemporary(file_);
+  temporary_ = std::move(opened.name);
+  stream_ = opened.stream;
+  if (stream_ == nullptr) refuse(errno);
+  remember(temporary_.c_str());
+}
+
+OutputFile::~OutputFile() {
+  if (stream_ == nullptr) return;
+  std::fclose(stream_);
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+  forget(temporary_.c_str());
+}
+
+void OutputFile::fail() {
+  throw Error(file_.string() + ": writing failed (" + reason(errno) + "); check the space left on the disk");
+}
+
+void OutputFile::write(std::span<const std::byte> bytes) {
+  if (!bytes.empty() && std::fwrite(bytes.data(), 1, bytes.size(), stream_) != bytes.size()) fail();
+}
+
+void OutputFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+
+void OutputFile::flush() {
+  if (std::fflush(stream_) != 0 || fsync(fileno(stream_)) != 0) fail();
+}
+
+void OutputFile::commit() {
+  flush();
+  if (std::rename(temporary_.c_str(), file_.c_str()) != 0) fail();
+  forget(temporary_.c_str());
+  std::fclose(stream_);
+  stream_ = nullptr;
+}
+
+void checkWritable(const std::filesystem::path& file) { OutputFile trial(file); }
+
+}  // namespace hpsdf

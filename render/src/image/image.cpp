@@ -1,0 +1,77 @@
+#include "hpsdf/render/image.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/error.h"
+
+// Static: an application that brings its own copy of stb must still link.
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_ONLY_PNG
+#define STBI_NO_STDIO
+#include <stb/stb_image.h>
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#include <stb/stb_image_write.h>
+namespace hpsdf::render {
+namespace {
+
+static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed bytes");
+
+std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }
+
+std::vector<char> encodePng(const Image& image) {
+  std::vector<char> bytes;
+  const auto append = [](void* context, void* data, int size) {
+    auto& out = *static_cast<std::vector<char>*>(context);
+    const char* begin = static_cast<const char*>(data);
+    out.insert(out.end(), begin, begin + size);
+  };
+  if (!stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, image.pixels.data(), image.width * 3))
+    bytes.clear();
+  return bytes;
+}
+
+}  // namespace
+
+void savePng(const Image& image, const std::filesystem::path& file) {
+  if (image.width <= 0 || image.height <= 0 || image.pixels.size() != std::size_t(image.width) * image.height)
+    throw Error(file.string() + ": cannot write the picture: it has no pixels; draw one first");
+  const std::vector<char> bytes = encodePng(image);
+  if (bytes.empty())
+    throw Error(file.string() + ": cannot write the picture: not enough memory to compress it; make it smaller");
+  OutputFile output(file);
+  output.write(std::string_view(bytes.data(), bytes.size()));
+  output.commit();
+}
+
+Image loadPng(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored))
+    throw Error(file.string() + ": cannot read the picture: it is a directory; name a PNG file");
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw Error(file.string() + ": cannot read the picture: " + systemReason() + "; check the path");
+  const std::vector<char> bytes(std::istreambuf_iterator<char>(stream), {});
+
+  int width = 0, height = 0, channels = 0;
+  const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+      stbi_load_from_memory(data, static_cast<int>(bytes.size()), &width, &height, &channels, 3), stbi_image_free);
+  if (!pixels)
+    throw Error(file.string() + ": cannot read the picture: " + stbi_failure_reason() +
+                "; it must be a whole PNG file");
+  Image image(width, height, Color{});
+  std::memcpy(image.pixels.data(), pixels.get(), image.pixels.size() * sizeof(Color));
+  return image;
+}
+
+}  // namespace hpsdf::render

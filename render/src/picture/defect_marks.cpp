@@ -1,0 +1,266 @@
+#include "picture/defect_marks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "image/color.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kCasing = {24, 22, 34};
+constexpr float kCasingStrength = 0.7F;
+constexpr float kHidden = 0.7F;      // strength of what lies behind something: in dashes, so that hues stay apart
+constexpr double kDash = 4;          // in thin lines, a dash and a gap each
+constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface may rise beside an edge of its own
+constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
+constexpr double kDotRadius = 2.6;
+constexpr double kCasingBorder = 0.9;
+constexpr double kSmallGroup = 16;     // pixels: what is no larger gets a ring
+constexpr double kLeastRing = 9;       // pixels, its radius
+constexpr double kNearestMark = 1e-3;  // before the eye, of how far away an edge's other end is
+constexpr int kGroupCell = 8;          // pixels: what lies in neighbouring cells of this size is one group
+
+/// As of a panel that has them all.
+const Swatch& styleOf(DefectKind kind) {
+  static const std::array<Swatch, kDefectKinds> styles = {
+      {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
+       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {226, 0, 206}},
+       {{"inconsistent edges", "inconsistent", "opposed"}, "", {0, 176, 80}},
+       {{"pinched vertices", "pinched"}, "", {255, 255, 255}},
+       {{"pairs of faces that meet", "pairs meet"}, "", {232, 24, 24}}}};
+  return styles[static_cast<std::size_t>(kind)];
+}
+
+std::string countOf(const MeshDefects& defects, DefectKind kind) {
+  const bool all = kind != DefectKind::crossing || defects.allCrossings;
+  return (all ? "" : "≥") + formatCount(defects.count(kind));
+}
+
+bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
+
+/// A line, a dot or a ring: all points at some distance from a segment.
+struct Stroke {
+  PicturePoint from, to;
+  double radius = 0;  ///< pixels: of a ring from the middle, else 0
+  double half = 0;    ///< of the width, pixels
+  Color color;
+  double tolerance = 0;  ///< world units: hidden by what is nearer by more
+};
+
+class Painter {
+ public:
+  Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
+      : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
+
+  /// Mixes a colour in where strokes, grown by `border`, cover pixels.
+  void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
+    for (const Stroke& stroke : strokes) paint(stroke, border, decodeSrgb(color ? *color : stroke.color), opacity);
+  }
+
+ private:
+  void paint(const Stroke& stroke, double border, const LinearColor& color, float opacity) {
+    const Eigen::Vector2d from(stroke.from.x, stroke.from.y), to(stroke.to.x, stroke.to.y);
+    const double reach = stroke.radius + stroke.half + border + 1;
+    const auto first = [&](double x) { return int(std::clamp(std::floor(x - reach), 0.0, 1e6)); };
+    const auto end = [&](double x, int size) { return int(std::clamp(std::ceil(x + reach), 0.0, double(size))); };
+    const int x1 = end(std::max(from.x(), to.x()), buffers_.width / samples_);
+    const int y1 = end(std::max(from.y(), to.y()), buffers_.height / samples_);
+    const Eigen::Vector2d along = to - from;
+    const double squared = along.squaredNorm();
+    for (int y = first(std::min(from.y(), to.y())); y < y1; ++y) {
+      // of the segment, what is no farther above or below the row than the stroke reaches
+      double begin = 0, last = 1;
+      if (along.y() != 0) {
+        const auto [low, high] =
+            std::minmax({(y + 0.5 - reach - from.y()) / along.y(), (y + 0.5 + reach - from.y()) / along.y()});
+        begin = std::clamp(low, 0.0, 1.0);
+        last = std::clamp(high, 0.0, 1.0);
+      }
+      const double xBegin = from.x() + begin * along.x(), xLast = from.x() + last * along.x();
+      const int rowEnd = std::min(x1, end(std::max(xBegin, xLast), x1));
+      for (int x = first(std::min(xBegin, xLast)); x < rowEnd; ++x) {
+        const Eigen::Vector2d middle(x + 0.5, y + 0.5);
+        const double t = squared > 0 ? std::clamp((middle - from).dot(along) / squared, 0.0, 1.0) : 0.0;
+        const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
+        const double covered = std::clamp(stroke.half + border + 0.5 - away, 0.0, 1.0);
+        if (covered <= 0) continue;
+        const bool hidden = isHidden(stroke, t, x, y);
+        if (hidden && isGap(stroke, middle)) continue;
+        const float strength = hidden ? kHidden : 1.0F;
+        Color& pixel = picture_.at(x, y);
+        pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
+      }
+    }
+  }
+
+  /// A ring is where its middle is.
+  bool isHidden(const Stroke& stroke, double t, int x, int y) const {
+    if (stroke.radius > 0) x = int(stroke.from.x), y = int(stroke.from.y);
+    if (x < 0 || y < 0 || x >= buffers_.width / samples_ || y >= buffers_.height / samples_) return false;
+    const std::size_t i =
+        std::size_t(y * samples_ + samples_ / 2) * buffers_.width + std::size_t(x * samples_ + samples_ / 2);
+    // along a line in space the reciprocal of the distance is what changes evenly
+    const double distance = 1 / ((1 - t) / stroke.from.distance + t / stroke.to.distance);
+    return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
+  }
+
+  /// By the place in the picture, not along the line: edges shorter than a dash have gaps too. A dot has none.
+  bool isGap(const Stroke& stroke, const Eigen::Vector2d& place) const {
+    const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
+    double path = across > down ? place.x() : place.y();
+    if (stroke.radius > 0)
+      path = stroke.radius * (std::numbers::pi + std::atan2(place.y() - stroke.from.y, place.x() - stroke.from.x));
+    else if (across == 0 && down == 0)
+      return false;
+    return std::fmod(path, 2 * dash_) >= dash_;
+  }
+
+  Image& picture_;
+  const ViewBuffers& buffers_;
+  int samples_;
+  double dash_;  ///< pixels
+};
+
+/// What hangs together in the picture, of one kind: cells of some pixels that touch.
+class Groups {
+ public:
+  Groups(int width, int height)
+      : columns_(width / kGroupCell + 1), rows_(height / kGroupCell + 1), here_(std::size_t(columns_) * rows_) {}
+
+  struct Group {
+    Eigen::AlignedBox2d extent;
+    PicturePoint nearest;
+  };
+
+  std::vector<Group> take() {
+    std::vector<Group> groups;
+    for (int row = 0; row < rows_; ++row)
+      for (int column = 0; column < columns_; ++column)
+        if (here_[std::size_t(row) * columns_ + column].used) groups.push_back(spread(column, row));
+    return groups;
+  }
+
+  /// A line, by places no farther apart than a cell.
+  void add(const PicturePoint& from, const PicturePoint& to) {
+    const double length = std::hypot(to.x - from.x, to.y - from.y);
+    const int steps = int(std::min(std::ceil(length / kGroupCell), 1e4));
+    add(from);
+    for (int i = 1; i <= steps; ++i) {
+      const double t = double(i) / steps;
+      const auto between = [t](double a, double b) { return a + t * (b - a); };
+      add({between(from.x, to.x), between(from.y, to.y), between(from.depth, to.depth),
+           between(from.distance, to.distance)});
+    }
+  }
+
+ private:
+  void add(const PicturePoint& p) {
+    if (!(p.x >= 0 && p.y >= 0 && p.x < columns_ * kGroupCell && p.y < rows_ * kGroupCell)) return;
+    const int column = int(p.x) / kGroupCell, row = int(p.y) / kGroupCell;
+    Cell& cell = here_[std::size_t(row) * columns_ + column];
+    if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
+    cell.used = true;
+    cell.extent.extend(Eigen::Vector2d(p.x, p.y));
+  }
+
+  struct Cell {
+    bool used = false;
+    PicturePoint nearest = {};
+    Eigen::AlignedBox2d extent;
+  };
+
+  Group spread(int column, int row) {
+    Group group{.extent = {}, .nearest = here_[std::size_t(row) * columns_ + column].nearest};
+    std::vector<std::array<int, 2>> pending = {{column, row}};
+    while (!pending.empty()) {
+      const auto [x, y] = pending.back();
+      pending.pop_back();
+      Cell& cell = here_[std::size_t(y) * columns_ + x];
+      if (!cell.used) continue;
+      cell.used = false;
+      group.extent.extend(cell.extent);
+      if (cell.nearest.distance < group.nearest.distance) group.nearest = cell.nearest;
+      for (int v = std::max(0, y - 1); v <= std::min(rows_ - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(columns_ - 1, x + 1); ++u) pending.push_back({u, v});
+    }
+    return group;
+  }
+
+  int columns_, rows_;
+  std::vector<Cell> here_;
+};
+
+/// The ends of what of a segment is before the eye; behind it where nothing is.
+std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
+  const auto place = [&](const Vector3& point) { return project(camera, point, width, height); };
+  PicturePoint from = place(ends[0]), to = place(ends[1]);
+  const double nearest = kNearestMark * std::max(from.depth, to.depth);
+  if (!(nearest > 0)) return {from, from};
+  const auto share = [&](double depth, double other) { return (nearest - depth) / (other - depth); };
+  const Vector3 along = ends[1] - ends[0];
+  if (from.depth < nearest) return {place(ends[0] + share(from.depth, to.depth) * along), to};
+  if (to.depth < nearest) return {from, place(ends[1] - share(to.depth, from.depth) * along)};
+  return {from, to};
+}
+
+}  // namespace
+
+Color defectColor(DefectKind kind) { return styleOf(kind).color; }
+
+std::vector<Legend::Defects> defectLegend(const MeshDefects& defects) {
+  std::vector<Legend::Defects> legend;
+  for (const Swatch& swatch : defectSwatches(defects))
+    legend.push_back({swatch.names.front(), swatch.count, swatch.color});
+  return legend;
+}
+
+std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
+  std::vector<Swatch> swatches;
+  for (std::size_t i = 0; i < kDefectKinds; ++i) {
+    const auto kind = DefectKind(i);
+    if (defects.count(kind) == 0) continue;
+    swatches.push_back(styleOf(kind));
+    swatches.back().count = countOf(defects, kind);
+  }
+  return swatches;
+}
+
+void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
+                  const MeshDefects& defects, double lineWidth) {
+  const int width = buffers.width / samples, height = buffers.height / samples;
+  std::vector<Stroke> strokes;
+  for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
+    Groups groups(width, height);
+    const Color color = defectColor(DefectKind(kind));
+    for (const Defect& defect : defects.of(DefectKind(kind))) {
+      const auto [from, to] = beforeEye(camera, defect.ends, width, height);
+      if (!(from.depth > 0)) continue;
+      const double tolerance = kHiddenBeyond * pixelSize(camera, std::max(from.depth, to.depth), height);
+      groups.add(from, to);
+      if (isEdge(defect.kind))
+        strokes.push_back({from, to, 0, 0.5 * kLineWidth * lineWidth, color, tolerance});
+      else if (defect.kind == DefectKind::pinchedVertex)
+        strokes.push_back({from, to, 0, kDotRadius * lineWidth, color, tolerance});
+    }
+    for (const Groups::Group& group : groups.take()) {
+      if (group.extent.sizes().maxCoeff() > kSmallGroup * lineWidth) continue;
+      PicturePoint middle = group.nearest;
+      middle.x = group.extent.center().x();
+      middle.y = group.extent.center().y();
+      const double radius = kLeastRing * lineWidth + 0.5 * group.extent.sizes().maxCoeff();
+      strokes.push_back({middle, middle, radius, 0.5 * kLineWidth * lineWidth, color,
+                         kHiddenBeyond * pixelSize(camera, middle.depth, height)});
+    }
+  }
+  // all casings first, so that none covers a neighbour
+  Painter painter(picture, buffers, samples, lineWidth);
+  painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
+  painter.paint(strokes, 0, nullptr, 1);
+}
+
+}  // namespace hpsdf::render

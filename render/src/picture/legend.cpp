@@ -1,0 +1,393 @@
+#include "picture/legend.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "picture/color_view.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kShareBar = {206, 209, 218};
+
+// Text of a picture: 15 pixels at 1280 × 720, in proportion above, shrinking less than the picture below.
+double textSizeFor(int width, int height) {
+  const double reach = std::min<double>(height, width * 9.0 / 16);
+  return reach >= 720 ? 15 * reach / 720 : std::max(9.0, 15 - (720 - reach) * 5 / 480);
+}
+
+Color colorOf(const LinearColor& color) { return encodeSrgb(color); }
+
+double advanceOf(const std::string& text, double size) { return measureText(text, size).advance; }
+
+void addText(Overlay& overlay, std::string text, double size, double x, double baseline, Color color) {
+  if (!text.empty()) overlay.texts.push_back({std::move(text), size, x, baseline, color});
+}
+
+void addTextRight(Overlay& overlay, const std::string& text, double size, double right, double baseline, Color color) {
+  addText(overlay, text, size, right - advanceOf(text, size), baseline, color);
+}
+
+// The column within the panel that legends stand in.
+struct Column {
+  double left, right, top, bottom;
+  double width() const { return right - left; }
+};
+
+Column columnOf(const Frame& frame) {
+  const double em = frame.textSize;
+  return {frame.panel.x0 + em, frame.panel.x1 - em, frame.panel.y0 + em, frame.panel.y1 - 0.5 * em};
+}
+
+// Writes the first title that fits and moves the column's top below it.
+void addTitle(Overlay& overlay, Column& column, std::span<const std::string> titles, double size) {
+  addText(overlay, fittingTitle(titles, size, column.width()), size, column.left, column.top + capHeight(size), kInk);
+  column.top += 1.7 * size;
+}
+
+struct LevelRow {
+  int level;
+  double share;
+  double top, height;
+  double baseline(double size) const { return top + (height + capHeight(size)) / 2; }
+};
+
+void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width, double gap, Color color) {
+  overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
+}
+
+// Number in the swatch, share beside it and, in a roomy picture, as a bar.
+void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double largestShare,
+                bool roomy, const LinearColor& color) {
+  const double left = std::round(column.left);
+  const double swatch = std::round(2.1 * size);
+  addSwatch(overlay, row, left, swatch, std::max(1.0, std::round(0.16 * row.height)), colorOf(color));
+  LevelRow box = row;
+  box.height -= std::max(1.0, std::round(0.16 * row.height));
+  const std::string number = std::to_string(row.level);
+  const double baseline = std::round(box.baseline(size));
+  addText(overlay, number, size, left + (swatch - advanceOf(number, size)) / 2, baseline, inkOn(color));
+
+  const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
+  if (shareRight > column.right) return;
+  addTextRight(overlay, formatShare(row.share), size, shareRight, baseline, kInk);
+  const double barLeft = shareRight + 0.6 * size;
+  if (!roomy || barLeft + size > column.right) return;
+  const double middle = box.top + box.height / 2, half = std::max(1.0, 0.22 * size);
+  overlay.boxes.push_back({barLeft, middle - half, barLeft + (column.right - barLeft) * row.share / largestShare,
+                           middle + half, kShareBar});
+}
+
+// Rows too low for text: the swatches touch, and every so many of them is numbered beside.
+void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
+  const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
+  const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
+  double lastTop = -1e9;
+  for (const LevelRow& row : rows) {
+    addSwatch(overlay, row, left, swatch, 0, colorOf(map(row.level)));
+    const double baseline = std::round(row.baseline(size));
+    if (baseline - capHeight(size) < lastTop + 1.5 * size || baseline > column.bottom) continue;
+    if (baseline - capHeight(size) < column.top) continue;
+    addText(overlay, std::to_string(row.level), size, left + swatch + 0.5 * size, baseline, kInk);
+    lastTop = baseline - capHeight(size);
+  }
+}
+
+// Of a positive number, as one types it: 1.5e-7, not 1.500e-07.
+std::string formatScientific(double value, int digits) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*e", digits - 1, value);
+  const std::string shown = text;
+  const std::size_t e = shown.find('e');
+  std::string mantissa = shown.substr(0, e);
+  if (mantissa.find('.') != std::string::npos) mantissa.erase(mantissa.find_last_not_of('0') + 1);
+  if (mantissa.back() == '.') mantissa.pop_back();
+  return mantissa + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
+}
+
+// Rounded to this many digits, or to a whole number where that has more; no zeros behind the last digit that counts.
+std::string formatPlain(double value, int digits) {
+  const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", std::max(0, digits - beforePoint), value);
+  std::string shown = text;
+  if (shown.find('.') == std::string::npos) return shown;
+  shown.erase(shown.find_last_not_of('0') + 1);
+  if (shown.back() == '.') shown.pop_back();
+  return shown;
+}
+
+int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
+
+// Values at multiples of a step, all with the same number of decimals, or with an exponent where that is shorter.
+std::string formatTick(double value, double step) {
+  if (value == 0) return "0";
+  const std::string sign = value < 0 ? "−" : "+";
+  if (step < 0.9e-3 || step > 0.9e4) return sign + formatScientific(std::abs(value), 3);
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimalsOf(step), std::abs(value));
+  return sign + text;
+}
+
+// From (x, y) to the right or upwards, with a head.
+void addArrow(Overlay& overlay, double x, double y, double length, double thin, bool upwards) {
+  const auto box = [&](double from, double to, double half) {
+    const double middle = 0.5 * thin;
+    if (upwards)
+      overlay.boxes.push_back({x + middle - half, y - to, x + middle + half, y - from, kSoftInk});
+    else
+      overlay.boxes.push_back({x + from, y + middle - half, x + to, y + middle + half, kSoftInk});
+  };
+  const double head = 4.5 * thin;
+  box(0, length - head, 0.5 * thin);
+  for (double back = 0; back < head; back += 0.5 * thin)
+    box(length - back - 0.5 * thin, length - back, 0.45 * (back + 0.5 * thin));
+}
+
+void blendBox(Image& image, const BoxItem& box) {
+  const auto overlap = [](double low, double high, int pixel) {
+    return std::clamp(std::min(high, pixel + 1.0) - std::max(low, double(pixel)), 0.0, 1.0);
+  };
+  const LinearColor color = decodeSrgb(box.color);
+  for (int y = std::max(0, int(std::floor(box.y0))); y < std::min<double>(image.height, std::ceil(box.y1)); ++y)
+    for (int x = std::max(0, int(std::floor(box.x0))); x < std::min<double>(image.width, std::ceil(box.x1)); ++x) {
+      const double covered = overlap(box.x0, box.x1, x) * overlap(box.y0, box.y1, y);
+      image.at(x, y) = covered >= 1 ? box.color : encodeSrgb(mix(decodeSrgb(image.at(x, y)), color, float(covered)));
+    }
+}
+
+}  // namespace
+
+Color inkOn(const LinearColor& ground) {
+  return toOklab(ground).lightness > 0.64 ? Color{20, 20, 30} : Color{255, 255, 255};
+}
+
+std::string fittingTitle(std::span<const std::string> titles, double size, double width) {
+  for (const std::string& title : titles)
+    if (advanceOf(title, size) <= width) return title;
+  return fitText(titles.back(), size, width);
+}
+
+Frame frame(int width, int height) {
+  Frame f;
+  f.width = width;
+  f.height = height;
+  f.textSize = textSizeFor(width, height);
+  f.roomy = std::min<double>(height, width * 9.0 / 16) >= 440;
+  const bool hasPanel = width >= 200 && height >= 140;
+  const bool hasCaption = width >= 160 && height >= 140;
+  const int panel = hasPanel ? static_cast<int>(std::lround((f.roomy ? 13.5 : 8.4) * f.textSize)) : 0;
+  const int caption = hasCaption ? static_cast<int>(std::lround(2.4 * f.textSize)) : 0;
+  f.view = {0, 0, width - panel, height - caption};
+  if (hasPanel) f.panel = {width - panel, 0, width, height - caption};
+  if (hasCaption) f.caption = {0, height - caption, width, height};
+  return f;
+}
+
+void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
+                    const std::map<int, double>& shares, const LevelMap& map) {
+  if (frame.panel.empty() || shares.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  addTitle(overlay, column, titles, em);
+  if (frame.roomy) {
+    const double small = 0.8 * em;
+    addText(overlay, fitText("share of the volume", small, column.width()), small, column.left,
+            column.top - 0.35 * em + capHeight(small), kSoftInk);
+    column.top += 1.2 * em;
+  }
+
+  const double height = std::min(1.75 * em, (column.bottom - column.top) / double(shares.size()));
+  const double size = std::min(em, 0.74 * height);
+  double largestShare = 0;
+  std::vector<LevelRow> rows;
+  for (auto level = shares.rbegin(); level != shares.rend(); ++level) {
+    rows.push_back({level->first, level->second, column.top + height * double(rows.size()), height});
+    largestShare = std::max(largestShare, level->second);
+  }
+  if (size < kSmallestText) return addNarrowRows(overlay, column, rows, map);
+  for (const LevelRow& row : rows) addWideRow(overlay, column, row, size, largestShare, frame.roomy, map(row.level));
+}
+
+void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  static const std::string titles[] = {"signed distance", "distance"};
+  addTitle(overlay, column, titles, em);
+
+  const double left = std::round(column.left), right = left + std::round(1.7 * em);
+  const double top = std::round(column.top + 0.3 * em), bottom = std::round(column.bottom - 0.6 * em);
+  const auto rowOf = [&](double value) { return top + (bottom - top) * (0.5 - 0.5 * value / scale.range); };
+  for (double y = top; y < bottom; ++y) {
+    const double value = 1 - 2 * (y + 0.5 - top) / (bottom - top);
+    overlay.boxes.push_back({left, y, right, y + 1, colorOf(divergingColor(value))});
+  }
+
+  // As many numbers as stand well apart: at every 1st, 2nd, 5th, 10th … line, zero always among them.
+  const double perLine = (bottom - top) * scale.step / (2 * scale.range);
+  const double size = std::min(em, 0.9 * em + 1);
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // about 1e7 at most
+  int every = 1;
+  for (int decade = 1; every * perLine < 1.7 * size && every <= lines; decade *= 10)
+    for (const int digit : {2, 5, 10})
+      if (every * perLine < 1.7 * size) every = digit * decade;
+  const double thin = std::max(1.0, em / 15);
+  // Lines of a close look, which would cover the colours: only those with numbers.
+  const int next = perLine < 2 * thin ? every : 1;
+  for (int line = -(lines / next) * next; line <= lines; line += next) {
+    const double y = rowOf(line * scale.step), half = line == 0 ? 1.2 * thin : 0.5 * thin;
+    const bool labelled = line % every == 0;
+    overlay.boxes.push_back({left, y - half, right + (labelled ? 0.35 * em : 0), y + half, kTick});
+    if (!labelled) continue;
+    // No number rather than part of one.
+    const std::string label = formatTick(line * scale.step, scale.step);
+    const double x = right + 0.6 * em;
+    if (x + advanceOf(label, size) <= column.right) addText(overlay, label, size, x, y + capHeight(size) / 2, kInk);
+  }
+}
+
+void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, const ColorScale& scale) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  addTitle(overlay, column, titles, em);
+
+  const double left = std::round(column.left), right = left + std::round(1.7 * em);
+  const double top = std::round(column.top + 0.5 * em), bottom = std::round(column.bottom - 0.8 * em);
+  for (double y = top; y < bottom; ++y) {
+    const double place = 1 - (y + 0.5 - top) / (bottom - top);
+    overlay.boxes.push_back({left, y, right, y + 1, colorOf(orderedColor(place))});
+  }
+
+  const double size = std::min(em, 0.9 * em + 1), thin = std::max(1.0, em / 15);
+  double lastLabel = std::numeric_limits<double>::infinity();  // its baseline; going upwards
+  const auto mark = [&](double value, bool labelled) {
+    const double y = bottom - (bottom - top) * scale.place(value);
+    labelled = labelled && y + 1.6 * size <= lastLabel;
+    overlay.boxes.push_back({labelled ? left : right - 0.4 * em, y - 0.5 * thin, right + (labelled ? 0.35 * em : 0),
+                             y + 0.5 * thin, kTick});
+    const std::string label = value == 0 ? "0" : formatNumber(value, 3);
+    const double x = right + 0.6 * em;
+    if (!labelled || x + advanceOf(label, size) > column.right) return;
+    addText(overlay, label, size, x, y + capHeight(size) / 2, kInk);
+    lastLabel = y;
+  };
+  for (const double value : scaleMarks(scale)) mark(value, true);
+  if (!scale.logarithmic()) return;
+  for (double decade = powerOfTenBelow(scale.low()); decade < scale.high(); decade *= 10)
+    for (int digit = 2; digit < 10; ++digit)
+      if (digit * decade > scale.low() && digit * decade < scale.high()) mark(digit * decade, false);
+}
+
+void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, char right, char up) {
+  const double em = frame.textSize, size = std::max(kSmallestText, 0.85 * em), thin = std::max(1.0, em / 15);
+  const double length = std::round(1.8 * em), gap = std::round(0.5 * em);
+  // from the tips of the arrows the letters reach as far again as they are large
+  const double reach = length + std::round(1.1 * size);
+  if (section.width() < 3 * reach || section.height() < 3 * reach) return;
+
+  double x = section.x0, y = section.y1;  // where the arrows start
+  if (section.x0 - frame.view.x0 >= reach + 2 * gap) {
+    x = section.x0 - gap - reach;
+    y = std::min<double>(section.y1, frame.view.y1 - gap);
+  } else if (frame.view.y1 - section.y1 >= reach + 2 * gap) {
+    x = std::max<double>(x, frame.view.x0 + gap);  // the letter above the arrow reaches to its left
+    y = section.y1 + gap + reach;
+  } else {
+    x += gap;
+    y -= gap;
+    overlay.boxes.push_back({x - 0.5 * gap, y - reach - 0.5 * gap, x + reach + 0.5 * gap, y + 0.5 * gap, paperColor()});
+  }
+  addArrow(overlay, x, y - thin, length, thin, false);
+  addArrow(overlay, x, y, length, thin, true);
+  const std::string across(1, right), upward(1, up);
+  // small letters, about half an em high: each in line with its arrow
+  addText(overlay, across, size, x + length + 0.3 * size, y - 0.5 * thin + 0.27 * size, kSoftInk);
+  addText(overlay, upward, size, x + 0.5 * (thin - advanceOf(upward, size)), y - length - 0.45 * size, kSoftInk);
+}
+
+void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
+              std::span<const std::pair<std::string, std::string>> facts) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em);
+  Column column = columnOf(frame);
+  addTitle(overlay, column, titles, em);
+  for (const auto& [name, value] : facts) {
+    if (column.top + 2.3 * em > column.bottom) return;
+    addText(overlay, fitText(name, small, column.width()), small, column.left, column.top + capHeight(small), kSoftInk);
+    addText(overlay, fitText(value, em, column.width()), em, column.left, column.top + 1.25 * small + capHeight(em),
+            kInk);
+    column.top += 1.25 * small + 1.75 * em;
+  }
+}
+
+void addSwatches(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
+                 std::span<const Swatch> swatches) {
+  if (frame.panel.empty()) return;
+  const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em), side = 0.9 * small;
+  Column column = columnOf(frame);
+  addTitle(overlay, column, titles, em);
+  for (const Swatch& swatch : swatches) {
+    const double height = 1.6 * small + (swatch.count.empty() ? 0 : 1.6 * em);
+    if (column.top + height > column.bottom) return;
+    const double left = std::round(column.left), top = std::round(column.top), text = left + side + 0.5 * em;
+    overlay.boxes.push_back({left, top, left + side, top + side, kTick});
+    overlay.boxes.push_back({left + 1, top + 1, left + side - 1, top + side - 1, swatch.color});
+    addText(overlay, fittingTitle(swatch.names, small, column.right - text), small, text,
+            top + (side + capHeight(small)) / 2, kSoftInk);
+    const double size = advanceOf(swatch.count, em) <= column.right - text ? em : small;
+    addText(overlay, fitText(swatch.count, size, column.right - text), size, text, top + 1.35 * small + capHeight(em),
+            kInk);
+    column.top += height;
+  }
+}
+
+void addCaption(Overlay& overlay, const Frame& frame, const std::string& name, std::span<const std::string> details) {
+  if (frame.caption.empty()) return;
+  const double em = frame.textSize;
+  const PixelRect& strip = frame.caption;
+  overlay.boxes.push_back({0, double(strip.y0), double(strip.x1), strip.y0 + std::max(1.0, em / 15), kRule});
+  const double left = em, right = strip.x1 - em;
+  const double baseline = std::round((strip.y0 + strip.y1 + capHeight(em)) / 2);
+
+  const std::string shownName = fitText(name, em, details.empty() ? right - left : 0.45 * (right - left));
+  addText(overlay, shownName, em, left, baseline, kInk);
+  const double start = left + (shownName.empty() ? 0 : advanceOf(shownName, em) + em);
+  std::string line;
+  for (const std::string& detail : details) {
+    const std::string longer = line.empty() ? detail : line + " · " + detail;
+    if (advanceOf(longer, em) <= right - start) line = longer;
+  }
+  if (line.empty() && !details.empty()) line = fitText(details.front(), em, right - start);
+  addText(overlay, line, em, start, baseline, kSoftInk);
+}
+
+void paint(Image& image, const Overlay& overlay) {
+  for (const BoxItem& box : overlay.boxes) blendBox(image, box);
+  for (const TextItem& text : overlay.texts) drawText(image, text.text, text.size, text.x, text.baseline, text.color);
+}
+
+std::string formatNumber(double value, int digits) {
+  if (value == 0) return "0";
+  const double size = std::abs(value);
+  const std::string sign = value < 0 ? "−" : "";
+  if (size < 1e-3 || size >= 999999.5) return sign + formatScientific(size, digits);
+  return sign + formatPlain(size, digits);
+}
+
+std::string formatCount(std::size_t count) {
+  std::string digits = std::to_string(count);
+  for (int i = static_cast<int>(digits.size()) - 3; i > 0; i -= 3) digits.insert(static_cast<std::size_t>(i), ",");
+  return digits;
+}
+
+std::string formatShare(double fraction) {
+  if (fraction > 0 && fraction < 0.0005) return "<0.1 %";
+  char text[32];
+  std::snprintf(text, sizeof text, fraction > 0.9995 ? "%.0f %%" : "%.1f %%", 100 * fraction);
+  return text;
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,67 @@
+#include "view/scaled_renderer.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+#include <variant>
+
+namespace hpsdf::render {
+namespace {
+
+Field scaled(const Field& field, double factor) {
+  FieldData data = field.data();
+  data.domain = Box(factor * data.domain.min(), factor * data.domain.max());
+  std::visit(
+      [&](auto& coefficients) {
+        for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
+      },
+      data.coefficients);
+  data.bounds.clear();  // no renderer asks for them
+  return Field(std::move(data));
+}
+
+/// Views come in world units, `inner` counts in `unit` of them.
+class ScaledRenderer final : public Renderer {
+ public:
+  ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}
+
+  ViewBuffers slice(const SliceView& view, int width, int height) override {
+    return inWorldUnits(inner_->slice({view.origin / unit_, view.right / unit_, view.up / unit_}, width, height));
+  }
+
+  ViewBuffers surface(const SurfaceView& view, int width, int height) override {
+    SurfaceView inner = view;
+    inner.camera.eye /= unit_;
+    if (view.camera.projection == Projection::orthographic) {
+      inner.camera.right /= unit_;
+      inner.camera.up /= unit_;
+    }
+    inner.offset /= unit_;
+    if (inner.clip) inner.clip->offset /= unit_;
+    return inWorldUnits(inner_->surface(inner, width, height));
+  }
+
+  std::string description() const override { return inner_->description(); }
+
+ private:
+  ViewBuffers inWorldUnits(ViewBuffers buffers) const {
+    for (auto* lengths : {&buffers.value, &buffers.distance})
+      for (float& length : *lengths) length = static_cast<float>(unit_ * length);
+    return buffers;
+  }
+
+  std::unique_ptr<Renderer> inner_;
+  double unit_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make) {
+  constexpr int kNear = 30;
+  const int exponent = std::ilogb(field.domain().sizes().maxCoeff());
+  if (std::abs(exponent) <= kNear) return make(field);
+  const double unit = std::ldexp(1.0, exponent);
+  return std::make_unique<ScaledRenderer>(make(scaled(field, 1 / unit)), unit);
+}
+
+}  // namespace hpsdf::render

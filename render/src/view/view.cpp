@@ -1,0 +1,202 @@
+#include "hpsdf/render/view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "hpsdf/error.h"
+#include "view/grid_space.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr double kBorder = 0.025;       // left free around the section, of the picture's width or height
+constexpr double kBeforeDomain = 0.01;  // where parallel rays start, in domain diagonals
+
+std::string text(double x) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.6g", x);
+  return buffer;
+}
+
+void checkDomain(const Box& domain) {
+  if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite())
+    throw Error("a view's domain is empty or not finite: give a field's domain");
+}
+
+/// The rectangle with square pixels that shows [lo, hi], two coordinates along the unit vectors `right` and `up`.
+SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vector3& base, const Vector3& right,
+                 const Vector3& up, int width, int height) {
+  const Eigen::Vector2d center = 0.5 * (lo + hi);
+  const Eigen::Vector2d extent = hi - lo;
+  const double pixel = std::max(extent.x() / width, extent.y() / height) / (1 - 2 * kBorder);
+  return {base + center.x() * right + center.y() * up, right * (pixel * width), up * (pixel * height)};
+}
+
+/// Unit vectors on screen for a plane: up is the projection of z, or of y where the plane is nearly level; right is
+/// turned towards growing coordinates, so that planes of one family are shown alike whichever way their normals point.
+std::pair<Vector3, Vector3> screenAxes(const Vector3& normal) {
+  const Vector3 upwards = std::abs(normal.z()) > 0.9 ? Vector3::UnitY() : Vector3::UnitZ();
+  const Vector3 up = (upwards - upwards.dot(normal) * normal).normalized();
+  Vector3 right = up.cross(normal).normalized();
+  Eigen::Index largest = 0;
+  right.cwiseAbs().maxCoeff(&largest);
+  if (right[largest] < 0) right = -right;
+  return {right, up};
+}
+
+/// Corners of the plane's section with the box: where it meets the box's edges. In no particular order.
+std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3& normal) {
+  std::vector<Vector3> corners;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int edge = 0; edge < 4; ++edge) {
+      Vector3 a = box.min();
+      a[(axis + 1) % 3] = edge & 1 ? box.max()[(axis + 1) % 3] : box.min()[(axis + 1) % 3];
+      a[(axis + 2) % 3] = edge & 2 ? box.max()[(axis + 2) % 3] : box.min()[(axis + 2) % 3];
+      Vector3 b = a;
+      b[axis] = box.max()[axis];
+      const double da = normal.dot(a - point);
+      const double db = normal.dot(b - point);
+      if (da == 0) corners.push_back(a);
+      if (db == 0) corners.push_back(b);
+      if ((da < 0 && db > 0) || (da > 0 && db < 0)) corners.push_back(a + (da / (da - db)) * (b - a));
+    }
+  return corners;
+}
+
+/// The picture's pixel when its middle is given.
+Vector3 onPicture(const Camera& camera, const Vector3& middle, int x, int y, int width, int height) {
+  return middle + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
+}
+
+double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
+
+void checkRange(const char* what, double value, bool inRange, const char* range) {
+  if (!std::isfinite(value) || !inRange)
+    throw Error(std::string("camera ") + what + " " + text(value) + " is out of range: give " + range);
+}
+
+}  // namespace
+
+SliceView axisSlice(const Box& domain, int axis, double offset, int width, int height) {
+  checkDomain(domain);
+  checkViewSize(width, height);
+  if (axis < 0 || axis > 2) throw Error("slice axis " + std::to_string(axis) + " is unknown: give 0, 1 or 2");
+  const double lo = domain.min()[axis];
+  const double hi = domain.max()[axis];
+  if (!(offset >= lo && offset <= hi))
+    throw Error("slice offset " + text(offset) + " lies outside of the domain: give " + text(lo) + " to " + text(hi));
+  const int across = axis == 0 ? 1 : 0;
+  const int upward = axis == 2 ? 1 : 2;
+  return framed({domain.min()[across], domain.min()[upward]}, {domain.max()[across], domain.max()[upward]},
+                offset * Vector3::Unit(axis), Vector3::Unit(across), Vector3::Unit(upward), width, height);
+}
+
+SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& normal, int width, int height) {
+  checkDomain(domain);
+  checkViewSize(width, height);
+  if (!point.allFinite()) throw Error("the slice plane's point is not finite: give finite coordinates");
+  if (!normal.allFinite() || normal.isZero(0))
+    throw Error("the slice plane's normal is zero or not finite: give a direction");
+  const auto misses = [&] {
+    return Error("the slice plane through (" + text(point.x()) + ", " + text(point.y()) + ", " + text(point.z()) +
+                 ") misses the domain: give a point within it");
+  };
+  // exactly along an axis: no rounding, so that the plane stays on a face between cells
+  for (int axis = 0; axis < 3; ++axis) {
+    if (normal[(axis + 1) % 3] != 0 || normal[(axis + 2) % 3] != 0) continue;
+    if (!(point[axis] >= domain.min()[axis] && point[axis] <= domain.max()[axis])) throw misses();
+    return axisSlice(domain, axis, point[axis], width, height);
+  }
+  const Vector3 unit = (normal / normal.cwiseAbs().maxCoeff()).normalized();
+  const std::vector<Vector3> corners = section(domain, point, unit);
+  if (corners.empty()) throw misses();
+  const auto [right, up] = screenAxes(unit);
+  // the point nearest to the domain's centre, so that coordinates stay small whatever point was given
+  const Vector3 base = domain.center() - unit.dot(domain.center() - point) * unit;
+  Eigen::AlignedBox2d extent;
+  for (const Vector3& corner : corners) extent.extend(Eigen::Vector2d(right.dot(corner - base), up.dot(corner - base)));
+  if (!(extent.sizes().maxCoeff() > 1e-9 * domain.diagonal().norm())) throw misses();
+  return framed(extent.min(), extent.max(), base, right, up, width, height);
+}
+
+Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height) {
+  checkDomain(domain);
+  checkViewSize(width, height);
+  checkRange("azimuth", camera.azimuthDegrees, true, "a finite angle in degrees");
+  checkRange("elevation", camera.elevationDegrees, std::abs(camera.elevationDegrees) <= 90, "-90 to 90 degrees");
+  checkRange("distance", camera.distance, camera.distance > 0, "a number above 0, in domain diagonals");
+  checkRange("field of view", camera.fieldOfViewDegrees,
+             camera.fieldOfViewDegrees > 0 && camera.fieldOfViewDegrees < 180, "more than 0 and less than 180 degrees");
+  const double azimuth = radians(std::remainder(camera.azimuthDegrees, 360));
+  const double elevation = radians(camera.elevationDegrees);
+  // the horizontal direction towards the eye and the one to its right, as seen from the eye
+  const bool upY = camera.up == UpAxis::y;
+  const Vector3 vertical = upY ? Vector3::UnitY() : Vector3::UnitZ();
+  const Vector3 front = upY ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
+  const Vector3 outward = std::sin(azimuth) * Vector3::UnitX() + std::cos(azimuth) * front;
+  const Vector3 right = std::cos(azimuth) * Vector3::UnitX() - std::sin(azimuth) * front;
+  const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
+  const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
+  const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
+  Camera result;
+  const Vector3 target = camera.target.value_or(domain.center());
+  if (!target.allFinite()) throw Error("the camera's target is not finite: give three coordinates");
+  result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
+  result.forward = -towardsEye;
+  result.right = right * (halfHeight * width / height);
+  result.up = up * halfHeight;
+  if (camera.projection == Projection::orthographic) {
+    const double atTarget = camera.distance * domain.diagonal().norm();
+    result.right *= atTarget;
+    result.up *= atTarget;
+    const double toCorner =
+        (domain.center() - target).dot(towardsEye) + 0.5 * domain.sizes().dot(towardsEye.cwiseAbs());
+    result.eye = target + (toCorner + kBeforeDomain * domain.diagonal().norm()) * towardsEye;
+    result.projection = Projection::orthographic;
+  }
+  return result;
+}
+
+Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height) {
+  return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
+}
+
+Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height) {
+  return camera.projection == Projection::orthographic ? onPicture(camera, camera.eye, x, y, width, height)
+                                                       : camera.eye;
+}
+
+Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height) {
+  return camera.projection == Projection::orthographic
+             ? camera.forward
+             : onPicture(camera, camera.forward, x, y, width, height).normalized();
+}
+
+PicturePoint project(const Camera& camera, const Vector3& point, int width, int height) {
+  const bool parallel = camera.projection == Projection::orthographic;
+  const Vector3 from = point - camera.eye;
+  const double depth = from.dot(camera.forward);
+  const double scale = parallel ? 1 : depth;
+  const double u = from.dot(camera.right) / (camera.right.squaredNorm() * scale);
+  const double v = from.dot(camera.up) / (camera.up.squaredNorm() * scale);
+  return {0.5 * (1 + u) * width, 0.5 * (1 - v) * height, depth, parallel ? depth : from.norm()};
+}
+
+double pixelSize(const Camera& camera, double depth, int height) {
+  const double size = 2 * camera.up.norm() / height;
+  return camera.projection == Projection::orthographic ? size : size * depth;
+}
+
+Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y) {
+  return pixelPoint(view, x, y, buffers.width, buffers.height);
+}
+
+Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y) {
+  return pixelEye(view.camera, x, y, buffers.width, buffers.height) +
+         pixelRay(view.camera, x, y, buffers.width, buffers.height) *
+             buffers.distance[std::size_t(y) * buffers.width + x];
+}
+
+}  // namespace hpsdf::render
