@@ -22,11 +22,11 @@ void explorerFrame(benchmark::State& state) {
     app::runScript(session, app::parseScript(registry, "bench", line, {}));
   };
   run("show slice size=1280x720 gl=software");
-  session.explorer().frame();  // compiles the shaders, measures the jumps
+  explorerOf(session).frame();  // compiles the shaders, measures the jumps
   int step = 0;
   for ([[maybe_unused]] auto _ : state) {
     run(fmt::format("plane offset={}", 0.001 * (++step % 500)));
-    benchmark::DoNotOptimize(session.explorer().frame());
+    benchmark::DoNotOptimize(explorerOf(session).frame());
   }
   state.SetLabel(session.lastRenderer());
 }

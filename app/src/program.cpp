@@ -7,11 +7,12 @@
 #include <ostream>
 
 #include "commands/commands.h"
+#include "console/console.h"
 #include "console/error_text.h"
-#include "console/printable.h"
+#include "console/version.h"
 #include "hpsdf/error.h"
 #include "language/help.h"
-#include "version.h"
+#include "text/printable.h"
 
 namespace hpsdf::app {
 namespace {

@@ -17,6 +17,7 @@
 
 #include "commands/commands.h"
 #include "files/other_program.h"
+#include "files/text_file.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"

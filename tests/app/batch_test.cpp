@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "batch/batch_list.h"
+#include "files/text_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "language/script.h"

@@ -37,12 +37,13 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/render/image.h"
 #include "language/point_query.h"
-#include "language/summaries.h"
 #include "started_program.h"
 #include "support/one_leaf_field.h"
 #include "support/require_gl.h"
 #include "support/short_files.h"
 #include "support/temporary_directory.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -32,7 +32,7 @@ struct Bench {
   Session session{registry, Console{in, out, err}};
 
   void run(const std::string& script) { runScript(session, parseScript(registry, "test", script, {})); }
-  Explorer& explorer() { return session.explorer(); }
+  Explorer& explorer() { return explorerOf(session); }
   const ViewState& view() { return explorer().view(); }
   std::string failure(const std::string& script) {
     try {

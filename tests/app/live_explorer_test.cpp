@@ -31,7 +31,7 @@ class Desk {
  public:
   Desk() { run(kField); }
   void run(const std::string& lines) { runScript(session_, parseScript(registry_, "test", lines, {})); }
-  Explorer& explorer() { return session_.explorer(); }
+  Explorer& explorer() { return explorerOf(session_); }
   Session& session() { return session_; }
 
   void move(double x, double y) { explorer().input({.kind = Input::Kind::move, .at = {x, y}}); }

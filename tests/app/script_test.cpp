@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "files/text_file.h"
 #include "hpsdf/error.h"
 #include "session/session.h"
 #include "support/temporary_directory.h"

@@ -12,6 +12,7 @@
 
 #include "commands/commands.h"
 #include "explorer/explorer.h"
+#include "files/text_file.h"
 #include "language/script.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
@@ -75,7 +76,7 @@ TEST(Usage, everyControlOfTheExplorerIsUsedByAScriptThatIsChecked) {
   for (const Call& call : callsOf(registry, kScripts / "explorer.hps", folder.path())) {
     runScript(session, std::span(&call, 1));
     if (call.command->name == "ui") used.insert(controlOf(call.arguments.text("target")));
-    for (const auto& [path, widget] : session.explorer().widgets()) seen.insert(controlOf(path));
+    for (const auto& [path, widget] : explorerOf(session).widgets()) seen.insert(controlOf(path));
   }
   std::set<std::string> unused;
   std::ranges::set_difference(seen, used, std::inserter(unused, unused.end()));

@@ -133,12 +133,12 @@ class Follower {
   }
   void run(const std::string& lines) { runScript(session_, parseScript(registry_, "test", lines, {})); }
   std::array<int, 2> middleOf(const std::string& widget) {
-    session_.explorer().frame();
-    const UiRect& rect = session_.explorer().widgets().at(widget).rect;
+    explorerOf(session_).frame();
+    const UiRect& rect = explorerOf(session_).widgets().at(widget).rect;
     EXPECT_TRUE(rect.width() > 0 && rect.height() > 0) << widget << " is out of sight";
     return {int(rect.x0 + rect.x1) / 2, int(rect.y0 + rect.y1) / 2};
   }
-  UiRect canvas() { return layoutOf(session_.explorer().view()).canvas; }
+  UiRect canvas() { return layoutOf(explorerOf(session_).view()).canvas; }
 
  private:
   std::istringstream in_;

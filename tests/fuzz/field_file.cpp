@@ -12,9 +12,10 @@
 
 #include "hpsdf/detail/line.h"
 #include "hpsdf/safe_distance.h"
-#include "language/summaries.h"
 #include "session/current_field.h"
+#include "session/field_summary.h"
 #include "target.h"
+#include "text/json.h"
 
 namespace {
 

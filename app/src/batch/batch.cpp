@@ -19,18 +19,22 @@
 
 #include "batch/batch_list.h"
 #include "batch/file_locks.h"
+#include "console/console.h"
 #include "console/error_text.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
-#include "console/printable.h"
+#include "console/version.h"
 #include "construction/building.h"
 #include "files/output_folder.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "language/script.h"
-#include "language/summaries.h"
-#include "version.h"
+#include "session/field_summary.h"
+#include "text/json.h"
+#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

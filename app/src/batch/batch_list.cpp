@@ -8,7 +8,7 @@
 #include <unordered_set>
 
 #include "hpsdf/error.h"
-#include "language/summaries.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

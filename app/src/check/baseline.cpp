@@ -2,12 +2,14 @@
 
 #include <algorithm>
 
-#include "console/printable.h"
 #include "files/data_table.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 #include "language/script.h"
-#include "language/summaries.h"
+#include "text/json.h"
+#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,3 +1,5 @@
+#include "check/check_command.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -5,14 +7,15 @@
 #include "check/baseline.h"
 #include "check/check.h"
 #include "check/check_page.h"
-#include "commands/commands.h"
 #include "console/failed.h"
+#include "console/version.h"
 #include "files/data_table.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/render/image.h"
-#include "language/summaries.h"
 #include "session/session.h"
-#include "version.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -5,8 +5,10 @@
 #include <cstdint>
 
 #include "files/html_page.h"
+#include "files/text_file.h"
 #include "language/script.h"
-#include "language/summaries.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,6 +1,21 @@
 #include "commands/commands.h"
 
-#include "version.h"
+#include "check/check_command.h"
+#include "commands/export_command.h"
+#include "commands/field_commands.h"
+#include "commands/jumps_command.h"
+#include "commands/probe_command.h"
+#include "commands/tool_commands.h"
+#include "commands/verify_command.h"
+#include "explorer/explorer_commands.h"
+#include "explorer/ui_command.h"
+#include "pictures/figure_commands.h"
+#include "pictures/motion_commands.h"
+#include "pictures/picture_commands.h"
+#include "pictures/report_command.h"
+#include "simulate/simulate_command.h"
+#include "study/study_command.h"
+#include "window/window_command.h"
 
 namespace hpsdf::app {
 
@@ -24,7 +39,5 @@ Registry makeRegistry() {
   addToolCommands(registry);
   return registry;
 }
-
-std::string versionText() { return "hpsdf " HPSDF_VERSION; }
 
 }  // namespace hpsdf::app

@@ -1,18 +1,21 @@
+#include "commands/export_command.h"
+
 // export: the field in a format that other programs load.
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
-#include "commands/commands.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/building.h"
 #include "hpsdf/detail/cubic_grid.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/summaries.h"
+#include "session/field_argument.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

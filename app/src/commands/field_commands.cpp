@@ -1,22 +1,28 @@
+#include "commands/field_commands.h"
+
 #include <fmt/format.h>
 
 #include <chrono>
 #include <fstream>
 
 #include "batch/batch.h"
-#include "commands/commands.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/building.h"
+#include "construction/mesh_summary.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
 #include "language/point_query.h"
-#include "language/summaries.h"
+#include "session/field_argument.h"
+#include "session/field_summary.h"
+#include "session/field_surface.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -224,7 +230,7 @@ void runBounds(Session& session, const Arguments& arguments) {
   const CurrentField& from = session.current();
   const Console& console = session.console();
   const InterruptGuard guard;  // until the file is whole
-  const std::string surface = surfaceFor(session, arguments);
+  const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(console, surface, from.field.metadata().source);
   refuseForeign(from, reference, surface);
   warnOfBounds(console, reference.report);
@@ -327,25 +333,6 @@ Command buildCommand() {
 }
 
 }  // namespace
-
-Parameter fieldParameter() {
-  return {.name = "field",
-          .type = ParameterType::path,
-          .help = "A field's file; in a script, the current field when left out.",
-          .valueName = "FIELD",
-          .positional = true,
-          .need = Need::onCommandLine};
-}
-
-void loadField(Session& session, const std::string& file) {
-  Field field = load(file);
-  session.setField({std::move(field), file, std::filesystem::file_size(file)});
-}
-
-void useField(Session& session, const Arguments& arguments) {
-  if (arguments.has("field")) return loadField(session, arguments.text("field"));
-  session.current();  // throws where there is none
-}
 
 void addFieldCommands(Registry& registry) {
   registry.add(buildCommand());

@@ -1,12 +1,15 @@
+#include "commands/jumps_command.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "commands/commands.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/jumps.h"
-#include "language/summaries.h"
+#include "session/field_argument.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -14,8 +14,8 @@
 
 #include "console/failed.h"
 #include "console/long_work.h"
-#include "console/printable.h"
 #include "construction/building.h"
+#include "construction/mesh_summary.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/sign_check.h"
 #include "hpsdf/exact_distance.h"
@@ -23,8 +23,11 @@
 #include "hpsdf/mesh_repair.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/render/mesh_picture.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
+#include "text/json.h"
+#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,15 +1,18 @@
+#include "commands/probe_command.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "commands/commands.h"
 #include "hpsdf/detail/line.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/line_plot.h"
-#include "language/summaries.h"
+#include "session/field_argument.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,21 +1,24 @@
+#include "commands/tool_commands.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <thread>
 
-#include "commands/commands.h"
 #include "commands/mesh_command.h"
 #include "console/machine.h"
+#include "console/version.h"
 #include "construction/building.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
 #include "language/help.h"
 #include "language/script.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
 #include "session/session.h"
-#include "version.h"
+#include "text/json.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,20 +1,25 @@
+#include "commands/verify_command.h"
+
 // verify: how wrong a field is, measured; with thresholds it is a gate.
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
-#include "commands/commands.h"
 #include "console/failed.h"
 #include "console/long_work.h"
 #include "construction/building.h"
 #include "explorer/view_state.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/face_steps.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
-#include "language/summaries.h"
+#include "session/field_argument.h"
+#include "session/field_surface.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -285,7 +290,7 @@ void runVerify(Session& session, const Arguments& arguments) {
   const CurrentField& current = session.current();
   if (arguments.given("max-violations") && current.field.data().bounds.empty())
     throw Error(fmt::format("max-violations: {} keeps no bounds: build it with --bounds", current.name));
-  const std::string surface = surfaceFor(session, arguments);
+  const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(session.console(), surface, current.field.metadata().source);
   if (!arguments.flag("any-mesh"))
     refuseForeign(current, reference, surface, ", or --any-mesh to compare them all the same");

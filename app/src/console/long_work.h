@@ -4,10 +4,10 @@
 #include <string>
 #include <string_view>
 
+#include "console/console.h"
 #include "console/interrupt.h"
 #include "console/progress_line.h"
 #include "hpsdf/error.h"
-#include "session/session.h"
 
 namespace hpsdf::app {
 

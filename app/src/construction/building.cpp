@@ -10,10 +10,11 @@
 #include <limits>
 #include <utility>
 
+#include "console/console.h"
 #include "console/long_work.h"
-#include "console/printable.h"
 #include "console/progress_line.h"
 #include "construction/mesh_process.h"
+#include "construction/mesh_summary.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/crossings.h"
@@ -21,7 +22,8 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
-#include "language/summaries.h"
+#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -732,26 +734,6 @@ MeshDefects meshDefects(const Console& console, const std::string& surface, cons
   } catch (const Error& error) {
     rethrowNaming(surface, error);
   }
-}
-
-std::string surfaceFor(const Session& session, const Arguments& arguments) {
-  return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(session.current());
-}
-
-std::string surfaceOf(const CurrentField& current, const char* asked) {
-  const std::string& source = current.field.metadata().source.name;
-  if (!current.surface.empty()) return current.surface;
-  if (isShape(source)) return source;
-  throw Error(fmt::format("{}: this needs the mesh that it was made from; give {}{}", current.name, asked,
-                          source.empty() ? "" : ", " + source));
-}
-
-void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
-                   std::string_view otherwise) {
-  if (reference.fieldIsMadeFromIt) return;
-  const std::string& source = current.field.metadata().source.name;
-  throw Error(fmt::format("{} was made from {}, not from {}; give that mesh{}", current.name,
-                          source.empty() ? "something unknown" : source, surface, otherwise));
 }
 
 ImportedMesh importSurface(const Console& console, const std::string& surface) {

@@ -9,11 +9,12 @@
 #include <string_view>
 #include <vector>
 
+#include "console/console.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_report.h"
-#include "session/session.h"
+#include "language/registry.h"
 
 namespace hpsdf::app {
 
@@ -111,18 +112,6 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
 /// What is wrong with the mesh `surface`, in the units of a field that was made from `source`. Throws `Error` naming
 /// it.
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
-
-/// The surface that a field was made from; throws `Error` where it does not say.
-std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
-
-/// The surface that the argument `mesh` names, or the one that the current field itself names; throws `Error` where
-/// neither does.
-std::string surfaceFor(const Session& session, const Arguments& arguments);
-
-/// Throws `Error` where the current field was made from another surface than this one, `surface`; `otherwise` ends the
-/// message.
-void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
-                   std::string_view otherwise = "");
 
 /// A mesh file or a built-in shape: the one road by which commands come to meshes. Files are read by the console's
 /// `meshReader`; a warning goes to the console's `err` where the reader's floats lose something of them. Throws

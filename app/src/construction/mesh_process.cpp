@@ -24,13 +24,12 @@
 #include <thread>
 #include <vector>
 
-#include "console/printable.h"
 #include "construction/mesh_reply.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "language/registry.h"
-#include "language/summaries.h"
+#include "text/printable.h"
 
 extern char** environ;
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "console/printable.h"
+#include "text/printable.h"
 
 namespace hpsdf::app {
 namespace {

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "language/script.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/field_summary.h"
 
 namespace hpsdf::app {
 namespace {

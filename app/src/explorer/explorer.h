@@ -24,7 +24,7 @@ struct Layout {
 };
 Layout layoutOf(const ViewState& view);
 
-class Explorer {
+class Explorer final : public SessionExtension {
  public:
   explicit Explorer(Session& session);
 
@@ -73,7 +73,7 @@ class Explorer {
   bool running() const { return running_; }
 
   /// The field is another one.
-  void fieldChanged();
+  void fieldChanged() override;
 
   /// Long work under way: shown by the panels, which take no other input meanwhile.
   struct Work {
@@ -144,6 +144,9 @@ class Explorer {
   std::array<double, 2> dragFrom_ = {};
   ViewState viewAtPress_;
 };
+
+/// The session's explorer, made when first asked for.
+inline Explorer& explorerOf(Session& session) { return session.extension<Explorer>(); }
 
 /// The panels; adds the commands that the person asks for.
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands);

@@ -1,3 +1,5 @@
+#include "explorer/explorer_commands.h"
+
 // The verbs of the explorer: what it shows, and its picture as a file. Each sets what it is given and leaves the rest.
 
 #include <fmt/format.h>
@@ -5,13 +7,16 @@
 #include <cmath>
 #include <limits>
 
-#include "commands/commands.h"
 #include "construction/building.h"
 #include "explorer/explorer.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "language/script.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_names.h"
+#include "session/backend.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -28,7 +33,7 @@ std::string textOrNone(const Arguments& arguments, const char* name) {
 }
 
 void runShow(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("kind")) view.slice = arguments.text("kind") == "slice";
   if (arguments.given("size")) {
     view.width = arguments.size("size")[0];
@@ -36,11 +41,11 @@ void runShow(Session& session, const Arguments& arguments) {
   }
   if (arguments.given("samples")) view.samples = arguments.whole("samples");
   if (arguments.given("cpu") || arguments.given("gl")) view.backend = backend(arguments);
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runCamera(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   render::OrbitCamera& camera = view.camera;
   if (arguments.given("orbit")) {
     const auto n = arguments.numbers("orbit");
@@ -54,7 +59,7 @@ void runCamera(Session& session, const Arguments& arguments) {
   if (arguments.given("projection"))
     camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                        : render::Projection::perspective;
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void checkCamera(const Arguments& arguments) {
@@ -66,7 +71,7 @@ void checkCamera(const Arguments& arguments) {
 }
 
 void runSurface(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
   if (arguments.given("shown")) view.surface = arguments.flag("shown");
   if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
@@ -85,11 +90,11 @@ void runSurface(Session& session, const Arguments& arguments) {
     if (!view.clip) throw Error("clip-offset: needs clip, the axis that it lies on");
     view.clip->offset = arguments.number("clip-offset");
   }
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runPlane(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("through")) {
     const auto n = arguments.numbers("through");
     view.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
@@ -106,7 +111,7 @@ void runPlane(Session& session, const Arguments& arguments) {
   if (arguments.given("in-space")) view.planeInSpace = arguments.flag("in-space");
   if (arguments.given("zoom")) view.zoom = arguments.number("zoom");
   if (arguments.given("target")) view.sliceTarget = pointOr(arguments, "target", "center");
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void checkPlane(const Arguments& arguments) {
@@ -115,7 +120,7 @@ void checkPlane(const Arguments& arguments) {
 }
 
 void runColor(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   const bool slice = arguments.given("of") ? arguments.text("of") == "slice" : view.slice;
   Coloring& colors = slice ? view.sliceColors : view.surfaceColors;
   const render::ColorBy by = colorNamed(arguments.text("by"));
@@ -139,51 +144,51 @@ void runColor(Session& session, const Arguments& arguments) {
     throw Error("range: expected LOW,HIGH with LOW below HIGH");
   if (colors.scale.limits && render::isQuantity(by) && colors.scale.logarithmic && !((*colors.scale.limits)[0] > 0))
     throw Error("range: a logarithmic scale needs limits above 0; give others, or scale=linear");
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runPanel(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("all")) view.open.fill(arguments.flag("all"));
   for (std::size_t panel = 0; panel < kPanels; ++panel)
     if (arguments.given(kPanelNames[panel])) view.open[panel] = arguments.flag(kPanelNames[panel]);
   if (arguments.given("left-scroll")) view.scroll[0] = arguments.number("left-scroll");
   if (arguments.given("right-scroll")) view.scroll[1] = arguments.number("right-scroll");
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runCells(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("style")) view.cells.style = cellStyle(arguments.text("style"));
   const auto levels = [&](const char* name, int most) {
     return arguments.text(name) == "all" ? std::vector<int>() : levelList(arguments.text(name), name, most);
   };
   if (arguments.given("degrees")) view.cells.degrees = levels("degrees", kMaxDegree);
   if (arguments.given("depths")) view.cells.depths = levels("depths", kMaxDepth);
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runArrows(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   view.arrows = arguments.whole("apart");
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runBeside(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   view.beside = textOrNone(arguments, "field");
   if (!view.beside.empty()) session.other(view.beside);  // an unreadable one shows now
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 void runWorst(Session& session, const Arguments& arguments) {
-  ViewState view = session.explorer().view();
+  ViewState view = explorerOf(session).view();
   if (arguments.given("by")) {
     view.worstBy = arguments.text("by") == "value" ? JumpKind::value : JumpKind::gradient;
     view.worstPage = 0;
   }
   if (arguments.given("page")) view.worstPage = arguments.whole("page") - 1;
-  session.explorer().change(std::move(view));
+  explorerOf(session).change(std::move(view));
 }
 
 /// Where to look closely, and the size of a cell there.
@@ -199,7 +204,7 @@ double cellSize(const Field& field, int depth) {
 
 /// Where the interface jumps most; a slice shows its face from the edge.
 Place placeOfWorst(Session& session, std::size_t rank) {
-  const auto& worst = session.explorer().worst(rank);
+  const auto& worst = explorerOf(session).worst(rank);
   if (rank > worst.size())
     throw Error(fmt::format("rank: the field has {} interfaces; give one of them", session.jumps().interfaces.size()));
   const Interface& face = session.jumps().interfaces[worst[rank - 1]];
@@ -210,12 +215,12 @@ Place placeOfWorst(Session& session, std::size_t rank) {
 Place placeOf(Session& session, const Vector3& point) {
   const Field& field = session.current().field;
   if (!field.domain().contains(point)) throw Error("to: the point lies outside the field's domain; give one within it");
-  return {point, cellSize(field, field.cellAt(point).depth), session.explorer().view().axis};
+  return {point, cellSize(field, field.cellAt(point).depth), explorerOf(session).view().axis};
 }
 
 /// So near that the cell takes about a sixth of the picture.
 void runFly(Session& session, const Arguments& arguments) {
-  Explorer& explorer = session.explorer();
+  Explorer& explorer = explorerOf(session);
   const Field& field = session.current().field;
   const Place place = arguments.has("to") ? placeOf(session, pointOf(arguments, "to"))
                                           : placeOfWorst(session, static_cast<std::size_t>(arguments.whole("rank")));
@@ -247,17 +252,17 @@ void checkFly(const Arguments& arguments) {
 }
 
 void runUndo(Session& session, const Arguments&) {
-  if (!session.explorer().undo()) throw Error("there is nothing to undo");
+  if (!explorerOf(session).undo()) throw Error("there is nothing to undo");
 }
 
 void runRedo(Session& session, const Arguments&) {
-  if (!session.explorer().redo())
+  if (!explorerOf(session).redo())
     throw Error("there is nothing to redo: nothing was undone, or something was done since");
 }
 
 void runCopyView(Session& session, const Arguments& arguments) {
-  const std::string script = scriptOf(session.explorer().view());
-  session.explorer().setClipboard(script);
+  const std::string script = scriptOf(explorerOf(session).view());
+  explorerOf(session).setClipboard(script);
   if (!arguments.has("output")) {
     session.console().out << script;
     return;
@@ -268,11 +273,12 @@ void runCopyView(Session& session, const Arguments& arguments) {
 void runSettings(Session& session, const Arguments& arguments) {
   for (const Parameter& parameter : session.registry().command("settings").parameters)
     if (arguments.given(parameter.name) && parameter.name != "json")
-      session.explorer().setSetting(parameter.name, arguments.text(parameter.name));
+      explorerOf(session).setSetting(parameter.name, arguments.text(parameter.name));
 }
 
 void runRebuild(Session& session, const Arguments& arguments) {
-  session.explorer().rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps")) : std::nullopt);
+  explorerOf(session).rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps"))
+                                                           : std::nullopt);
 }
 
 void runShot(Session& session, const Arguments& arguments) {
@@ -280,7 +286,7 @@ void runShot(Session& session, const Arguments& arguments) {
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
   checkWritable(file);
   session.current();
-  Explorer& explorer = session.explorer();
+  Explorer& explorer = explorerOf(session);
   const render::Image frame = explorer.frame();
   savePng(frame, file);
   render::Drawn picture = *explorer.picture();

@@ -12,8 +12,10 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_names.h"
+#include "session/field_summary.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

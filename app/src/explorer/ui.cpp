@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "console/console.h"
 #include "explorer/raster.h"
 #include "hpsdf/render/font.h"
 

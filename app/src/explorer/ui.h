@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "console/console.h"
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::app {

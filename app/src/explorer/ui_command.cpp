@@ -1,8 +1,9 @@
+#include "explorer/ui_command.h"
+
 // ui: a real mouse and keyboard on the explorer's widgets.
 
 #include <fmt/format.h>
 
-#include "commands/commands.h"
 #include "explorer/explorer.h"
 #include "hpsdf/detail/nearest_name.h"
 
@@ -46,7 +47,7 @@ void moveTo(Explorer& explorer, const Point& place) { explorer.input({.kind = In
 
 void runUi(Session& session, const Arguments& arguments) {
   session.current();
-  Explorer& explorer = session.explorer();
+  Explorer& explorer = explorerOf(session);
   const std::string action = arguments.text("action");
   const std::string target = arguments.textOr("target", "");
   const std::string value = arguments.textOr("value", "");

@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_names.h"
+#include "session/backend.h"
 
 namespace hpsdf::app {
 namespace {

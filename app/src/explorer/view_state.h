@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hpsdf/render/picture.h"
+#include "session/backend.h"
 #include "session/session.h"
 
 namespace hpsdf::app {

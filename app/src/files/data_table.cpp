@@ -10,9 +10,9 @@
 #include <optional>
 #include <sstream>
 
+#include "files/text_file.h"
 #include "hpsdf/error.h"
-#include "language/script.h"
-#include "language/summaries.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
-#include "language/script.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -9,7 +9,7 @@
 #include "files/output_folder.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/image.h"
-#include "language/summaries.h"
+#include "text/json.h"
 
 namespace hpsdf::app {
 

@@ -34,21 +34,6 @@ std::vector<Call> parseScript(const Registry& registry, std::string_view name, s
 /// Runs the calls one after another; stops at the first that throws, and says where.
 void runScript(Session& session, std::span<const Call> calls);
 
-/// What a person writes by hand or by a script of a few lines, a script of ours or a list, is never as long.
-constexpr std::size_t kMostTextBytes = std::size_t{1} << 26;
-
-/// All of a text that is called `name` in messages. Throws `Error` where it is longer than `kMostTextBytes`, or cannot
-/// be read to its end.
-std::string readText(std::istream& in, const std::string& name);
-/// The same of a file; throws `Error` also where it is missing, a folder or a device, which may have no end.
-std::string readTextFile(const std::string& file);
-/// All of a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` otherwise.
-std::string readWholeFile(const std::string& file);
-/// The last line that is not empty; "" where there is none.
-std::string lastLine(const std::string& text);
-/// Throws `Error` naming it; then nothing of it is left behind.
-void writeTextFile(const std::filesystem::path& file, std::string_view text);
-
 /// "name=value" words. Throws `Error` for one that is not of that form.
 Variables parseVariables(const std::vector<std::string>& words);
 

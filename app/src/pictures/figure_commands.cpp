@@ -1,15 +1,17 @@
+#include "pictures/figure_commands.h"
+
 // pick and expect: figures of the current field and of the last picture.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "commands/commands.h"
 #include "console/failed.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "language/expectation.h"
-#include "language/summaries.h"
 #include "pictures/readout.h"
+#include "session/field_summary.h"
 #include "session/session.h"
+#include "text/json.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,3 +1,5 @@
+#include "pictures/motion_commands.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -5,14 +7,15 @@
 #include <numeric>
 #include <ostream>
 
-#include "commands/commands.h"
 #include "console/long_work.h"
 #include "construction/building.h"
 #include "files/film.h"
 #include "language/script.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
+#include "session/field_argument.h"
 #include "session/session.h"
+#include "text/json.h"
 
 namespace hpsdf::app {
 namespace {

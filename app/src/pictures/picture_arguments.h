@@ -10,31 +10,10 @@
 
 #include "hpsdf/render/picture.h"
 #include "language/registry.h"
+#include "session/backend.h"
 #include "session/session.h"
 
 namespace hpsdf::app {
-
-/// Of --gl alone.
-render::GlChoice glChoice(const Arguments& arguments);
-
-/// Throws `Error` when --cpu and --gl are both given.
-Backend backend(const Arguments& arguments);
-
-/// Names of colours, as commands spell them.
-std::string_view colorName(render::ColorBy color);
-std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
-render::ColorBy colorNamed(std::string_view name);
-
-/// Names of directions of a camera: front, back, …
-std::vector<std::string> viewNames();
-/// Turns the camera. The name is one of those.
-void turnTo(render::OrbitCamera& camera, std::string_view view);
-/// The name of its direction; "" where it has none.
-std::string viewName(const render::OrbitCamera& camera);
-
-/// none, lines or boxes.
-render::CellStyle cellStyle(std::string_view name);
-std::string cellStyleName(render::CellStyle style);
 
 /// "2,4-6" → 2, 4, 5, 6; empty for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);

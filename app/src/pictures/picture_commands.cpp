@@ -1,3 +1,5 @@
+#include "pictures/picture_commands.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,12 +8,15 @@
 #include <limits>
 #include <span>
 
-#include "commands/commands.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_names.h"
+#include "session/backend.h"
+#include "session/field_argument.h"
 #include "session/session.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -109,35 +114,6 @@ void runSlice(Session& session, const Arguments& arguments) {
   report(session, arguments, picture.width, picture.height, renderer);
 }
 
-}  // namespace
-
-void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {
-  if (!seen)
-    note(console, picture.surface ? "no surface in view: move the camera, or give an offset nearer to 0"
-                                  : "nothing of the field in view: move the camera, or choose a plane or cells");
-  if (picture.surface && render::meetsWalls(field, picture.offset))
-    note(console,
-         fmt::format("the surface meets the walls of the domain and is cut off there: {} a field with a larger "
-                     "margin",
-                     picture.offset == 0 ? "build" : "give an offset nearer to 0, or build"));
-}
-
-render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
-                                       const render::SlicePicture& picture) {
-  return session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
-}
-
-render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
-                                       const render::SurfacePicture& picture) {
-  render::ReferenceData reference =
-      session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
-  const std::string defects = arguments.textOr("defects", "");
-  if (!defects.empty()) reference.defects = &session.defects(defects);
-  return reference;
-}
-
-namespace {
-
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
@@ -193,122 +169,7 @@ Command withParameters(Command command, std::vector<Parameter> more) {
   return command;
 }
 
-}  // namespace
-
-std::vector<Parameter> backendParameters() {
-  return {{.name = "cpu",
-           .type = ParameterType::flag,
-           .help = "Draw in double precision on the CPU, without OpenGL: slow, and the reference.",
-           .defaultText = "false"},
-          {.name = "gl",
-           .type = ParameterType::choice,
-           .help = "Which OpenGL device to take; auto tries a hardware device first.",
-           .defaultText = "auto",
-           .choices = {"auto", "software", "hardware"}}};
-}
-
-render::GlChoice glChoice(const Arguments& arguments) {
-  const std::string gl = arguments.text("gl");
-  return gl == "software"   ? render::GlChoice::software
-         : gl == "hardware" ? render::GlChoice::hardware
-                            : render::GlChoice::automatic;
-}
-
-Backend backend(const Arguments& arguments) {
-  if (arguments.flag("cpu") && arguments.given("gl"))
-    throw Error(fmt::format("cpu excludes gl ({}): give one or the other", arguments.text("gl")));
-  return {arguments.flag("cpu"), glChoice(arguments)};
-}
-
-namespace {
-
 using render::ColorBy;
-constexpr std::pair<std::string_view, ColorBy> kColors[] = {
-    {"normal", ColorBy::normal},       {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
-    {"distance", ColorBy::distance},   {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
-    {"slope", ColorBy::slope},         {"error", ColorBy::error},          {"difference", ColorBy::difference},
-    {"cell-error", ColorBy::cellError}};
-
-struct NamedView {
-  std::string_view name;
-  double azimuthDegrees, elevationDegrees;
-};
-constexpr NamedView kViews[] = {{"front", 0, 0},
-                                {"back", 180, 0},
-                                {"left", -90, 0},
-                                {"right", 90, 0},
-                                {"top", 0, 90},
-                                {"bottom", 0, -90},
-                                {"corner", 45, 35.264389682754654}};
-
-}  // namespace
-
-std::vector<std::string> viewNames() {
-  std::vector<std::string> names;
-  for (const NamedView& view : kViews) names.emplace_back(view.name);
-  return names;
-}
-
-void turnTo(render::OrbitCamera& camera, std::string_view view) {
-  const NamedView& named = *std::ranges::find(kViews, view, &NamedView::name);
-  camera.azimuthDegrees = named.azimuthDegrees;
-  camera.elevationDegrees = named.elevationDegrees;
-}
-
-std::string viewName(const render::OrbitCamera& camera) {
-  for (const NamedView& view : kViews)
-    if (view.azimuthDegrees == camera.azimuthDegrees && view.elevationDegrees == camera.elevationDegrees)
-      return std::string(view.name);
-  return {};
-}
-
-std::vector<std::string> colorNames(std::optional<ColorBy> without) {
-  std::vector<std::string> names;
-  for (const auto& [name, color] : kColors)
-    if (color != without) names.emplace_back(name);
-  return names;
-}
-
-std::string_view colorName(ColorBy color) {
-  return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
-}
-
-/// One of the names above: the registry has seen to that.
-ColorBy colorNamed(std::string_view name) {
-  return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
-}
-
-namespace {
-
-render::ScaleOptions scaleOptions(const Arguments& arguments) {
-  render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
-  const ColorBy color = colorNamed(arguments.text("color"));
-  for (const char* name : {"range", "scale"})
-    if (arguments.given(name) && !render::isQuantity(color) &&
-        !(color == ColorBy::distance && name == std::string_view("range")))
-      throw Error(
-          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error, "
-                      "difference and cell-error",
-                      name, arguments.text("color")));
-  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
-    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
-  if (arguments.given("mesh") && color != ColorBy::error)
-    throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
-  if (arguments.given("other") && color != ColorBy::difference)
-    throw Error(fmt::format("other: is for color difference, not {}", arguments.text("color")));
-  if (!arguments.given("other") && color == ColorBy::difference)
-    throw Error("color difference: needs other, the file of the field to compare with");
-  if (arguments.given("range")) {
-    const auto limits = arguments.numbers("range");
-    options.limits = {limits[0], limits[1]};
-  }
-  if (arguments.given("levels")) {
-    const auto ends = arguments.numbers("levels");
-    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
-    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
-  }
-  return options;
-}
 
 std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCells, const std::string& standard) {
   return {
@@ -355,172 +216,6 @@ std::vector<Parameter> colorParameters(ColorBy without, const std::string& ofCel
 }
 
 }  // namespace
-
-std::vector<int> levelList(const std::string& text, const char* name, int most) {
-  if (text.empty()) return {};
-  const auto refuse = [&] {
-    throw Error(
-        fmt::format("{}: expected whole numbers and ranges from 0 to {} with commas between them, as in 2,4-6; "
-                    "found '{}'",
-                    name, most, text));
-  };
-  const auto level = [&](std::string_view word) {
-    const auto number = parseNumber(word);
-    if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
-    return static_cast<int>(*number);
-  };
-  std::vector<int> levels;
-  for (std::size_t start = 0; start <= text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    const std::string_view part = std::string_view(text).substr(start, end - start);
-    const std::size_t dash = part.find('-');
-    const int first = level(part.substr(0, dash));
-    const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
-    if (first > last) refuse();
-    for (int i = first; i <= last; ++i) levels.push_back(i);
-    start = end + 1;
-  }
-  std::ranges::sort(levels);
-  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-  return levels;
-}
-
-render::CellStyle cellStyle(std::string_view name) {
-  return name == "lines"   ? render::CellStyle::lines
-         : name == "boxes" ? render::CellStyle::boxes
-                           : render::CellStyle::none;
-}
-
-std::string cellStyleName(render::CellStyle style) {
-  return style == render::CellStyle::lines ? "lines" : style == render::CellStyle::boxes ? "boxes" : "none";
-}
-
-namespace {
-
-render::ShownCells shownCells(const Arguments& arguments) {
-  const std::string style = arguments.text("cells");
-  for (const char* name : {"degrees", "depths"})
-    if (style == "none" && arguments.given(name))
-      throw Error(fmt::format("{}: needs cells, lines or boxes: it says which of them are drawn", name));
-  return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
-          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
-}
-
-render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
-
-/// The plane in a surface's picture: six numbers, or an axis with an offset.
-std::optional<render::Plane> scenePlane(const Arguments& arguments) {
-  if (!arguments.given("plane")) {
-    if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
-    return std::nullopt;
-  }
-  if (const auto numbers = arguments.numbers("plane"); !numbers.empty()) {
-    if (arguments.given("plane-offset"))
-      throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
-    return freePlane(numbers);
-  }
-  return render::AxisPlane{arguments.text("plane")[0] - 'x',
-                           arguments.given("plane-offset") ? arguments.number("plane-offset") : 0};
-}
-
-}  // namespace
-
-Vector3 pointOf(const Arguments& arguments, const char* name) {
-  const auto p = arguments.numbers(name);
-  return {p[0], p[1], p[2]};
-}
-
-render::SlicePicture slicePicture(const Arguments& arguments) {
-  render::SlicePicture picture;
-  if (arguments.given("plane")) {
-    if (arguments.given("axis") || arguments.given("offset"))
-      throw Error("plane: excludes axis and offset; give one or the other");
-    picture.plane = freePlane(arguments.numbers("plane"));
-  } else {
-    picture.plane =
-        render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
-  }
-  picture.zoom = arguments.number("zoom");
-  if (arguments.given("target")) picture.target = pointOf(arguments, "target");
-  picture.color = colorNamed(arguments.text("color"));
-  picture.scale = scaleOptions(arguments);
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
-  picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
-  render::SlicePicture picture = slicePicture(arguments);
-  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
-    plane->offset = defaultOffset(domain, plane->axis);
-  return picture;
-}
-
-std::vector<Parameter> lookParameters(const Registry& registry) {
-  std::vector<Parameter> parameters;
-  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
-  return parameters;
-}
-
-std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend) {
-  return backend.cpu ? render::makeCpuBodyRenderer(std::move(meshes))
-                     : render::makeGlBodyRenderer(std::move(meshes), backend.gl);
-}
-
-render::SurfacePicture cameraPicture(const Arguments& arguments) {
-  render::SurfacePicture picture;
-  if (arguments.has("camera")) {
-    const auto camera = arguments.numbers("camera");
-    if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
-    if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0");
-    picture.camera.azimuthDegrees = camera[0];
-    picture.camera.elevationDegrees = camera[1];
-    picture.camera.distance = camera[2];
-  }
-  if (arguments.given("view")) {
-    if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
-    turnTo(picture.camera, arguments.text("view"));
-  }
-  if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
-  picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
-                                                                             : render::Projection::perspective;
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
-  render::checkPictureSize(picture.width, picture.height, picture.samples);
-  return picture;
-}
-
-render::SurfacePicture surfacePicture(const Arguments& arguments) {
-  render::SurfacePicture picture = cameraPicture(arguments);
-  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
-  picture.offset = arguments.number("offset");
-  if (arguments.given("clip"))
-    picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
-  else if (arguments.given("clip-offset"))
-    throw Error("clip-offset: needs clip, the axis that it lies on");
-  picture.cracks = arguments.flag("cracks");
-  picture.surface = arguments.flag("surface");
-  picture.plane = scenePlane(arguments);
-  picture.cells = shownCells(arguments);
-  picture.color = colorNamed(arguments.text("color"));
-  picture.scale = scaleOptions(arguments);
-  picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
-  render::SurfacePicture picture = surfacePicture(arguments);
-  auto* plane = picture.plane ? std::get_if<render::AxisPlane>(&*picture.plane) : nullptr;
-  if (plane != nullptr && !arguments.given("plane-offset")) plane->offset = defaultOffset(domain, plane->axis);
-  return picture;
-}
-
-double defaultOffset(const Box& domain, int axis) {
-  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
-}
 
 void addPictureCommands(Registry& registry) {
   registry.add(withParameters(

@@ -6,7 +6,7 @@
 #include <limits>
 #include <span>
 
-#include "language/summaries.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,21 +1,27 @@
+#include "pictures/report_command.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 
-#include "commands/commands.h"
+#include "console/version.h"
 #include "construction/building.h"
+#include "construction/mesh_summary.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/picture.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
+#include "session/field_argument.h"
+#include "session/field_summary.h"
 #include "session/session.h"
-#include "version.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

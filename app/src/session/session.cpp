@@ -1,15 +1,14 @@
 #include "session/session.h"
 
 #include <algorithm>
-#include <ostream>
 #include <utility>
 
 #include "console/long_work.h"
-#include "console/printable.h"
 #include "construction/building.h"
-#include "explorer/explorer.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "session/backend.h"
+#include "session/field_surface.h"
 
 namespace hpsdf::app {
 namespace {
@@ -20,21 +19,8 @@ std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend
 
 }  // namespace
 
-void note(const Console& console, std::string_view text) {
-  console.err << "hpsdf: note: " << printable(text) << std::endl;
-}
-
-void warn(const Console& console, std::string_view text) {
-  console.err << "hpsdf: warning: " << printable(text) << std::endl;
-}
-
 Session::Session(const Registry& registry, Console console) : registry_(registry), console_(console) {}
 Session::~Session() = default;
-
-Explorer& Session::explorer() {
-  if (!explorer_) explorer_ = std::make_unique<Explorer>(*this);
-  return *explorer_;
-}
 
 void Session::setField(CurrentField field) {
   renderer_.reset();
@@ -44,7 +30,7 @@ void Session::setField(CurrentField field) {
   given_.reset();
   picture_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
-  if (explorer_) explorer_->fieldChanged();
+  if (extension_) extension_->fieldChanged();
 }
 
 void Session::changeField(CurrentField field) {

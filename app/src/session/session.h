@@ -2,59 +2,29 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <iosfwd>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "console/console.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/render/renderer.h"
 #include "language/registry.h"
+#include "session/backend.h"
 #include "session/current_field.h"
 
 namespace hpsdf::app {
 
-/// Watches long work and may end it.
-class WorkListener {
+/// An object that lives as long as the session and is told when another field becomes the current one.
+class SessionExtension {
  public:
-  virtual ~WorkListener() = default;
-  /// As `Progress` has it: from any thread, by one at a time.
-  virtual void report(std::string_view task, double fraction) = 0;
-  /// Asked often, from any thread.
-  virtual bool wantsCancel() = 0;
-  /// The work is over, whatever came of it.
-  virtual void ended() = 0;
+  virtual ~SessionExtension() = default;
+  virtual void fieldChanged() = 0;
 };
-
-/// Where the program reads and writes: the process's own streams, or a test's.
-struct Console {
-  std::istream& in;
-  std::ostream& out;             ///< results
-  std::ostream& err;             ///< progress, notes and warnings
-  bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
-  WorkListener* listener = nullptr;
-  std::filesystem::path meshReader =
-      {};                 ///< program that mesh files are read by (mesh_process.h); empty: by this process
-  std::string work = {};  ///< what progress is told of, in front of it, where that is one of many
-};
-
-/// Which renderer draws.
-struct Backend {
-  bool cpu = false;
-  render::GlChoice gl = render::GlChoice::automatic;
-  bool operator==(const Backend&) const = default;
-};
-
-/// A line for the user, on any terminal, whatever a stranger's file or name holds.
-void note(const Console& console, std::string_view text);
-void warn(const Console& console, std::string_view text);
-
-class Explorer;
 
 /// What lives from command to command: the current field, its renderer, and what the explorer shows.
 class Session {
@@ -102,8 +72,12 @@ class Session {
   /// For pictures that are not drawn by `renderer`.
   void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
-  /// Made when first asked for.
-  Explorer& explorer();
+  /// The session's extension, made from the session when it is first asked for. A session has one, of one type.
+  template <typename Extension>
+  Extension& extension() {
+    if (!extension_) extension_ = std::make_unique<Extension>(*this);
+    return static_cast<Extension&>(*extension_);
+  }
 
   /// A field to compare the current one with: read from its file when first asked for, and kept; of two files at most,
   /// one beside the current field and one that it differs from.
@@ -152,7 +126,7 @@ class Session {
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
   std::string lastRenderer_;
-  std::unique_ptr<Explorer> explorer_;
+  std::unique_ptr<SessionExtension> extension_;
 };
 
 }  // namespace hpsdf::app

@@ -1,3 +1,4 @@
+#include "console/console.h"
 #include "hpsdf/error.h"
 #include "simulate/simulation.h"
 

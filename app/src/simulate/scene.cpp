@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "console/console.h"
 #include "console/long_work.h"
 #include "construction/building.h"
 #include "hpsdf/build.h"

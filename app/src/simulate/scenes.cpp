@@ -9,11 +9,12 @@
 #include <numbers>
 #include <random>
 
+#include "console/console.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "language/summaries.h"
 #include "simulate/scene.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,3 +1,5 @@
+#include "simulate/simulate_command.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -6,16 +8,17 @@
 #include <iterator>
 #include <optional>
 
-#include "commands/commands.h"
 #include "console/long_work.h"
 #include "construction/building.h"
 #include "files/film.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
 #include "session/session.h"
 #include "simulate/scene_request.h"
 #include "simulate/simulation.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <optional>
 
+#include "console/console.h"
 #include "console/long_work.h"
 #include "hpsdf/detail/threads.h"
 #include "simulate/scene.h"

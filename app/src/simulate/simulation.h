@@ -7,8 +7,10 @@
 
 #include "hpsdf/field.h"
 #include "hpsdf/render/picture.h"
+#include "session/backend.h"
 #include "session/session.h"
 #include "simulate/scene_request.h"
+#include "simulate/shot.h"
 
 namespace hpsdf::app {
 
@@ -36,15 +38,6 @@ struct SimulationFigures {
   double size = 0;  ///< what depths are compared with: the radius of a marble, the size of a body, a cloth's margin
   double deepest = 0, sumOfDeepest = 0, deepestAtEnd = 0;  ///< the last of the simulation's last second
   std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end
-};
-
-/// A picture of a simulation.
-struct SimulationShot {
-  render::Drawn drawn;
-  const Field& field;  ///< whose surface and coordinates it has; good while it is taken
-  const std::string& renderer;
-  double seconds;  ///< simulated
-  std::size_t contacts;
 };
 
 /// How a simulation is drawn: it goes on as if it were not.

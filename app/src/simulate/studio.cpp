@@ -11,9 +11,10 @@
 #include <stdexcept>
 
 #include "hpsdf/shapes.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
 #include "simulate/coarse_mesh.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

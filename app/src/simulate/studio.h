@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "hpsdf/render/picture.h"
+#include "session/backend.h"
 #include "session/session.h"
 #include "simulate/scene.h"
-#include "simulate/simulation.h"
+#include "simulate/shot.h"
 
 namespace hpsdf::app {
 

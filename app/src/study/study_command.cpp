@@ -1,13 +1,14 @@
+#include "study/study_command.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
-#include "commands/commands.h"
 #include "construction/building.h"
-#include "language/summaries.h"
 #include "session/session.h"
 #include "study/study.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

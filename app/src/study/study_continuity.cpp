@@ -11,9 +11,10 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
-#include "language/summaries.h"
 #include "session/session.h"
 #include "study/study.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -12,12 +12,15 @@
 #include "construction/building.h"
 #include "files/other_program.h"
 #include "files/output_folder.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
-#include "language/summaries.h"
+#include "session/field_summary.h"
 #include "session/session.h"
 #include "study/study.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

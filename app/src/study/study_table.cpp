@@ -6,22 +6,24 @@
 #include <map>
 #include <set>
 
-#include "commands/commands.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
+#include "console/version.h"
 #include "construction/building.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
 #include "session/session.h"
 #include "study/study.h"
-#include "version.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

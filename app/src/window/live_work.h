@@ -8,6 +8,7 @@
 #include <optional>
 #include <thread>
 
+#include "console/console.h"
 #include "explorer/explorer.h"
 
 namespace hpsdf::app {

@@ -161,7 +161,7 @@ std::string freeShotName() {
 class Window {
  public:
   Window(Session& session, const WindowOptions& options)
-      : explorer_(session.explorer()),
+      : explorer_(explorerOf(session)),
         screen_(options.width, options.height, options.title),
         recording_(explorer_, {options.opening}),
         work_(explorer_, [this] { refresh(); }) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "session/backend.h"
 #include "session/session.h"
 
 namespace hpsdf::app {

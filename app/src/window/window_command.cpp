@@ -1,13 +1,16 @@
+#include "window/window_command.h"
+
 // view: the explorer in a window.
 
 #include <fmt/format.h>
 
-#include "commands/commands.h"
 #include "construction/building.h"
 #include "explorer/view_state.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/summaries.h"
 #include "pictures/picture_arguments.h"
+#include "session/backend.h"
+#include "text/json.h"
+#include "text/text.h"
 #include "window/window.h"
 
 namespace hpsdf::app {

@@ -1,4 +1,4 @@
-#include "language/summaries.h"
+#include "session/field_summary.h"
 
 #include <fmt/format.h>
 
@@ -6,15 +6,16 @@
 #include <cctype>
 #include <cmath>
 
-#include "console/printable.h"
+#include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
+#include "text/json.h"
+#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
 constexpr int kBarCells = 40;
-
-Json boxJson(const Box& box) { return Json::array({vectorJson(box.min()), vectorJson(box.max())}); }
 
 template <typename Value>
 Json levelsJson(const std::map<int, Value>& levels) {
@@ -38,72 +39,7 @@ std::string histogram(std::string_view name, const std::map<int, double>& volume
 
 std::string fingerprintText(std::uint64_t fingerprint) { return fmt::format("{:016x}", fingerprint); }
 
-/// "3 boundary, 1 non-manifold and 0 inconsistent edges"
-std::string faultyEdges(const MeshReport& report) {
-  return fmt::format("{} boundary, {} non-manifold and {} inconsistent edges", grouped(report.boundaryEdges),
-                     grouped(report.nonManifoldEdges), grouped(report.inconsistentEdges));
-}
-
 }  // namespace
-
-Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
-std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
-
-std::string vectorText(const Vector3& v, const Box& box) {
-  const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
-  const double size = box.sizes().maxCoeff();
-  const int more = size > 0 && largest > size ? int(std::log10(largest / size)) : 0;
-  return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + more, 17), v.x(), v.y(), v.z());
-}
-
-std::string boxText(const Box& box) { return vectorText(box.min(), box) + " to " + vectorText(box.max(), box); }
-
-std::string summaryRow(std::string_view label, const std::string& value) {
-  return fmt::format("  {:<22} {}\n", label, value);
-}
-
-void printJson(std::ostream& out, const Json& json) {
-  out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
-}
-
-std::string grouped(std::uint64_t number) {
-  std::string text = std::to_string(number);
-  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
-  return text;
-}
-
-std::string countOf(std::size_t count, std::string_view one, std::string_view many) {
-  return fmt::format("{} {}", grouped(count), count == 1 ? one : many);
-}
-
-std::string shortNumber(double number) {
-  if (!std::isfinite(number)) return fmt::format("{}", number);  // strangers' files hold such
-  const double size = std::abs(number);
-  if (number == 0 || (size >= 0.01 && size < 1e5)) return fmt::format("{:.3g}", number);
-  std::string mantissa = fmt::format("{:.2e}", number);
-  const std::size_t e = mantissa.find('e');
-  const int exponent = std::stoi(mantissa.substr(e + 1));
-  mantissa.erase(mantissa.find_last_not_of("0", e - 1) + 1);
-  if (mantissa.ends_with('.')) mantissa.pop_back();
-  return fmt::format("{}e{}", mantissa, exponent);
-}
-
-std::string lowerExtension(const std::filesystem::path& file) {
-  std::string text = file.extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-std::string shellWord(const std::string& word) {
-  const bool plain = std::ranges::all_of(word, [](unsigned char c) {
-    return std::isalnum(c) || std::string_view("._-/:,=+").find(char(c)) != std::string::npos;
-  });
-  if (plain && !word.empty()) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
 
 std::string nearnessName(NearnessKind kind) { return kind == NearnessKind::polynomial ? "polynomial" : "exponential"; }
 
@@ -111,34 +47,9 @@ std::string estimatorName(Estimator estimator) { return estimator == Estimator::
 
 std::string criterionName(Criterion criterion) { return criterion == Criterion::paper ? "paper" : "optimal"; }
 
-std::string plainName(const std::string& source) {
-  const bool isShape = source.starts_with("builtin:") || source.starts_with("analytic:");
-  std::string name = isShape ? source.substr(source.find(':') + 1) : std::filesystem::path(source).stem().string();
-  name = name.substr(0, name.find(','));
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
-  return name.empty() ? "field" : name;
-}
-
 std::string continuityName(const Field& field) {
   const bool weak = field.metadata().continuityWeight > 0, exact = field.data().blend > 0;
   return weak && exact ? "both" : weak ? "weak" : exact ? "exact" : "none";
-}
-
-std::string insideTestName(InsideTest sign) {
-  switch (sign) {
-    case InsideTest::pseudonormal:
-      return "pseudonormal";
-    case InsideTest::winding:
-      return "winding";
-    case InsideTest::shell:
-      return "unsigned-shell";
-    case InsideTest::outerHull:
-      return "hull";
-    case InsideTest::automatic:
-      break;
-  }
-  return "unknown";
 }
 
 std::string strategyName(Strategy strategy) {
@@ -151,69 +62,6 @@ std::string strategyName(Strategy strategy) {
       break;
   }
   return "hp";
-}
-
-std::string closednessText(const MeshReport& report) {
-  return report.closed() ? "closed" : "not closed: " + faultyEdges(report);
-}
-
-Json meshJson(const std::string& name, const MeshReport& report) {
-  return {{"name", name},
-          {"vertices", report.vertices},
-          {"faces", report.faces},
-          {"parts", report.parts},
-          {"closed", report.closed()},
-          {"boundary_edges", report.boundaryEdges},
-          {"non_manifold_edges", report.nonManifoldEdges},
-          {"inconsistent_edges", report.inconsistentEdges},
-          {"unbalanced_edges", report.unbalancedEdges},
-          {"welded_vertices", report.weldedVertices},
-          {"unreferenced_vertices", report.unreferencedVertices},
-          {"degenerate_faces", report.degenerateFaces},
-          {"flipped_faces", report.flippedFaces},
-          {"duplicate_faces", report.duplicateFaces},
-          {"degenerate_at", report.degenerateFaces > 0 ? vectorJson(report.degeneratePosition) : Json()},
-          {"duplicate_at", report.duplicateFaces > 0 ? vectorJson(report.duplicatePosition) : Json()},
-          {"turned", report.turned},
-          {"volume", report.volume},
-          {"area", report.area},
-          {"box", boxJson(report.box)}};
-}
-
-std::string meshText(const std::string& name, const MeshReport& report) {
-  std::string text = name + "\n";
-  text += summaryRow("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
-  text += summaryRow("parts", grouped(report.parts));
-  text += summaryRow("surface", closednessText(report));
-  text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
-  text += summaryRow("box", boxText(report.box));
-  if (report.weldedVertices > 0)
-    text += summaryRow("welded", countOf(report.weldedVertices, "vertex", "vertices") +
-                                     " (most readers give each corner of a face its own)");
-  if (report.unreferencedVertices > 0)
-    text += summaryRow("unused", countOf(report.unreferencedVertices, "vertex", "vertices") + " dropped");
-  const auto dropped = [&](const char* kind, std::size_t faces, const Vector3& place) {
-    if (faces > 0)
-      text += summaryRow(kind, countOf(faces, "face", "faces") + " dropped, as at " + vectorText(place, report.box));
-  };
-  dropped("degenerate", report.degenerateFaces, report.degeneratePosition);
-  if (report.flippedFaces > 0)
-    text += summaryRow("flipped", countOf(report.flippedFaces, "edge of a face without area that holds its neighbours",
-                                          "edges of faces without area that hold their neighbours"));
-  dropped("duplicate", report.duplicateFaces, report.duplicatePosition);
-  if (report.turned) text += summaryRow("turned", "the whole mesh: its faces looked inward");
-  return text;
-}
-
-std::string reasonText(const InsideTestChoice& choice, const Box& mesh) {
-  return choice.place ? choice.reason + ", as at " + vectorText(*choice.place, mesh) : choice.reason;
-}
-
-std::string unsureSigns(const std::string& name, const MeshReport& report) {
-  return fmt::format(
-      "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "
-      "without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
-      name, faultyEdges(report));
 }
 
 /// Of the leaves' errors, in ascending order; empty where none are kept.

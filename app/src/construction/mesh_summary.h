@@ -1,0 +1,27 @@
+#pragma once
+// What is known of a mesh, for people and for machines.
+
+#include <string>
+
+#include "hpsdf/distance_function.h"
+#include "hpsdf/mesh_report.h"
+#include "text/json.h"
+
+namespace hpsdf::app {
+
+Json meshJson(const std::string& name, const MeshReport& report);
+
+std::string meshText(const std::string& name, const MeshReport& report);
+
+std::string closednessText(const MeshReport& report);
+
+/// As `--sign` has them; "unknown" for `automatic`.
+std::string insideTestName(InsideTest sign);
+
+/// "the mesh meets itself, as at (0, 1, 2)"; `mesh`: its box.
+std::string reasonText(const InsideTestChoice& choice, const Box& mesh);
+
+/// One line for a mesh that is not closed and yet is to have its sign by pseudonormals.
+std::string unsureSigns(const std::string& name, const MeshReport& report);
+
+}  // namespace hpsdf::app

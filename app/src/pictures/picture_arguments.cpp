@@ -1,0 +1,233 @@
+#include "pictures/picture_arguments.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "console/console.h"
+#include "hpsdf/error.h"
+#include "pictures/picture_names.h"
+#include "session/backend.h"
+
+namespace hpsdf::app {
+
+namespace {
+
+using render::ColorBy;
+
+render::ScaleOptions scaleOptions(const Arguments& arguments) {
+  render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
+  const ColorBy color = colorNamed(arguments.text("color"));
+  for (const char* name : {"range", "scale"})
+    if (arguments.given(name) && !render::isQuantity(color) &&
+        !(color == ColorBy::distance && name == std::string_view("range")))
+      throw Error(
+          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error, "
+                      "difference and cell-error",
+                      name, arguments.text("color")));
+  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
+    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
+  if (arguments.given("mesh") && color != ColorBy::error)
+    throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
+  if (arguments.given("other") && color != ColorBy::difference)
+    throw Error(fmt::format("other: is for color difference, not {}", arguments.text("color")));
+  if (!arguments.given("other") && color == ColorBy::difference)
+    throw Error("color difference: needs other, the file of the field to compare with");
+  if (arguments.given("range")) {
+    const auto limits = arguments.numbers("range");
+    options.limits = {limits[0], limits[1]};
+  }
+  if (arguments.given("levels")) {
+    const auto ends = arguments.numbers("levels");
+    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
+    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
+  }
+  return options;
+}
+
+}  // namespace
+
+std::vector<int> levelList(const std::string& text, const char* name, int most) {
+  if (text.empty()) return {};
+  const auto refuse = [&] {
+    throw Error(
+        fmt::format("{}: expected whole numbers and ranges from 0 to {} with commas between them, as in 2,4-6; "
+                    "found '{}'",
+                    name, most, text));
+  };
+  const auto level = [&](std::string_view word) {
+    const auto number = parseNumber(word);
+    if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
+    return static_cast<int>(*number);
+  };
+  std::vector<int> levels;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    const std::string_view part = std::string_view(text).substr(start, end - start);
+    const std::size_t dash = part.find('-');
+    const int first = level(part.substr(0, dash));
+    const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
+    if (first > last) refuse();
+    for (int i = first; i <= last; ++i) levels.push_back(i);
+    start = end + 1;
+  }
+  std::ranges::sort(levels);
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+  return levels;
+}
+
+namespace {
+
+render::ShownCells shownCells(const Arguments& arguments) {
+  const std::string style = arguments.text("cells");
+  for (const char* name : {"degrees", "depths"})
+    if (style == "none" && arguments.given(name))
+      throw Error(fmt::format("{}: needs cells, lines or boxes: it says which of them are drawn", name));
+  return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
+          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
+}
+
+render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
+
+/// The plane in a surface's picture: six numbers, or an axis with an offset.
+std::optional<render::Plane> scenePlane(const Arguments& arguments) {
+  if (!arguments.given("plane")) {
+    if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
+    return std::nullopt;
+  }
+  if (const auto numbers = arguments.numbers("plane"); !numbers.empty()) {
+    if (arguments.given("plane-offset"))
+      throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
+    return freePlane(numbers);
+  }
+  return render::AxisPlane{arguments.text("plane")[0] - 'x',
+                           arguments.given("plane-offset") ? arguments.number("plane-offset") : 0};
+}
+
+}  // namespace
+
+Vector3 pointOf(const Arguments& arguments, const char* name) {
+  const auto p = arguments.numbers(name);
+  return {p[0], p[1], p[2]};
+}
+
+render::SlicePicture slicePicture(const Arguments& arguments) {
+  render::SlicePicture picture;
+  if (arguments.given("plane")) {
+    if (arguments.given("axis") || arguments.given("offset"))
+      throw Error("plane: excludes axis and offset; give one or the other");
+    picture.plane = freePlane(arguments.numbers("plane"));
+  } else {
+    picture.plane =
+        render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
+  }
+  picture.zoom = arguments.number("zoom");
+  if (arguments.given("target")) picture.target = pointOf(arguments, "target");
+  picture.color = colorNamed(arguments.text("color"));
+  picture.scale = scaleOptions(arguments);
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+  picture.arrows = arguments.whole("arrows");
+  return picture;
+}
+
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
+  render::SlicePicture picture = slicePicture(arguments);
+  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
+    plane->offset = defaultOffset(domain, plane->axis);
+  return picture;
+}
+
+std::vector<Parameter> lookParameters(const Registry& registry) {
+  std::vector<Parameter> parameters;
+  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
+  return parameters;
+}
+
+std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend) {
+  return backend.cpu ? render::makeCpuBodyRenderer(std::move(meshes))
+                     : render::makeGlBodyRenderer(std::move(meshes), backend.gl);
+}
+
+render::SurfacePicture cameraPicture(const Arguments& arguments) {
+  render::SurfacePicture picture;
+  if (arguments.has("camera")) {
+    const auto camera = arguments.numbers("camera");
+    if (!(std::abs(camera[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+    if (!(camera[2] > 0)) throw Error("camera: expected a distance above 0");
+    picture.camera.azimuthDegrees = camera[0];
+    picture.camera.elevationDegrees = camera[1];
+    picture.camera.distance = camera[2];
+  }
+  if (arguments.given("view")) {
+    if (arguments.given("camera")) throw Error("view: excludes camera; give one or the other");
+    turnTo(picture.camera, arguments.text("view"));
+  }
+  if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
+  picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                             : render::Projection::perspective;
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+  render::checkPictureSize(picture.width, picture.height, picture.samples);
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const Arguments& arguments) {
+  render::SurfacePicture picture = cameraPicture(arguments);
+  picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  picture.offset = arguments.number("offset");
+  if (arguments.given("clip"))
+    picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
+  else if (arguments.given("clip-offset"))
+    throw Error("clip-offset: needs clip, the axis that it lies on");
+  picture.cracks = arguments.flag("cracks");
+  picture.surface = arguments.flag("surface");
+  picture.plane = scenePlane(arguments);
+  picture.cells = shownCells(arguments);
+  picture.color = colorNamed(arguments.text("color"));
+  picture.scale = scaleOptions(arguments);
+  picture.arrows = arguments.whole("arrows");
+  return picture;
+}
+
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
+  render::SurfacePicture picture = surfacePicture(arguments);
+  auto* plane = picture.plane ? std::get_if<render::AxisPlane>(&*picture.plane) : nullptr;
+  if (plane != nullptr && !arguments.given("plane-offset")) plane->offset = defaultOffset(domain, plane->axis);
+  return picture;
+}
+
+double defaultOffset(const Box& domain, int axis) {
+  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
+}
+
+void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {
+  if (!seen)
+    note(console, picture.surface ? "no surface in view: move the camera, or give an offset nearer to 0"
+                                  : "nothing of the field in view: move the camera, or choose a plane or cells");
+  if (picture.surface && render::meetsWalls(field, picture.offset))
+    note(console,
+         fmt::format("the surface meets the walls of the domain and is cut off there: {} a field with a larger "
+                     "margin",
+                     picture.offset == 0 ? "build" : "give an offset nearer to 0, or build"));
+}
+
+render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
+                                       const render::SlicePicture& picture) {
+  return session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+}
+
+render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
+                                       const render::SurfacePicture& picture) {
+  render::ReferenceData reference =
+      session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  const std::string defects = arguments.textOr("defects", "");
+  if (!defects.empty()) reference.defects = &session.defects(defects);
+  return reference;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,34 @@
+#include "session/backend.h"
+
+#include <fmt/format.h>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+
+std::vector<Parameter> backendParameters() {
+  return {{.name = "cpu",
+           .type = ParameterType::flag,
+           .help = "Draw in double precision on the CPU, without OpenGL: slow, and the reference.",
+           .defaultText = "false"},
+          {.name = "gl",
+           .type = ParameterType::choice,
+           .help = "Which OpenGL device to take; auto tries a hardware device first.",
+           .defaultText = "auto",
+           .choices = {"auto", "software", "hardware"}}};
+}
+
+render::GlChoice glChoice(const Arguments& arguments) {
+  const std::string gl = arguments.text("gl");
+  return gl == "software"   ? render::GlChoice::software
+         : gl == "hardware" ? render::GlChoice::hardware
+                            : render::GlChoice::automatic;
+}
+
+Backend backend(const Arguments& arguments) {
+  if (arguments.flag("cpu") && arguments.given("gl"))
+    throw Error(fmt::format("cpu excludes gl ({}): give one or the other", arguments.text("gl")));
+  return {arguments.flag("cpu"), glChoice(arguments)};
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,29 @@
+#include "session/field_argument.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "hpsdf/field_file.h"
+
+namespace hpsdf::app {
+
+Parameter fieldParameter() {
+  return {.name = "field",
+          .type = ParameterType::path,
+          .help = "A field's file; in a script, the current field when left out.",
+          .valueName = "FIELD",
+          .positional = true,
+          .need = Need::onCommandLine};
+}
+
+void loadField(Session& session, const std::string& file) {
+  Field field = load(file);
+  session.setField({std::move(field), file, std::filesystem::file_size(file)});
+}
+
+void useField(Session& session, const Arguments& arguments) {
+  if (arguments.has("field")) return loadField(session, arguments.text("field"));
+  session.current();  // throws where there is none
+}
+
+}  // namespace hpsdf::app

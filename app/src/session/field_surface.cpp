@@ -1,0 +1,29 @@
+#include "session/field_surface.h"
+
+#include <fmt/format.h>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+
+std::string surfaceOf(const CurrentField& current, const char* asked) {
+  const std::string& source = current.field.metadata().source.name;
+  if (!current.surface.empty()) return current.surface;
+  if (isShape(source)) return source;
+  throw Error(fmt::format("{}: this needs the mesh that it was made from; give {}{}", current.name, asked,
+                          source.empty() ? "" : ", " + source));
+}
+
+std::string surfaceFor(const CurrentField& current, const Arguments& arguments) {
+  return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(current);
+}
+
+void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
+                   std::string_view otherwise) {
+  if (reference.fieldIsMadeFromIt) return;
+  const std::string& source = current.field.metadata().source.name;
+  throw Error(fmt::format("{} was made from {}, not from {}; give that mesh{}", current.name,
+                          source.empty() ? "something unknown" : source, surface, otherwise));
+}
+
+}  // namespace hpsdf::app
