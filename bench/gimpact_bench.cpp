@@ -13,7 +13,7 @@
 #include <optional>
 
 #include "contact_places.h"
-#include "hpsdf/physics/bullet.h"
+#include "hpsdf/physics/field_shape.h"
 #include "simulate/coarse_mesh.h"
 
 namespace hpsdf::bench {

@@ -3,7 +3,7 @@
 
 #include "hpsdf/detail/sign_check.h"
 #include "scene.h"
-#include "sign/winding.h"
+#include "sign/winding_number.h"
 
 namespace hpsdf::bench {
 namespace {
@@ -16,11 +16,11 @@ void allFaces(benchmark::State& state) {
 }
 
 void byHierarchy(benchmark::State& state) {
-  static const distance::Hierarchy hierarchy(bunny(), boundingBox(bunny()));
-  static const distance::Winding winding(hierarchy);
+  static const bvh::Hierarchy hierarchy(bunny(), boundingBox(bunny()));
+  static const sign::WindingNumber winding(hierarchy);
   const std::vector<Vector3> points = uniformPoints(10'000);
   timeEach(state, points.size(), [&] {
-    for (const Vector3& x : points) benchmark::DoNotOptimize(winding.inside(x));
+    for (const Vector3& x : points) benchmark::DoNotOptimize(winding.isAbove(x));
   });
 }
 

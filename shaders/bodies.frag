@@ -1,4 +1,4 @@
-// Which triangle of which body a pixel sees; all else follows from that in double precision.
+// Writes the indices of the body and the triangle that a pixel sees; the CPU computes the rest in double precision.
 
 flat in uint body;
 

@@ -1,6 +1,6 @@
-// A mesh, each instance a body.
+// Transforms a mesh that is drawn once for each of its bodies, as instances.
 
-layout(location = 0) in vec3 position;  // about the mesh's middle
+layout(location = 0) in vec3 position;  // relative to the centre of the mesh's ball
 layout(location = 1) in mat4 targetFromMesh;
 layout(location = 5) in uint index;
 

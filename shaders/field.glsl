@@ -1,9 +1,9 @@
-// Lookup and evaluation of a field.
-// Positions are in grid coordinates: the domain is [0, grid], a base cell a unit cube.
+// Lookup and evaluation of a field. Positions are in grid coordinates, in which the domain is [0, grid] and a base cell a
+// unit cube.
 
 layout(binding = 0) uniform usamplerBuffer nodes;        // see FieldUpload
-layout(binding = 1) uniform samplerBuffer coefficients;  // see FieldData
-layout(binding = 5) uniform samplerBuffer coefficientQuads;  // the same by four
+layout(binding = 1) uniform samplerBuffer coefficients;  // see FieldUpload
+layout(binding = 5) uniform samplerBuffer coefficientQuads;  // four coefficients a texel
 layout(location = 0) uniform uvec3 grid;
 
 const uint kNoCell = 0xffffffffu;
@@ -11,13 +11,13 @@ const uint kNoCell = 0xffffffffu;
 struct Node {
   uint index;
   bool leaf;
-  uint firstChild;  // of an internal node
-  int degree;       // of a leaf
-  int offset;       // of a leaf's coefficients
-  float lo, hi;     // of an internal node: the field's values lie between
-  float rest;       // of a leaf: the value differs from the linear part's by at most this
-  float bend;       // of a leaf: the gradient in local coordinates differs from the linear part's by at most this
-  float curve;      // of a leaf: largest second derivative in local coordinates
+  // Internal nodes:
+  uint firstChild;
+  float lo, hi;  // range of the field
+  // Leaves; see SurfaceBounds:
+  int degree;
+  int offset;  // index of the first coefficient
+  float valueDeviation, gradientDeviation, secondDerivative;
 };
 
 Node fetchNode(uint index) {
@@ -29,22 +29,22 @@ Node fetchNode(uint index) {
   node.offset = int(texel.x & 0x7ffffffu);
   node.lo = uintBitsToFloat(texel.y << 16);
   node.hi = uintBitsToFloat(texel.y & 0xffff0000u);
-  node.rest = uintBitsToFloat(texel.y);
-  node.bend = uintBitsToFloat(texel.z);
-  node.curve = uintBitsToFloat(texel.w);
-  node.leaf = node.bend >= 0.0;
+  node.valueDeviation = uintBitsToFloat(texel.y);
+  node.gradientDeviation = uintBitsToFloat(texel.z);
+  node.secondDerivative = uintBitsToFloat(texel.w);
+  node.leaf = node.gradientDeviation >= 0.0;
   return node;
 }
 
-// What others have to say in a leaf (ZoneBounds), local coordinates; nothing in a field without blending.
-struct Blending {
-  bool near;  // a face: a point where they may have a say
-  float apart, twist, reach;
-  float width;  // of the zones along the faces, in parts of the leaf's edges
+// The blending at a point of a leaf. All members are 0 in a field without blending.
+struct BlendZone {
+  bool inside;                                        // whether other leaves may have a weight at the point
+  float valueDifference, gradientDifference, extent;  // see BlendZoneBounds
+  float width;                                        // of the blend zones along the faces, in edges of the leaf
 };
 
-// The field at a point, and the lowest and highest that any leaf says which has a say there.
-struct Answer {
+// The field at a point, and the least and greatest value there of the polynomials of the leaves with a weight.
+struct FieldRange {
   float value, lowest, highest;
 };
 
@@ -52,19 +52,20 @@ uint baseCellIndex(uvec3 base) { return (base.z * grid.y + base.y) * grid.x + ba
 
 uint childIndex(Node node, uvec3 upper) { return node.firstChild + upper.x + 2u * upper.y + 4u * upper.z; }
 
-// L_i and L_{i-1} to L_{i+1} and L_i.
-void advance(inout float value, inout float before, float x, float i) {
+// Replaces L_i(x) and L_{i-1}(x) by L_{i+1}(x) and L_i(x).
+void nextLegendre(inout float value, inout float previous, float x, float i) {
   float product = x * value;
-  float next = product + (product - before) * (i / (i + 1.0));
-  before = value;
+  float next = product + (product - previous) * (i / (i + 1.0));
+  previous = value;
   value = next;
 }
 
-// Coefficients of a leaf up to degree 4: texels of the terms up to degree 3, then of degree 4, which are zero below it.
-// What llvmpipe pays for is loops, and loads one by one: all nine are loaded, and used in straight code.
-const int kStraight = 4;
+// The coefficients of a leaf up to degree 4: the terms up to degree 3, then those of degree 4, which are zero in a leaf of
+// a lower degree. Such leaves are evaluated without loops and from whole texels, because loops and single loads are what
+// costs time on llvmpipe.
+const int kLowDegree = 4;
 
-struct Straight {
+struct LowDegree {
   vec4 a;  // c_000 to c_003
   vec4 b;  // c_010, c_011, c_012, c_020
   vec4 c;  // c_021, c_030, c_100, c_101
@@ -76,16 +77,16 @@ struct Straight {
   vec4 i;  // c_301, c_310, c_400
 };
 
-Straight fetchStraight(int offset, int degree) {
+LowDegree fetchLowDegree(int offset, int degree) {
   int first = offset / 4;
-  Straight s;
+  LowDegree s;
   s.a = texelFetch(coefficientQuads, first);
   s.b = texelFetch(coefficientQuads, first + 1);
   s.c = texelFetch(coefficientQuads, first + 2);
   s.d = texelFetch(coefficientQuads, first + 3);
   s.e = texelFetch(coefficientQuads, first + 4);
   s.f = s.g = s.h = s.i = vec4(0.0);
-  if (degree == kStraight) {
+  if (degree == kLowDegree) {
     s.f = texelFetch(coefficientQuads, first + 5);
     s.g = texelFetch(coefficientQuads, first + 6);
     s.h = texelFetch(coefficientQuads, first + 7);
@@ -94,12 +95,12 @@ Straight fetchStraight(int offset, int degree) {
   return s;
 }
 
-// L_2, L_3 and L_4 of each coordinate.
+// The Legendre polynomials L_2, L_3 and L_4 of each coordinate.
 vec3 legendre2(vec3 x) { return 1.5 * x * x - 0.5; }
 vec3 legendre3(vec3 x) { return (2.5 * x * x - 1.5) * x; }
 vec3 legendre4(vec3 x) { return (4.375 * x * x - 3.75) * x * x + 0.375; }
 
-float evaluateStraight(Straight s, vec3 one) {
+float evaluateLowDegree(LowDegree s, vec3 one) {
   vec3 two = legendre2(one), three = legendre3(one), four = legendre4(one);
   float x0 = s.a.x + s.a.y * one.z + s.a.z * two.z + s.a.w * three.z + s.f.x * four.z +
              (s.b.x + s.b.y * one.z + s.b.z * two.z + s.f.y * three.z) * one.y +
@@ -111,75 +112,75 @@ float evaluateStraight(Straight s, vec3 one) {
   return x0 + x1 * one.x + x2 * two.x + x3 * three.x + s.i.z * four.x;
 }
 
-// The polynomial at local coordinates in [-1, 1]^3.
-float evaluateAny(int offset, int degree, vec3 local) {
+// Evaluates a polynomial at local coordinates in [-1, 1]^3.
+float evaluateAnyDegree(int offset, int degree, vec3 local) {
   float value = 0.0;
-  float x = 1.0, xBefore = 0.0;
+  float x = 1.0, xPrevious = 0.0;
   for (int i = 0; i <= degree; ++i) {
     float plane = 0.0;
-    float y = 1.0, yBefore = 0.0;
+    float y = 1.0, yPrevious = 0.0;
     for (int j = 0; j <= degree - i; ++j) {
       float line = 0.0;
-      float z = 1.0, zBefore = 0.0;
+      float z = 1.0, zPrevious = 0.0;
       for (int k = 0; k <= degree - i - j; ++k) {
         line += texelFetch(coefficients, offset++).x * z;
-        advance(z, zBefore, local.z, float(k));
+        nextLegendre(z, zPrevious, local.z, float(k));
       }
       plane += line * y;
-      advance(y, yBefore, local.y, float(j));
+      nextLegendre(y, yPrevious, local.y, float(j));
     }
     value += plane * x;
-    advance(x, xBefore, local.x, float(i));
+    nextLegendre(x, xPrevious, local.x, float(i));
   }
   return value;
 }
 
 float evaluate(int offset, int degree, vec3 local) {
-  if (degree > kStraight) return evaluateAny(offset, degree, local);
-  return evaluateStraight(fetchStraight(offset, degree), local);
+  if (degree > kLowDegree) return evaluateAnyDegree(offset, degree, local);
+  return evaluateLowDegree(fetchLowDegree(offset, degree), local);
 }
 
-// L_i' to L_{i+1}', where `value` is L_i.
-void advanceDerivative(inout float derivative, inout float before, float value, int i) {
-  float next = before + float(2 * i + 1) * value;
-  before = derivative;
+// Replaces L_i' and L_{i-1}' by L_{i+1}' and L_i', where `value` is L_i.
+void nextDerivative(inout float derivative, inout float previous, float value, int i) {
+  float next = previous + float(2 * i + 1) * value;
+  previous = derivative;
   derivative = next;
 }
 
-// Gradient with respect to local coordinates, and value.
-vec4 evaluateWithGradientAny(int index, int degree, vec3 local) {
+// Evaluates the gradient with respect to local coordinates (xyz) and the value (w).
+vec4 evaluateAnyDegreeWithGradient(int index, int degree, vec3 local) {
   float value = 0.0;
   vec3 gradient = vec3(0.0);
-  float x = 1.0, xBefore = 0.0, dx = 0.0, dxBefore = 0.0;
+  float x = 1.0, xPrevious = 0.0, dx = 0.0, dxPrevious = 0.0;
   for (int i = 0; i <= degree; ++i) {
-    float y = 1.0, yBefore = 0.0, dy = 0.0, dyBefore = 0.0;
+    float y = 1.0, yPrevious = 0.0, dy = 0.0, dyPrevious = 0.0;
     for (int j = 0; j <= degree - i; ++j) {
       float line = 0.0, lineDz = 0.0;
-      float z = 1.0, zBefore = 0.0, dz = 0.0, dzBefore = 0.0;
+      float z = 1.0, zPrevious = 0.0, dz = 0.0, dzPrevious = 0.0;
       for (int k = 0; k <= degree - i - j; ++k) {
         float c = texelFetch(coefficients, index++).x;
         line += c * z;
         lineDz += c * dz;
-        advanceDerivative(dz, dzBefore, z, k);
-        advance(z, zBefore, local.z, float(k));
+        nextDerivative(dz, dzPrevious, z, k);
+        nextLegendre(z, zPrevious, local.z, float(k));
       }
       value += line * y * x;
       gradient += vec3(line * y * dx, line * dy * x, lineDz * y * x);
-      advanceDerivative(dy, dyBefore, y, j);
-      advance(y, yBefore, local.y, float(j));
+      nextDerivative(dy, dyPrevious, y, j);
+      nextLegendre(y, yPrevious, local.y, float(j));
     }
-    advanceDerivative(dx, dxBefore, x, i);
-    advance(x, xBefore, local.x, float(i));
+    nextDerivative(dx, dxPrevious, x, i);
+    nextLegendre(x, xPrevious, local.x, float(i));
   }
   return vec4(gradient, value);
 }
 
-vec4 evaluateStraightWithGradient(Straight s, vec3 one) {
+vec4 evaluateLowDegreeWithGradient(LowDegree s, vec3 one) {
   vec3 two = legendre2(one), three = legendre3(one), four = legendre4(one);
   vec3 twoSlope = 3.0 * one;
   vec3 threeSlope = 7.5 * one * one - 1.5;
   vec3 fourSlope = (17.5 * one * one - 7.5) * one;
-  // xIyJ: the sum over k of c_IJk L_k; xI: that over j of xIyJ L_j
+  // xIyJ is the sum over k of c_IJk L_k(z), and xI the sum over j of xIyJ L_j(y).
   float x0y1 = s.b.x + s.b.y * one.z + s.b.z * two.z + s.f.y * three.z;
   float x0y2 = s.b.w + s.c.x * one.z + s.f.z * two.z;
   float x0y3 = s.c.y + s.f.w * one.z;
@@ -208,6 +209,6 @@ vec4 evaluateStraightWithGradient(Straight s, vec3 one) {
 }
 
 vec4 evaluateWithGradient(int offset, int degree, vec3 local) {
-  if (degree > kStraight) return evaluateWithGradientAny(offset, degree, local);
-  return evaluateStraightWithGradient(fetchStraight(offset, degree), local);
+  if (degree > kLowDegree) return evaluateAnyDegreeWithGradient(offset, degree, local);
+  return evaluateLowDegreeWithGradient(fetchLowDegree(offset, degree), local);
 }

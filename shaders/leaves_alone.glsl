@@ -1,15 +1,17 @@
-// A field without blending: its leaves answer alone. As leaves_blended.glsl.
-
-float fieldValue(Node leaf, uint depth, uvec3 place, vec3 local) {
-  return evaluate(leaf.offset, leaf.degree, local);
-}
-
-vec4 fieldWithGradient(Node leaf, uint depth, uvec3 place, vec3 local) {
-  return evaluateWithGradient(leaf.offset, leaf.degree, local);
-}
+// The field of leaves without blending: the interface of leaves_blended.glsl where each leaf's polynomial is the field.
 
 const bool kBlended = false;
 
-Blending blendingAt(uint leaf, vec3 fraction) { return Blending(false, 0.0, 0.0, 0.0, 0.0); }
+float fieldValue(Node leaf, uint depth, uvec3 cellIndex, vec3 local) {
+  return evaluate(leaf.offset, leaf.degree, local);
+}
 
-Answer fieldAmong(Node leaf, uint depth, uvec3 place, vec3 local, float margin) { return Answer(0.0, 0.0, 0.0); }
+vec4 fieldWithGradient(Node leaf, uint depth, uvec3 cellIndex, vec3 local) {
+  return evaluateWithGradient(leaf.offset, leaf.degree, local);
+}
+
+BlendZone blendZoneAt(uint leaf, vec3 fraction) { return BlendZone(false, 0.0, 0.0, 0.0, 0.0); }
+
+FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
+  return FieldRange(0.0, 0.0, 0.0);
+}

@@ -1,4 +1,5 @@
-// One sample of a slice a pixel. Positions in double precision, rounded as on the CPU: cells are the same to the bit.
+// Samples one point of a slice a pixel. Positions are in double precision and rounded like those of the CPU, so that both
+// find the same cells.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;
@@ -20,15 +21,15 @@ void main() {
   precise dvec3 fraction = p - dvec3(base);
   Node node = fetchNode(baseCellIndex(base));
   uint depth = 0u;
-  uvec3 place = base;
+  uvec3 cellIndex = base;
   while (!node.leaf) {
     precise dvec3 doubled = 2.0lf * fraction;
     uvec3 upper = uvec3(greaterThanEqual(doubled, dvec3(1.0)));
     fraction = doubled - dvec3(upper);
-    place = 2u * place + upper;
+    cellIndex = 2u * cellIndex + upper;
     node = fetchNode(childIndex(node, upper));
     ++depth;
   }
-  float value = fieldValue(node, depth, place, vec3(2.0lf * fraction - 1.0lf));
+  float value = fieldValue(node, depth, cellIndex, vec3(2.0lf * fraction - 1.0lf));
   cellDegreeDepthValue = uvec4(node.index, uint(node.degree), depth, floatBitsToUint(value));
 }

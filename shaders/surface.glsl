@@ -1,4 +1,4 @@
-// What both passes of a surface share: the pixel's ray, the descent along it, and the state between passes.
+// Parts of both passes of a surface: the pixel's ray, the lookup of nodes along it, and the state between the passes.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;
@@ -10,29 +10,29 @@ layout(location = 7) uniform dvec3 scale;  // grid coordinates per world unit
 layout(location = 8) uniform dvec2 pixelStep;
 layout(location = 9) uniform float offset;
 layout(location = 10) uniform float diagonal;  // of the domain, world units
-layout(location = 15) uniform dvec3 shownLo;   // what of the domain is shown, grid coordinates
+layout(location = 15) uniform dvec3 shownLo;   // corners of the visible part of the domain, grid coordinates
 layout(location = 16) uniform dvec3 shownHi;
-layout(location = 17) uniform bool parallel;  // rays
+layout(location = 17) uniform bool parallel;  // whether rays are parallel
 
-// State of a pixel. Integers: (kind, t, side, last leaf), t and side as bits of floats. Floats: for a bracket (a, b,
-// a first guess, -), for a pixel under way (last height, reach, -, -).
+// The state of a pixel. Integers: kind, t and side as bits of floats, last leaf. Floats: for a bracket its ends a and b and
+// a first guess of the root; for a pixel under way the last height and the longest step to try.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 
 const uint kMiss = 0u;
 const uint kUnderWay = 1u;
-const uint kOnFace = 2u;     // the surface is crossed at t, where the ray enters a leaf
-const uint kBracketed = 3u;  // the surface is crossed between a and b, within one leaf
+const uint kOnFace = 2u;     // the ray crosses the surface at t, where it enters a leaf
+const uint kBracketed = 3u;  // the ray crosses the surface between a and b, within one leaf
 
 struct Ray {
-  dvec3 worldDirection;  // unit
-  dvec3 origin;          // where the ray enters what is shown of the domain, grid coordinates
+  dvec3 worldDirection;  // unit vector
+  dvec3 origin;          // entry into the visible part of the domain, grid coordinates
   dvec3 direction;       // grid coordinates per world unit
-  double fromEye;        // world units from the ray's start to the origin
-  double length;         // world units within it; negative for a ray that misses it
+  double fromEye;        // distance from the ray's start to the origin, world units
+  double length;         // length within the visible part, world units; negative for a ray that misses it
 };
 
-// The picture's pixel when its middle is given.
+// `middle` plus the vector from the picture's middle to the pixel.
 dvec3 onPicture(dvec3 middle) {
   ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
   return middle + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
@@ -68,16 +68,17 @@ Ray pixelRay() {
   return ray;
 }
 
-// A node that holds a point.
+// A node and a point in it.
 struct CellPoint {
   Node node;
   uint depth;
   float scale;    // 2^depth
   vec3 base;      // lower corner of the base cell, grid coordinates
   uvec3 path;     // lower corner of the node within its base cell, counted in nodes of its depth
-  vec3 fraction;  // of the point within the node, in [0, 1]
+  vec3 fraction;  // position of the point within the node, in [0, 1]^3
 };
 
+// The base cell at a point.
 CellPoint baseCellAt(vec3 p) {
   p = clamp(p, vec3(0.0), vec3(grid));
   uvec3 base = min(uvec3(p), grid - 1u);
@@ -91,6 +92,7 @@ CellPoint baseCellAt(vec3 p) {
   return at;
 }
 
+// Replaces a node by its child at the point.
 void descend(inout CellPoint at) {
   vec3 doubled = 2.0 * at.fraction;
   uvec3 upper = uvec3(greaterThanEqual(doubled, vec3(1.0)));
@@ -101,5 +103,5 @@ void descend(inout CellPoint at) {
   at.scale *= 2.0;
 }
 
-// In nodes of its depth, counted from the domain's lower corner.
-uvec3 placeOf(CellPoint at) { return (uvec3(at.base) << at.depth) + at.path; }
+// The index of a node among the nodes of its depth, counted from the domain's lower corner.
+uvec3 cellIndexOf(CellPoint at) { return (uvec3(at.base) << at.depth) + at.path; }

@@ -1,13 +1,13 @@
-// A block of pixels as one point: see SurfaceBlocks.
+// Draws a block of pixels as one point (see SurfaceBlocks).
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 13) uniform ivec2 viewport;
 
-layout(location = 0) in vec3 block;  // x and y of its upper left pixel, start
+layout(location = 0) in vec3 block;  // x and y of its upper left pixel, and Block::start
 
 flat out float start;
 
-const float kBlock = 8.0;  // pixels a side; as in surface_blocks.h
+const float kBlock = 8.0;  // pixels along each side; as in surface_blocks.h
 
 void main() {
   vec2 center = block.xy + 0.5 * kBlock - vec2(firstPixel);

@@ -1,19 +1,59 @@
-// Second pass of a surface: from the bracket of the first crossing to the hit itself, the ray's positions in double
-// precision. A pixel still under way counts as a miss.
+// Second pass of a surface: from the bracket of the first crossing to the hit itself, with positions along the ray in
+// double precision. A pixel whose march has not ended counts as a miss.
 
 layout(location = 11) uniform int mostRefinements;
 
-layout(location = 0) out uvec4 cellLevelsValueDistance;  // degree | depth << 8 | crack << 16; value, distance as floats' bits
+// The second number is degree | depth << 8 | crack << 16; value and distance are stored as bits of floats.
+layout(location = 0) out uvec4 cellLevelsValueDistance;
 layout(location = 1) out vec4 normal;
 
-const float kTurned = 1e-4;     // radians, about: how far the gradient may have turned since where it was taken
+const float kTurned = 1e-4;     // in radians, approximately: change of the gradient over the last step that is tolerated
 const float kInfinity = 1e30;
-const float kConverged = 1e-8;  // in domain diagonals: change of the root between two steps; as in trace.cpp
-const float kCrack = 4e-6;      // in domain diagonals at slope 1: the lowest step at a face that counts; as in trace.h
+const float kConverged = 1e-8;  // in domain diagonals: change of the root that ends its refinement; as in trace.cpp
+const float kCrack = 4e-6;      // in domain diagonals at slope 1: least jump that is a crack; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
   dvec3 inBase = ray.origin - dvec3(cell.base) + t * ray.direction;
   return vec3(2.0lf * (inBase * double(cell.scale) - dvec3(cell.path)) - 1.0lf);
+}
+
+// The root along a ray.
+struct Root {
+  float added;          // distance from the first guess, world units
+  vec4 gradientValue;  // gradient in local coordinates, and value, at the root
+};
+
+// Refines the root in a bracket by Newton's method, and by halving where Newton's method would leave the bracket. Without
+// a bracket, only evaluates the field. The bracket, from a to b, and the root are relative to the point `local`, so that
+// single precision is enough.
+Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool bracketed, float a, float b) {
+  uvec3 cellIndex = cellIndexOf(at);
+  bool blended = blendZoneAt(at.node.index, at.fraction).inside;
+  float curve = blended ? kInfinity : at.node.secondDerivative * dot(localDirection, localDirection);
+  float added = 0.0, change = 0.0;
+  vec4 gradientValue;
+  for (int i = 0; i < mostRefinements; ++i) {
+    added += change;
+    gradientValue = fieldWithGradient(at.node, at.depth, cellIndex, local + added * localDirection);
+    float height = side * (gradientValue.w - offset);
+    float slope = side * dot(gradientValue.xyz, localDirection);
+    if (!bracketed) break;
+    if (height > 0.0) {
+      a = added;
+    } else {
+      b = added;
+    }
+    change = -height / slope;
+    bool newton = added + change >= a && added + change <= b;
+    if (!newton) change = 0.5 * (a + b) - added;
+    // The root lies within curve / slope * change^2 / 2 of the next point.
+    float turned = newton ? abs(curve / slope * change) : kInfinity;
+    bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
+    if (close || abs(change) <= kConverged * diagonal) break;
+  }
+  added += change;
+  gradientValue.w += change * dot(gradientValue.xyz, localDirection);
+  return Root(added, gradientValue);
 }
 
 void main() {
@@ -26,49 +66,22 @@ void main() {
   float t = uintBitsToFloat(integers.y);
   float side = uintBitsToFloat(integers.z);
 
+  // Find the leaf in which the march ended, by the same point.
   Ray ray = pixelRay();
-  // the march stood in this leaf, and finds it again from the same point
   CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);
-  uvec3 place = placeOf(at);
 
-  // Newton's method from `first`, in double precision, by what is to be added, in single precision; halving where it
-  // would leave the bracket
   double first = double(bracketed ? bracket.z : t);
-  vec3 local = localAt(at, ray, first);
   vec3 localDirection = 2.0 * at.scale * vec3(ray.direction);
-  bool near = blendingAt(at.node.index, at.fraction).near;
-  float curve = near ? kInfinity : at.node.curve * dot(localDirection, localDirection);
-  float a = bracket.x - bracket.z, b = bracket.y - bracket.z;
-  float added = 0.0, change = 0.0;
-  vec4 gradientValue;
-  for (int i = 0; i < mostRefinements; ++i) {
-    added += change;
-    gradientValue = fieldWithGradient(at.node, at.depth, place, local + added * localDirection);
-    float height = side * (gradientValue.w - offset);
-    float slope = side * dot(gradientValue.xyz, localDirection);
-    if (!bracketed) break;
-    if (height > 0.0) {
-      a = added;
-    } else {
-      b = added;
-    }
-    change = -height / slope;
-    bool newton = added + change >= a && added + change <= b;
-    if (!newton) change = 0.5 * (a + b) - added;
-    // what is left is curve / slope * change^2 / 2 at most
-    float turned = newton ? abs(curve / slope * change) : kInfinity;
-    bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
-    if (close || abs(change) <= kConverged * diagonal) break;
-  }
-  added += change;
-  gradientValue.w += change * dot(gradientValue.xyz, localDirection);
-  vec3 gradient = gradientValue.xyz * vec3(scale);
+  Root root = refine(at, localAt(at, ray, first), localDirection, side, bracketed, bracket.x - bracket.z,
+                     bracket.y - bracket.z);
+  float value = root.gradientValue.w;
+  vec3 gradient = root.gradientValue.xyz * vec3(scale);
   float steepness = length(gradient);
-  // a cell of degree 0 has no gradient: face the eye
+  // A cell of degree 0 has no gradient; its normal points to the eye.
   normal.xyz = steepness > 0.0 ? gradient / steepness : -vec3(ray.worldDirection);
-  bool crack = !bracketed && abs(gradientValue.w - offset) > kCrack * diagonal * max(1.0, steepness);
+  bool crack = !bracketed && abs(value - offset) > kCrack * diagonal * max(1.0, steepness);
   cellLevelsValueDistance =
-      uvec4(at.node.index, uint(at.node.degree) | at.depth << 8 | uint(crack) << 16, floatBitsToUint(gradientValue.w),
-            floatBitsToUint(float(ray.fromEye + first + double(added))));
+      uvec4(at.node.index, uint(at.node.degree) | at.depth << 8 | uint(crack) << 16, floatBitsToUint(value),
+            floatBitsToUint(float(ray.fromEye + first + double(root.added))));
 }

@@ -1,224 +1,293 @@
-// First pass of a surface: up to the leaf and the bracket of the first crossing of f = offset (docs/rendering.md,
-// "Tracing"). llvmpipe runs both sides of a branch: what is dear stands in the loops once, and what is cheap before it.
-// After `mostSteps` a pixel is left under way and the pass drawn again: llvmpipe ends all loops of a shader without a
-// word once they have run 65535 times together.
+// First pass of a surface: the march of each pixel's ray to the leaf and the bracket of the first crossing of f = offset
+// (docs/rendering.md, "Tracing"). A height is f - offset, signed so that it is positive where the ray starts. The stages
+// have the names of those in trace.cpp.
+//
+// llvmpipe executes both sides of a branch, so that each expensive expression occurs once within the loops, with cheap
+// tests before it. It also ends all loops of a shader silently once the sum of their iterations is 65535; so a pixel is
+// left under way after `mostSteps`, and the pass is drawn again.
 
 layout(location = 11) uniform int mostSteps;
-layout(location = 12) uniform bool resume;      // draw again: takes up the pixels under way, leaves the others
-layout(location = 19) uniform int togetherSteps;  // what an evaluation of the field where others have a say counts for
-layout(location = 14) uniform float startSide;  // SurfaceBlocks::side
+layout(location = 12) uniform bool resume;       // continue the pixels under way, leave the others as they are
+layout(location = 19) uniform int blendedSteps;  // the steps that one evaluation in a blend zone counts for
+layout(location = 14) uniform float startSide;   // see SurfaceBlocks::side
 
 layout(binding = 4) uniform samplerBuffer linearParts;  // of leaves: slopes in local x, y, z, value in the middle
 
-flat in float start;  // of the block: see SurfaceBlocks
+flat in float start;  // see Block::start
 
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
-const float kNudge = 1e-6;  // in domain diagonals: beyond a face; also the shortest step; as in trace.cpp
-
-const float kPastFace = 4e-7;  // of the grid; as in trace.cpp
+// The same as in trace.cpp.
+const float kNudge = 1e-6;     // in domain diagonals: distance by which steps end behind a face; also the shortest step
+const float kPastFace = 4e-7;  // in parts of the grid: greatest distance behind a face at which rays enter the next node
+const float kGrain = 0.25;     // in parts of a blend zone's extent: step where no bound excludes a zero
 
 const float kInfinity = 1e30;
 
-const float kGrain = 0.25;  // as in trace.cpp
+struct MarchRay {
+  vec3 origin, direction;
+  vec3 inverse;  // of the direction's magnitudes; infinite for an axis along which the ray does not move
+  float length;
+  float nudge;  // kNudge in world units
+};
 
-// World length from the point to where the ray has left the node's box, or that within it whose faces are `margin` of
-// its edges inside, past a face by a little: see trace.cpp.
-// `inverse`: of the absolute direction, infinite for an axis along which the ray does not move.
-float lengthToExit(CellPoint at, vec3 direction, vec3 inverse, float margin) {
-  vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(direction, vec3(0.0))) - margin;
-  vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * inverse, vec3(kInfinity), equal(direction, vec3(0.0)));
+struct March {
+  uint kind;
+  float t;
+  float side;         // the sign of f - offset where the ray starts, or 0 while it is unknown
+  uint lastLeaf;      // the leaf in which the last step stayed, or kNoCell
+  float lastHeight;   // the height at t of the last leaf's polynomial, or an upper bound of it where it falls throughout
+  float longestStep;  // the longest step to try in the last leaf
+  vec4 bracket;
+  int steps;
+  uint zoneLeaf;   // the leaf for which zoneStep holds
+  float zoneStep;  // the next step in the blend zone
+};
+
+// The node at t, and bounds of the height along the ray.
+struct LeafPoint {
+  CellPoint at;
+  BlendZone zone;
+  vec3 localDirection;   // change of the local coordinates per world unit
+  float toLeave;         // length to the exit from the node
+  float middle, slope;   // the height of the linear part at t, and its slope
+  float lowest, highest;  // the range of the height at t
+  float slopeDeviation;   // greatest difference between the slope of the height and that of its linear part
+  bool known;             // whether lastHeight is the height of the leaf's polynomial at t
+  float steepestOfAll;    // least slope of the polynomial of any leaf with a weight
+};
+
+// World length from the point to the exit of the ray from the node's box, or from the box whose faces are `margin` node
+// edges further inside. It ends slightly behind the face: see trace.cpp.
+float lengthToExit(CellPoint at, MarchRay ray, float margin) {
+  vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(ray.direction, vec3(0.0))) - margin;
+  vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * ray.inverse, vec3(kInfinity),
+                   equal(ray.direction, vec3(0.0)));
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// How far along the ray a height stays above zero at least that falls no steeper than `steepest`.
+// The length over which a height whose slope is at least `steepest` cannot fall to zero.
 float certainlyAbove(float height, float steepest) {
   return height > 0.0 ? (steepest < 0.0 ? height / -steepest : kInfinity) : 0.0;
 }
 
-// Down to a leaf, or to a node whose range excludes the offset.
+// The leaf at a point, or the first node along the descent whose range excludes the offset.
 CellPoint relevantNodeAt(vec3 p) {
   CellPoint at = baseCellAt(p);
   while (!at.node.leaf && at.node.lo <= offset && at.node.hi >= offset) descend(at);
   return at;
 }
 
-void main() {
-  Ray ray = pixelRay();
-  vec3 origin = vec3(ray.origin);
-  vec3 direction = vec3(ray.direction);
-  vec3 inverse = abs(1.0 / direction);
-  float rayLength = float(ray.length);
-  float nudge = kNudge * diagonal;
-
-  float t = max(0.0, float(double(start) - ray.fromEye) - 4.0 * nudge);
-  // of the surface, on which the ray starts, or 0: not known yet. The height above the surface is side * (f - offset)
-  float side = t > 0.0 ? startSide : 0.0;
-  // what the step before has left where it stayed in its leaf: the height at t, and the longest step to try
-  uint lastLeaf = kNoCell;
-  float lastHeight = 0.0, reach = 0.0;
+March startMarch(Ray ray, MarchRay marchRay) {
+  March march;
+  march.t = max(0.0, float(double(start) - ray.fromEye) - 4.0 * marchRay.nudge);
+  march.side = march.t > 0.0 ? startSide : 0.0;
+  march.lastLeaf = kNoCell;
+  march.lastHeight = 0.0;
+  march.longestStep = 0.0;
   if (resume) {
     uvec4 before = texelFetch(stateIntegers, ivec2(gl_FragCoord.xy), 0);
     if (before.x != kUnderWay) discard;
     vec4 last = texelFetch(stateFloats, ivec2(gl_FragCoord.xy), 0);
-    t = uintBitsToFloat(before.y);
-    side = uintBitsToFloat(before.z);
-    lastLeaf = before.w;
-    lastHeight = last.x;
-    reach = last.y;
+    march.t = uintBitsToFloat(before.y);
+    march.side = uintBitsToFloat(before.z);
+    march.lastLeaf = before.w;
+    march.lastHeight = last.x;
+    march.longestStep = last.y;
   }
-  uint kind = t <= rayLength ? kUnderWay : kMiss;
-  vec4 bracket = vec4(0.0);
+  march.kind = march.t <= marchRay.length ? kUnderWay : kMiss;
+  march.bracket = vec4(0.0);
+  march.steps = 0;
+  march.zoneLeaf = kNoCell;
+  march.zoneStep = 0.0;
+  return march;
+}
 
-  // where others have a say: the next step, and the leaf that it holds for
-  uint togetherLeaf = kNoCell;
-  float togetherLength = 0.0;
+// Finds the node at t and bounds the height there; sets the side where it is unknown and the bounds tell it.
+LeafPoint boundHeight(MarchRay ray, inout March march) {
+  LeafPoint leaf;
+  leaf.at = relevantNodeAt(ray.origin + march.t * ray.direction);
+  leaf.toLeave = lengthToExit(leaf.at, ray, 0.0);
+  leaf.localDirection = 2.0 * leaf.at.scale * ray.direction;
+  // Bound f - offset.
+  leaf.middle = 0.0;
+  leaf.slope = 0.0;
+  leaf.lowest = leaf.at.node.lo - offset;
+  leaf.highest = leaf.at.node.hi - offset;
+  leaf.zone = BlendZone(false, 0.0, 0.0, 0.0, 0.0);
+  if (leaf.at.node.leaf) {
+    leaf.zone = blendZoneAt(leaf.at.node.index, leaf.at.fraction);
+    vec4 linear = texelFetch(linearParts, int(leaf.at.node.index));
+    leaf.middle = dot(linear.xyz, 2.0 * leaf.at.fraction - 1.0) + (linear.w - offset);
+    leaf.slope = dot(linear.xyz, leaf.localDirection);
+    leaf.lowest = leaf.middle - leaf.at.node.valueDeviation - leaf.zone.valueDifference;
+    leaf.highest = leaf.middle + leaf.at.node.valueDeviation + leaf.zone.valueDifference;
+  }
+  // Give it the sign of the height.
+  if (march.side == 0.0) march.side = leaf.lowest > 0.0 ? 1.0 : leaf.highest < 0.0 ? -1.0 : 0.0;
+  if (march.side < 0.0) {
+    float negated = -leaf.lowest;
+    leaf.lowest = -leaf.highest;
+    leaf.highest = negated;
+    leaf.middle = -leaf.middle;
+    leaf.slope = -leaf.slope;
+  }
+  leaf.slopeDeviation = leaf.at.node.gradientDeviation * length(leaf.localDirection);
+  leaf.known = leaf.at.node.index == march.lastLeaf;
+  leaf.steepestOfAll = 0.0;
+  return leaf;
+}
 
-  int step = 0;
-  while (kind == kUnderWay && step < mostSteps) {
-    CellPoint at;
-    Blending blending;
-    vec3 localDirection;
-    float toLeave = 0.0;  // the leaf
-    // by the leaves' own polynomials, up to where others have a say in whether the field is zero
-    bool together = false;
-    float steepestOfAll = 0.0;  // slope along the ray of what any leaf says that has a say
-    while (!together && kind == kUnderWay && step < mostSteps) {
-      // on through all nodes of which the bounds alone say that nothing is crossed in them
-      // the height's linear part at t and its slope; the height at t lies between the next two, its slope within +-bend
-      float middle = 0.0, slope = 0.0, lowest = 0.0, highest = 0.0, bend = 0.0;
-      bool known = false;  // the height of the leaf's polynomial at t
-      bool stays = false;
-      while (!stays && kind == kUnderWay && step < mostSteps) {
-        ++step;
-        at = relevantNodeAt(origin + t * direction);
-        toLeave = lengthToExit(at, direction, inverse, 0.0);
-        localDirection = 2.0 * at.scale * direction;
-        // of f - offset at first
-        middle = 0.0;
-        slope = 0.0;
-        lowest = at.node.lo - offset;
-        highest = at.node.hi - offset;
-        blending = Blending(false, 0.0, 0.0, 0.0, 0.0);
-        if (at.node.leaf) {
-          blending = blendingAt(at.node.index, at.fraction);
-          vec4 linear = texelFetch(linearParts, int(at.node.index));
-          middle = dot(linear.xyz, 2.0 * at.fraction - 1.0) + (linear.w - offset);
-          slope = dot(linear.xyz, localDirection);
-          lowest = middle - at.node.rest - blending.apart;
-          highest = middle + at.node.rest + blending.apart;
-        }
-        if (side == 0.0) side = lowest > 0.0 ? 1.0 : highest < 0.0 ? -1.0 : 0.0;
-        if (side < 0.0) {
-          float negated = -lowest;
-          lowest = -highest;
-          highest = negated;
-          middle = -middle;
-          slope = -slope;
-        }
-        bend = at.node.bend * length(localDirection);
-        known = at.node.index == lastLeaf;
-        if (side != 0.0 && highest < 0.0) {
-          kind = kOnFace;
-        } else if (side != 0.0 && ((lowest > 0.0 && lowest + slope * toLeave > 0.0) ||
-                                   (known && lastHeight - blending.apart + (slope - bend) * toLeave >= 0.0))) {
-          t += toLeave + nudge;
-          lastLeaf = kNoCell;
-          if (!(t <= rayLength)) kind = kMiss;
-        } else {
-          stays = true;
-        }
-      }
-      if (!stays) break;
+// Moves t to the exit of a node without a crossing. Returns whether the bounds leave a crossing in the node possible; a
+// node on the other side of the surface is a hit on its face.
+bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
+  bool above = (leaf.lowest > 0.0 && leaf.lowest + leaf.slope * leaf.toLeave > 0.0) ||
+               (leaf.known && march.lastHeight - leaf.zone.valueDifference +
+                                      (leaf.slope - leaf.slopeDeviation) * leaf.toLeave >=
+                                  0.0);
+  if (march.side != 0.0 && leaf.highest < 0.0) {
+    march.kind = kOnFace;
+    return false;
+  }
+  if (march.side != 0.0 && above) {
+    march.t += leaf.toLeave + ray.nudge;
+    march.lastLeaf = kNoCell;
+    if (!(march.t <= ray.length)) march.kind = kMiss;
+    return false;
+  }
+  return true;
+}
 
-      // within this leaf the slope of its polynomial's height along the ray lies between these two, its second
-      // derivative in +-curve
-      float curve = at.node.curve * dot(localDirection, localDirection);
-      float steepest = slope - bend;
-      float shallowest = slope + bend;
-      float toExit = toLeave;  // of where the bounds hold for the field
-      if (kBlended && !blending.near) toExit = lengthToExit(at, direction, inverse, blending.width);
-      bool falling = !blending.near && shallowest < 0.0;  // throughout: at most one root
-      if (side != 0.0 && falling && lowest > 0.0) {
-        if (highest + slope * toExit < 0.0) {
-          kind = kBracketed;
-          bracket = vec4(t, t, t, 0.0) + vec4(lowest, highest, middle, 0.0) / -slope;
-          break;
-        }
-        if (!known) {
-          // a height that is no smaller will do
-          known = true;
-          lastHeight = highest;
-          lastLeaf = at.node.index;
-        }
-      }
-      // the field is no lower than this much below the polynomial
-      float lower = blending.near ? blending.apart : 0.0;
-      float clear = lastHeight - lower;
-      float safe = certainlyAbove(clear, steepest) + nudge;
-      steepestOfAll = steepest - blending.twist * length(localDirection);
-      together = blending.near && known && safe * length(localDirection) < blending.reach;
-      if (together) break;
-      float stepLength = min(toExit, falling ? lastHeight / -shallowest + nudge
-                                             : max(safe, min(reach, sqrt(4.0 * max(clear, 0.0) / curve))));
-      if (!known) stepLength = 0.0;
-      vec3 localAhead = 2.0 * (at.fraction + stepLength * at.scale * direction) - 1.0;
-      float value = evaluate(at.node.offset, at.node.degree, localAhead) - offset;
-      if (!known) {
-        together = blending.near && side == 0.0 && abs(value) <= lower;
-        if (side == 0.0 && !together) side = value >= 0.0 ? 1.0 : -1.0;
-        lastLeaf = at.node.index;
-        lastHeight = side * value;
-        reach = kInfinity;
-        if (lastHeight < -lower) kind = kOnFace;
-      } else {
-        float ahead = side * value;
-        bool certain = falling || stepLength <= safe;
-        if (!blending.near && ahead <= 0.0 &&
-            (certain || lastHeight - ahead > 0.5 * curve * stepLength * stepLength)) {
-          kind = kBracketed;
-          bracket = vec4(t, t + stepLength, t + stepLength * lastHeight / (lastHeight - ahead), 0.0);
-        } else if (certain || min(clear, ahead - lower) > 0.125 * curve * stepLength * stepLength) {
-          // the height sags below its chord by at most curve * length^2 / 8
-          bool leaves = stepLength == toLeave;
-          t += leaves ? stepLength + nudge : stepLength;
-          if (leaves) lastLeaf = kNoCell;
-          lastHeight = ahead;
-          reach = kInfinity;
-          if (!(t <= rayLength)) kind = kMiss;
-        } else {
-          reach = 0.25 * stepLength;
-        }
-      }
+// Takes the value at t as the first height in a leaf. Returns whether the blended field has to decide on the side.
+bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
+  bool undecided = leaf.zone.inside && march.side == 0.0 && abs(value) <= lower;
+  if (march.side == 0.0 && !undecided) march.side = value >= 0.0 ? 1.0 : -1.0;
+  march.lastLeaf = leaf.at.node.index;
+  march.lastHeight = march.side * value;
+  march.longestStep = kInfinity;
+  if (march.lastHeight < -lower) march.kind = kOnFace;
+  return undecided;
+}
+
+// Moves t by a step to the height `ahead` where that is proven to cross nothing, brackets a crossing, or shortens the
+// step. The height sags below its chord by at most curve * length^2 / 8, and is monotone where it falls by more than
+// curve * length^2 / 2.
+void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float lower, float curve, bool certain,
+             inout March march) {
+  float clear = march.lastHeight - lower;
+  if (!leaf.zone.inside && ahead <= 0.0 &&
+      (certain || march.lastHeight - ahead > 0.5 * curve * stepLength * stepLength)) {
+    march.kind = kBracketed;
+    march.bracket = vec4(march.t, march.t + stepLength,
+                         march.t + stepLength * march.lastHeight / (march.lastHeight - ahead), 0.0);
+  } else if (certain || min(clear, ahead - lower) > 0.125 * curve * stepLength * stepLength) {
+    bool leaves = stepLength == leaf.toLeave;
+    march.t += leaves ? stepLength + ray.nudge : stepLength;
+    if (leaves) march.lastLeaf = kNoCell;
+    march.lastHeight = ahead;
+    march.longestStep = kInfinity;
+    if (!(march.t <= ray.length)) march.kind = kMiss;
+  } else {
+    march.longestStep = 0.25 * stepLength;
+  }
+}
+
+// Steps by the polynomial of the leaf. Returns whether the weights of other leaves decide where the field is zero.
+bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
+  float curve = leaf.at.node.secondDerivative * dot(leaf.localDirection, leaf.localDirection);
+  float steepest = leaf.slope - leaf.slopeDeviation;
+  float shallowest = leaf.slope + leaf.slopeDeviation;
+  float toExit = leaf.toLeave;  // from the part of the leaf in which the polynomial is the field
+  if (kBlended && !leaf.zone.inside) toExit = lengthToExit(leaf.at, ray, leaf.zone.width);
+  bool falling = !leaf.zone.inside && shallowest < 0.0;  // throughout the leaf, so that there is one root at most
+  if (march.side != 0.0 && falling && leaf.lowest > 0.0) {
+    if (leaf.highest + leaf.slope * toExit < 0.0) {
+      march.kind = kBracketed;
+      march.bracket = vec4(march.t, march.t, march.t, 0.0) + vec4(leaf.lowest, leaf.highest, leaf.middle, 0.0) / -leaf.slope;
+      return false;
     }
-
-    if (kBlended && together) {
-      step += togetherSteps;
-      float stepLength = at.node.index == togetherLeaf ? min(toLeave, togetherLength) : 0.0;
-      vec3 localAhead = 2.0 * (at.fraction + stepLength * at.scale * direction) - 1.0;
-      Answer ahead = fieldAmong(at.node, at.depth, placeOf(at), localAhead, 1.0);
-      float height = ahead.value - offset;
-      lastLeaf = kNoCell;
-      if (side == 0.0) side = height >= 0.0 ? 1.0 : -1.0;
-      height *= side;
-      if (height < 0.0 && stepLength == 0.0) {
-        kind = kOnFace;
-      } else if (height <= 0.0) {
-        kind = kBracketed;
-        bracket = vec4(t, t + stepLength, t + 0.5 * stepLength, 0.0);
-      } else {
-        t += stepLength == toLeave ? stepLength + nudge : stepLength;
-        if (!(t <= rayLength)) kind = kMiss;
-      }
-      // no leaf that will have a say within its reach falls to zero before
-      float lowest = side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
-      float reachLength = blending.reach / length(localDirection);
-      togetherLength = max(kGrain * reachLength, min(reachLength, certainlyAbove(lowest, steepestOfAll))) + nudge;
-      togetherLeaf = at.node.index;
+    if (!leaf.known) {
+      // An upper bound of the height serves as well as the height itself.
+      leaf.known = true;
+      march.lastHeight = leaf.highest;
+      march.lastLeaf = leaf.at.node.index;
     }
   }
-  if (kind == kUnderWay) bracket = vec4(lastHeight, reach, 0.0, 0.0);
-  integers = uvec4(kind, floatBitsToUint(t), floatBitsToUint(side), lastLeaf);
-  floats = bracket;
+  float lower = leaf.zone.inside ? leaf.zone.valueDifference : 0.0;  // greatest height of the polynomial above the field
+  float clear = march.lastHeight - lower;
+  float safe = certainlyAbove(clear, steepest) + ray.nudge;
+  leaf.steepestOfAll = steepest - leaf.zone.gradientDifference * length(leaf.localDirection);
+  if (leaf.zone.inside && leaf.known && safe * length(leaf.localDirection) < leaf.zone.extent) return true;
+  float stepLength = min(toExit, falling ? march.lastHeight / -shallowest + ray.nudge
+                                         : max(safe, min(march.longestStep, sqrt(4.0 * max(clear, 0.0) / curve))));
+  if (!leaf.known) stepLength = 0.0;
+  vec3 localAhead = 2.0 * (leaf.at.fraction + stepLength * leaf.at.scale * ray.direction) - 1.0;
+  float value = evaluate(leaf.at.node.offset, leaf.at.node.degree, localAhead) - offset;
+  if (!leaf.known) return enterLeaf(leaf, value, lower, march);
+  advance(ray, leaf, stepLength, march.side * value, lower, curve, falling || stepLength <= safe, march);
+  return false;
+}
+
+// Marches by the polynomials of single leaves, up to a point at which the weights of other leaves matter. Returns whether
+// there is such a point, and its leaf.
+bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
+  bool blended = false;
+  while (!blended && march.kind == kUnderWay && march.steps < mostSteps) {
+    bool stays = false;
+    while (!stays && march.kind == kUnderWay && march.steps < mostSteps) {
+      ++march.steps;
+      leaf = boundHeight(ray, march);
+      stays = passNode(ray, leaf, march);
+    }
+    if (!stays) break;
+    blended = stepInLeaf(ray, leaf, march);
+  }
+  return blended;
+}
+
+// Steps by the blended field: as far as the height is certainly positive, or by a small part of the zone's extent. The
+// first evaluation in a leaf is that at t.
+void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
+  march.steps += blendedSteps;
+  float stepLength = leaf.at.node.index == march.zoneLeaf ? min(leaf.toLeave, march.zoneStep) : 0.0;
+  vec3 localAhead = 2.0 * (leaf.at.fraction + stepLength * leaf.at.scale * ray.direction) - 1.0;
+  FieldRange ahead = blendedRange(leaf.at.node, leaf.at.depth, cellIndexOf(leaf.at), localAhead, 1.0);
+  float height = ahead.value - offset;
+  march.lastLeaf = kNoCell;
+  if (march.side == 0.0) march.side = height >= 0.0 ? 1.0 : -1.0;
+  height *= march.side;
+  if (height < 0.0 && stepLength == 0.0) {
+    march.kind = kOnFace;
+  } else if (height <= 0.0) {
+    march.kind = kBracketed;
+    march.bracket = vec4(march.t, march.t + stepLength, march.t + 0.5 * stepLength, 0.0);
+  } else {
+    march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
+    if (!(march.t <= ray.length)) march.kind = kMiss;
+  }
+  // No leaf with a weight within one extent of the point falls to zero over the next step.
+  float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
+  float extent = leaf.zone.extent / length(leaf.localDirection);
+  march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;
+  march.zoneLeaf = leaf.at.node.index;
+}
+
+void main() {
+  Ray pixel = pixelRay();
+  MarchRay ray;
+  ray.origin = vec3(pixel.origin);
+  ray.direction = vec3(pixel.direction);
+  ray.inverse = abs(1.0 / ray.direction);
+  ray.length = float(pixel.length);
+  ray.nudge = kNudge * diagonal;
+  March march = startMarch(pixel, ray);
+  while (march.kind == kUnderWay && march.steps < mostSteps) {
+    LeafPoint leaf;
+    bool blended = marchByPolynomials(ray, march, leaf);
+    if (kBlended && blended) stepInBlendZone(ray, leaf, march);
+  }
+  if (march.kind == kUnderWay) march.bracket = vec4(march.lastHeight, march.longestStep, 0.0, 0.0);
+  integers = uvec4(march.kind, floatBitsToUint(march.t), floatBitsToUint(march.side), march.lastLeaf);
+  floats = march.bracket;
 }

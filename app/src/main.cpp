@@ -12,11 +12,12 @@
 
 namespace {
 
-/// A standard stream that the caller closed must not be handed to the first file that we open.
+/// Opens /dev/null for each standard stream that the caller closed; otherwise the first file that the program opens
+/// would take its place.
 void occupyClosedStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(stream, F_GETFD) == -1) {
-      // the wrong direction on purpose: writing to a closed stream stays an error
+      // The direction is reversed, so that using a closed stream remains an error.
       [[maybe_unused]] const int opened = open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
     }
 }
@@ -26,10 +27,10 @@ void occupyClosedStreams() {
 int main(int argc, char** argv) {
   occupyClosedStreams();
   hpsdf::app::installInterruptHandlers();
-  // a reader that went away, or a file longer than allowed, is reported like any other failed write
+  // Without these signals a closed pipe and a file beyond the size limit are reported like other failed writes.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGCHLD, SIG_DFL);  // ignored, as some callers leave it, nobody could be waited for
+  std::signal(SIGCHLD, SIG_DFL);  // waitpid would fail where the caller ignores the signal
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   const std::vector<std::string> words(argv + (argc > 0), argv + argc);

@@ -17,7 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-bool asksForHelp(const std::string& word) { return word == "--help" || word == "-h"; }
+bool asksForAllHelp(const std::string& word) { return word == "--help-all"; }
+bool asksForHelp(const std::string& word) { return word == "--help" || word == "-h" || asksForAllHelp(word); }
 
 void execute(std::span<const std::string> words, const Registry& registry, const Console& console) {
   if (words.empty()) throw Error("expected a command; 'hpsdf --help' lists them");
@@ -31,7 +32,8 @@ void execute(std::span<const std::string> words, const Registry& registry, const
   }
   const Command& command = registry.command(words[0]);
   if (std::ranges::any_of(words, asksForHelp)) {
-    console.out << commandHelp(command);
+    console.out << commandHelp(command,
+                               std::ranges::any_of(words, asksForAllHelp) ? HelpDetail::all : HelpDetail::common);
     return;
   }
   if (command.scriptOnly)
@@ -40,11 +42,6 @@ void execute(std::span<const std::string> words, const Registry& registry, const
   for (const std::string& word : words.subspan(1)) arguments.push_back({.text = word});
   Session session(registry, console);
   perform(command, session, parseArguments(command, arguments, Origin::commandLine));
-}
-
-/// Output to a closed pipe or a full disk fails late, inside the stream's buffer.
-void checkOutput(const Console& console) {
-  if (!console.out.flush()) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
 }
 
 int fail(const Console& console, const std::string& message, int status) {
@@ -58,7 +55,7 @@ int runProgram(std::span<const std::string> words, const Console& console) {
   try {
     const Registry registry = makeRegistry();
     execute(words, registry, console);
-    checkOutput(console);
+    requireWritten(console.out.flush());  // errors of buffered output appear only here
     return kExitDone;
   } catch (const CancelledPartway& cancelled) {
     console.err << "hpsdf: cancelled; " << cancelled.kept() << std::endl;

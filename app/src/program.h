@@ -10,9 +10,9 @@ namespace hpsdf::app {
 
 constexpr int kExitDone = 0;
 constexpr int kExitBadInput = 2;
-constexpr int kExitCancelled = 130;  // 128 + SIGINT, as shells count
+constexpr int kExitCancelled = 130;  // the status that shells report after SIGINT, 128 + 2
 
-/// The program without its process: the words after its name in, exit status out. Never throws.
+/// Runs the program with the words that follow its name and returns its exit status. Never throws.
 int runProgram(std::span<const std::string> words, const Console& console);
 
 }  // namespace hpsdf::app

@@ -6,24 +6,26 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "hpsdf/error.h"
-#include "rigid.h"
+#include "rigid_transform.h"
 
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kBlock = 8;  // pairs: enough to be worth a task
+constexpr std::size_t kBlock = 8;  // pairs that one task handles
 
-/// `where`: before the message, with the number. No text is made unless there is a fault.
-void requireValid(const BodyPair& pair, const char* where = nullptr, std::size_t number = 0) {
+/// Throws `Error` for an invalid pair; messages start with the pair's number, if there is one. Allocates nothing for a
+/// valid pair.
+void requireValid(const BodyPair& pair, std::optional<std::size_t> number = {}) {
   const auto refuse = [&](const std::string& what) {
-    throw Error((where ? where + std::to_string(number) + ": " : std::string()) + what);
+    throw Error((number ? "pair " + std::to_string(*number) + ": " : std::string()) + what);
   };
   if (pair.samples == nullptr || pair.field == nullptr) refuse("samples or field are missing");
-  if (const char* what = faultOf(pair.worldFromSamples)) refuse(std::string("the samples' ") + what);
-  if (const char* what = faultOf(pair.worldFromField)) refuse(std::string("the field's ") + what);
+  if (const char* fault = transformFault(pair.worldFromSamples)) refuse(std::string("the samples' ") + fault);
+  if (const char* fault = transformFault(pair.worldFromField)) refuse(std::string("the field's ") + fault);
 }
 
 void requireValid(const ContactOptions& options) {
@@ -32,7 +34,7 @@ void requireValid(const ContactOptions& options) {
   if (options.deepest == std::size_t{0}) throw Error("contacts: the number of the deepest must be 1 or more");
 }
 
-/// One pair's query: samples that may count are gathered and evaluated together.
+/// The query of one pair. It collects the samples that may be contacts and evaluates the field at them in batches.
 class Search {
  public:
   Search(const BodyPair& pair, const ContactOptions& options, std::vector<Contact>& out)
@@ -43,17 +45,18 @@ class Search {
 
   QueryCost run() {
     const std::span<const Sphere> spheres = pair_.samples->spheres();
-    // what roundings, and a rotation that is not quite one, may move a sample away from where its sphere is
-    const double shift = fieldFromSamples_.translation().norm() + spheres[0].center.norm() + spheres[0].radius;
-    const double slack = margin_ + 32 * std::numeric_limits<double>::epsilon() * shift;
+    // Bound the distance by which rounding, and the tolerance of rotations, may move a sample out of its sphere.
+    const double size = fieldFromSamples_.translation().norm() + spheres[0].center.norm() + spheres[0].radius;
+    const double slack = margin_ + 32 * std::numeric_limits<double>::epsilon() * size;
     for (std::uint32_t node = 0; node < spheres.size();) {
       const Sphere& sphere = spheres[node];
       ++cost_.spheres;
-      if (pair_.field->lowerBoundAround(fieldFromSamples_ * sphere.center) > sphere.radius * (1 + 4 * kRigid) + slack) {
+      if (pair_.field->lowerBoundAround(fieldFromSamples_ * sphere.center) >
+          sphere.radius * (1 + 4 * kRotationTolerance) + slack) {
         node = sphere.next;
         continue;
       }
-      if (++node == sphere.next) look(sphere.begin, sphere.end);
+      if (++node == sphere.next) collect(sphere.begin, sphere.end);
     }
     evaluate();
     return cost_;
@@ -62,7 +65,7 @@ class Search {
  private:
   static constexpr std::size_t kBatch = 128;
 
-  void look(std::uint32_t begin, std::uint32_t end) {
+  void collect(std::uint32_t begin, std::uint32_t end) {
     cost_.samples += end - begin;
     for (std::uint32_t sample = begin; sample < end; ++sample) {
       const Vector3 x = fieldFromSamples_ * pair_.samples->points()[sample];
@@ -99,7 +102,7 @@ class Search {
   std::array<ValueAndGradient, kBatch> results_;
 };
 
-/// Of the contacts from `first` on.
+/// Keeps the deepest of the contacts from index `first` on.
 void keepDeepest(std::size_t count, std::size_t first, std::vector<Contact>& contacts) {
   const auto begin = contacts.begin() + static_cast<std::ptrdiff_t>(first);
   const auto end = begin + static_cast<std::ptrdiff_t>(std::min(count, contacts.size() - first));
@@ -109,7 +112,7 @@ void keepDeepest(std::size_t count, std::size_t first, std::vector<Contact>& con
   contacts.erase(end, contacts.end());
 }
 
-/// Behind those that are there.
+/// Appends the pair's contacts.
 QueryCost append(const BodyPair& pair, const ContactOptions& options, std::vector<Contact>& contacts) {
   const std::size_t first = contacts.size();
   const QueryCost cost = Search(pair, options, contacts).run();
@@ -141,9 +144,11 @@ std::span<const Contact> PairContacts::of(std::size_t pair) const {
 
 void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out) {
   requireValid(options);
-  for (std::size_t i = 0; i < pairs.size(); ++i) requireValid(pairs[i], "pair ", i);
+  for (std::size_t i = 0; i < pairs.size(); ++i) requireValid(pairs[i], i);
   const std::size_t blocks = (pairs.size() + kBlock - 1) / kBlock;
-  if (out.blocks_.size() < blocks) out.blocks_.resize(blocks);  // never fewer: their room is kept
+  if (out.blocks_.size() < blocks) out.blocks_.resize(blocks);  // never shrinks, in order to keep the memory
+
+  // Query the blocks in parallel.
   out.pairs_ = pairs.size();
   out.ends_.resize(pairs.size());
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t number) {
@@ -155,6 +160,8 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
       out.ends_[i] = block.contacts.size();
     }
   });
+
+  // Concatenate the blocks in the order of the pairs.
   out.contacts_.clear();
   out.cost_ = {};
   for (std::size_t number = 0; number < blocks; ++number) {

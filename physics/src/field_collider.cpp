@@ -11,20 +11,21 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // to a cell's shortest edge: 16 bits tell of two thousand cells
-constexpr double kLoose = 0.05;      // of that edge: what bounds of polynomials may lose
-constexpr double kRounding = 1e-12;  // in the size of the numbers at hand
+constexpr double kUnits = 32;        // units of a bound in a cell's shortest edge: 16 bits suffice for 2048 cells
+constexpr double kTolerance = 0.05;  // error of the bounds of polynomials, as a share of that edge
+constexpr double kRounding = 1e-12;  // relative error of sums by rounding
 
-/// L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i, up to a degree; what is beyond is not set.
+/// The coefficients of Legendre polynomials restricted to a part of their interval: L_i(shift + scale·t) =
+/// Σ_a rows[i][a] L_a(t) for a ≤ i; other elements are not set.
 using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
 
-/// By the recurrences of L_i and of t·L_a.
-Rows legendreOfPart(double shift, double scale, int degree) {
+/// Follows from the recurrences of L_i and of t·L_a.
+Rows restrictedLegendre(double shift, double scale, int degree) {
   Rows row;
   row[0][0] = 1;
   for (int i = 0; i < degree; ++i)
     for (int a = 0; a <= i + 1; ++a) {
-      double product = 0;  // of (shift + scale·t)·L_i
+      double product = 0;  // coefficient of (shift + scale·t)·L_i
       if (a <= i) product += shift * row[i][a];
       if (a > 0) product += scale * row[i][a - 1] * a / (2 * a - 1);
       if (a + 1 <= i) product += scale * row[i][a + 1] * (a + 1) / (2 * a + 3);
@@ -33,18 +34,18 @@ Rows legendreOfPart(double shift, double scale, int degree) {
   return row;
 }
 
-/// A polynomial over a box, which is -1 to 1 in its coordinates.
+/// A polynomial in the local coordinates [−1, 1]³ of a box.
 struct Piece {
-  std::array<double, 3> lower, upper;  ///< in the grid's cells
-  int degree;                          ///< 1 or more: of constants too the linear terms are looked at
-  std::vector<double> c;               ///< a cube of (degree + 1)³, z fastest; those of a greater total degree are 0
-  double rest = 0;                     ///< what terms that were left out amount to, at most
+  std::array<double, 3> lower, upper;  ///< corners of the box, in grid cells
+  int degree;                          ///< at least 1, so that linear terms exist
+  std::vector<double> c;               ///< (degree + 1)³ coefficients, z fastest; 0 beyond the total degree
+  double rest = 0;                     ///< bound of the sum of terms that were left out
 
   double width(int axis) const { return upper[axis] - lower[axis]; }
   double at(int i, int j, int k) const { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
   double& at(int i, int j, int k) { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
 
-  /// Calls f(i, j, k) for all of a total degree in a range.
+  /// Calls f(i, j, k) for all terms whose total degree is in a range.
   template <typename F>
   static void forEachTerm(int least, int most, const F& f) {
     for (int i = 0; i <= most; ++i)
@@ -52,14 +53,15 @@ struct Piece {
         for (int k = std::max(0, least - i - j); i + j + k <= most; ++k) f(i, j, k);
   }
 
-  /// Over a part of one axis, of which the rows are.
+  /// Restricts the polynomial to a part of one axis, which the rows describe.
   void restrict(int axis, const Rows& rows) {
     for (int a = 0; a <= degree; ++a)
       for (int b = 0; a + b <= degree; ++b) {
         const auto along = [&](int i) -> double& {
           return axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i);
         };
-        for (int to = 0; to <= degree - a - b; ++to) {  // upwards: the higher ones are still those of the whole
+        for (int to = 0; to <= degree - a - b;
+             ++to) {  // ascending, because the sum uses higher coefficients before they change
           double sum = 0;
           for (int from = to; from <= degree - a - b; ++from) sum += rows[from][to] * along(from);
           along(to) = sum;
@@ -67,7 +69,7 @@ struct Piece {
       }
   }
 
-  /// Leaves the highest degrees out, as many as come to no more than `tolerance` together.
+  /// Leaves out as many of the highest degrees as have a sum of at most `tolerance`.
   void trim(double tolerance) {
     int kept = degree;
     double sum = 0, leftOut = 0;
@@ -83,8 +85,8 @@ struct Piece {
     *this = std::move(smaller);
   }
 
-  /// What all terms but the constant and the linear ones amount to, at most, roundings included.
-  double bend() const {
+  /// A bound of the sum of all terms beyond the linear ones, rounding included.
+  double nonlinearBound() const {
     double high = rest, low = 0;
     forEachTerm(0, 1, [&](int i, int j, int k) { low += std::abs(at(i, j, k)); });
     forEachTerm(2, degree, [&](int i, int j, int k) { high += std::abs(at(i, j, k)); });
@@ -92,7 +94,7 @@ struct Piece {
   }
 };
 
-/// Lower bounds of the field in each cell of a grid.
+/// Finds lower bounds of the field in each cell of a grid.
 class LowerBounds {
  public:
   LowerBounds(const Field& field, int depth, const std::array<std::int64_t, 3>& size, double tolerance)
@@ -103,12 +105,12 @@ class LowerBounds {
         least_(std::size_t(size[0] * size[1] * size[2]), std::numeric_limits<double>::infinity()) {}
 
   std::vector<double> find() {
-    field_.forEachCell([&](const Cell& leaf) { lower(pieceOf(leaf)); });
+    field_.forEachCell([&](const Cell& leaf) { bound(pieceOf(leaf)); });
     return std::move(least_);
   }
 
  private:
-  /// A leaf's polynomial where it has a say. A blended field is a mean of those that do.
+  /// A leaf's polynomial over the box in which it has a weight. A blended field is a weighted mean of polynomials.
   Piece pieceOf(const Cell& leaf) const {
     const FieldData& data = field_.data();
     const GridFrame& frame = field_.lookupGrid().frame;
@@ -124,42 +126,43 @@ class LowerBounds {
     const double edge = std::ldexp(1.0, depth_ - leaf.depth);
     for (int axis = 0; axis < 3; ++axis) {
       const double from = leaf.box.min()[axis] - frame.lower[axis];
-      const double place = std::round(std::ldexp(from / frame.size[axis] * frame.cells[axis], leaf.depth));
-      piece.lower[axis] = place * edge;
+      const double index = std::round(std::ldexp(from / frame.size[axis] * frame.cells[axis], leaf.depth));
+      piece.lower[axis] = index * edge;
       piece.upper[axis] = piece.lower[axis] + edge;
       if (data.blend == 0) continue;
-      const auto beyond = [&](bool upper) {
+      const auto extentBeyond = [&](bool upper) {
         const int depth = blend_extent::depth(field_.lookupGrid().blendExtents[leaf.id], axis, upper);
-        return depth == blend_extent::kWall ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
+        return depth == blend_extent::kDomainFace ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
       };
-      const double below = beyond(false), above = beyond(true);
+      const double below = extentBeyond(false), above = extentBeyond(true);
       piece.lower[axis] -= below;
       piece.upper[axis] += above;
-      piece.restrict(axis, legendreOfPart((above - below) / edge, piece.width(axis) / edge, degree));
+      piece.restrict(axis, restrictedLegendre((above - below) / edge, piece.width(axis) / edge, degree));
     }
     return piece;
   }
 
-  /// In halves, until the linear polynomial tells nearly all.
-  void lower(Piece piece) {
+  /// Halves the piece until its polynomial is almost linear, and lowers the bounds of the cells that it overlaps.
+  void bound(Piece piece) {
     piece.trim(tolerance_ / 8);
-    const double bend = piece.bend();
+    const double nonlinear = piece.nonlinearBound();
     const auto widths = {piece.width(0), piece.width(1), piece.width(2)};
     const auto widest = std::ranges::max_element(widths);
-    if (bend <= tolerance_ || *widest <= 1) return fill(piece, bend);
+    if (nonlinear <= tolerance_ || *widest <= 1) return fill(piece, nonlinear);
     const auto axis = static_cast<int>(widest - widths.begin());
     const double middle = (piece.lower[axis] + piece.upper[axis]) / 2;
     Piece upper = piece;
     upper.lower[axis] = middle;
     upper.restrict(axis, upperHalf_);
-    lower(std::move(upper));
+    bound(std::move(upper));
     piece.upper[axis] = middle;
     piece.restrict(axis, lowerHalf_);
-    lower(std::move(piece));
+    bound(std::move(piece));
   }
 
-  void fill(const Piece& piece, double bend) {
-    // of the linear term along each axis, its least over each cell that the piece reaches
+  /// Lowers the bounds of all cells that the piece overlaps to its linear part less `nonlinear`.
+  void fill(const Piece& piece, double nonlinear) {
+    // Find the least value of each axis's linear term over each cell.
     std::array<std::int64_t, 3> first, count;
     std::array<double, 3> slope{};
     if (piece.degree > 0) slope = {piece.at(1, 0, 0), piece.at(0, 1, 0), piece.at(0, 0, 1)};
@@ -180,7 +183,7 @@ class LowerBounds {
     for (std::int64_t z = 0; z < count[2]; ++z)
       for (std::int64_t y = 0; y < count[1]; ++y) {
         double* row = &least_[((first[2] + z) * size_[1] + first[1] + y) * size_[0] + first[0]];
-        const double base = piece.at(0, 0, 0) - bend + linear_[1][y] + linear_[2][z];
+        const double base = piece.at(0, 0, 0) - nonlinear + linear_[1][y] + linear_[2][z];
         for (std::int64_t x = 0; x < count[0]; ++x) row[x] = std::min(row[x], base + linear_[0][x]);
       }
   }
@@ -191,33 +194,33 @@ class LowerBounds {
   double tolerance_;
   std::vector<double> least_;
   std::array<std::vector<double>, 3> linear_;
-  Rows lowerHalf_ = legendreOfPart(-0.5, 0.5, kMaxDegree), upperHalf_ = legendreOfPart(0.5, 0.5, kMaxDegree);
+  Rows lowerHalf_ = restrictedLegendre(-0.5, 0.5, kMaxDegree), upperHalf_ = restrictedLegendre(0.5, 0.5, kMaxDegree);
 };
 
-using Place = std::array<std::int64_t, 3>;
+using CellIndex = std::array<std::int64_t, 3>;
 
-Place placeOf(std::int64_t n, const std::array<std::int64_t, 3>& size) {
+CellIndex cellIndexOf(std::int64_t n, const std::array<std::int64_t, 3>& size) {
   return {n % size[0], n / size[0] % size[1], n / size[0] / size[1]};
 }
 
-/// Each cell's least over itself and those around it.
+/// The least value of each cell and its 26 neighbours.
 std::vector<double> leastAround(std::vector<double> values, const std::array<std::int64_t, 3>& size) {
   std::int64_t stride = 1;
   for (int axis = 0; axis < 3; stride *= size[axis++]) {
     std::vector<double> least = values;
     for (std::int64_t n = 0; n < std::ssize(values); ++n) {
-      const std::int64_t place = n / stride % size[axis];
-      if (place > 0) least[n] = std::min(least[n], values[n - stride]);
-      if (place + 1 < size[axis]) least[n] = std::min(least[n], values[n + stride]);
+      const std::int64_t index = n / stride % size[axis];
+      if (index > 0) least[n] = std::min(least[n], values[n - stride]);
+      if (index + 1 < size[axis]) least[n] = std::min(least[n], values[n + stride]);
     }
     values = std::move(least);
   }
   return values;
 }
 
-/// A way by steps to neighbours is longer than the straight one, at most by this factor. Within the steps along a,
-/// along a and b, and along all, a way's length is a linear function of where it leads; its gradient's length is the
-/// factor.
+/// The greatest ratio of the length of a path by steps to neighbouring cells and the distance of its ends. Among paths
+/// by steps along axis a, along a and b, and along all three, the length is a linear function of the end point; the
+/// ratio is the length of its gradient.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -229,16 +232,17 @@ double worstDetour(const Vector3& cell) {
   return worst;
 }
 
-/// The least of all cells' values and the ways there, between centres, or a little less: ways go by steps that are
-/// shortened so that none is too long (Borgefors 1986). One pass there and one back find the shortest ones.
-void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
+/// Chamfer distance transform (Borgefors 1986): replaces each value by the least sum of a cell's value and the length
+/// of the shortest path to that cell. Steps are shortened so that no path is longer than the distance of its ends. One
+/// pass forwards and one backwards find the shortest paths.
+void distanceTransform(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
   struct Step {
-    Place by;
+    CellIndex by;
     std::int64_t offset;
     double length;
   };
   const double shorten = (1 - kRounding) / worstDetour(cell);
-  std::vector<Step> back;  // to those that come before
+  std::vector<Step> back;  // steps to neighbours that precede a cell in memory
   for (std::int64_t z = -1; z <= 0; ++z)
     for (std::int64_t y = -1; y <= 1; ++y)
       for (std::int64_t x = -1; x <= 1; ++x) {
@@ -249,7 +253,7 @@ void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size
               {{x, y, z}, offset, shorten * cell.cwiseProduct(Vector3(double(x), double(y), double(z))).norm()});
       }
   const auto visit = [&](std::int64_t n, int sign) {
-    const Place at = placeOf(n, size);
+    const CellIndex at = cellIndexOf(n, size);
     for (const Step& step : back) {
       bool within = true;
       for (int axis = 0; axis < 3; ++axis) {
@@ -263,11 +267,11 @@ void spread(std::vector<double>& values, const std::array<std::int64_t, 3>& size
   for (std::int64_t n = std::ssize(values); n-- > 0;) visit(n, -1);
 }
 
-/// Of the cells at the domain's sides.
+/// The least value of the cells at the domain's sides.
 double leastAtSides(const std::vector<double>& values, const std::array<std::int64_t, 3>& size) {
   double least = std::numeric_limits<double>::infinity();
   for (std::int64_t n = 0; n < std::ssize(values); ++n) {
-    const Place at = placeOf(n, size);
+    const CellIndex at = cellIndexOf(n, size);
     for (int axis = 0; axis < 3; ++axis)
       if (at[axis] == 0 || at[axis] + 1 == size[axis]) least = std::min(least, values[n]);
   }
@@ -291,12 +295,14 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
     cell[axis] = frame.size[axis] / double(size_[axis]);
   }
   unit_ = cell.minCoeff() / kUnits;
-  std::vector<double> within = LowerBounds(field, depth_, size_, kLoose * cell.minCoeff()).find();
+  std::vector<double> within = LowerBounds(field, depth_, size_, kTolerance * cell.minCoeff()).find();
   wall_ = leastAtSides(within, size_);
   for (double& bound : within) bound = std::max(bound, 0.0);
-  // two cells are as far apart as the one's centre and that of the nearest around the other
+
+  // The distance between two cells is at least that between the centres of one and of the nearest neighbour of the
+  // other: take the least of each neighbourhood before the distances between centres.
   std::vector<double> around = leastAround(within, size_);
-  spread(around, size_, cell);
+  distanceTransform(around, size_, cell);
   if (wall_ > 0) wall_ = leastAtSides(around, size_);
   cells_.resize(within.size());
   for (std::size_t n = 0; n < cells_.size(); ++n)
@@ -308,15 +314,14 @@ const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const 
   const double scale = double(std::uint32_t{1} << depth_);
   std::array<std::int64_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {
-    // as the field finds its own cells, to the bit
+    // Compute exactly what the field computes to find its own cells.
     const double coordinate = (inDomain[axis] - frame.lower[axis]) / frame.size[axis] * frame.cells[axis];
     at[axis] = std::min(static_cast<std::int64_t>(coordinate * scale), size_[axis] - 1);
   }
   return cells_[(at[2] * size_[1] + at[1]) * size_[0] + at[0]];
 }
 
-// Outside the domain the field is f(q) + |x - q|, q being the domain's closest point to x. At its sides f is `wall_` or
-// more.
+// Outside the domain the field is f(q) + |x − q| with the domain's closest point q to x, and f ≥ `wall_` at the sides.
 
 double FieldCollider::lowerBound(const Vector3& x) const {
   const Box& domain = field_->domain();
@@ -327,9 +332,9 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-/// What holds around q holds around x: |q - q_y| ≤ |x - y| for any y and its own closest point. And y is either
-/// outside, and no more than |x - y| nearer to the domain than x, or behind its sides: beyond reach if `wall_` is
-/// negative, and if not, that is what holds around them.
+// The bound around q holds around x: |q − q_y| ≤ |x − y| for every y and its closest point q_y. The second bound,
+// `wall_` + |x − q|, holds outside, because y is at most |x − y| nearer to the domain than x; it holds inside, because
+// a path to y crosses a side, around which `wall_` is a bound unless it is negative, and then the bound is not used.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -1,4 +1,4 @@
-#include "sphere_tree.h"
+#include "hpsdf/physics/sphere_tree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::uint32_t kLeafSamples = 16;  // bench contacts/pile: 8 and 32 are as fast within a fifth
-constexpr int kFitSteps = 64;               // radii are within some percent of the smallest then
+constexpr std::uint32_t kLeafPoints = 16;  // with 8 or 32, the benchmark contacts/pile takes as long within a fifth
+constexpr int kFitSteps = 64;              // radii are then within some percent of the smallest possible
 
 class Builder {
  public:
@@ -29,7 +29,7 @@ class Builder {
     Box box;
     for (std::uint32_t i = begin; i < end; ++i) box.extend(point(i));
     tree_.spheres.push_back(fit(begin, end, box.center()));
-    if (end - begin > kLeafSamples) {
+    if (end - begin > kLeafPoints) {
       const std::uint32_t middle = split(begin, end, box);
       add(begin, middle);
       add(middle, end);
@@ -37,7 +37,7 @@ class Builder {
     tree_.spheres[self].next = static_cast<std::uint32_t>(tree_.spheres.size());
   }
 
-  /// In halves along the longest axis; of equal coordinates the lower index comes first.
+  /// Divides the points into halves along the box's longest axis; equal coordinates are ordered by index.
   std::uint32_t split(std::uint32_t begin, std::uint32_t end, const Box& box) {
     Eigen::Index axis;
     box.sizes().maxCoeff(&axis);
@@ -49,7 +49,8 @@ class Builder {
     return middle;
   }
 
-  /// Towards the farthest point by ever smaller steps (Bădoiu, Clarkson 2003), the best of all centres on the way.
+  /// Approximates the smallest enclosing sphere: the centre moves towards the farthest point by ever smaller steps
+  /// (Bădoiu, Clarkson 2003), and the best of its positions is kept.
   Sphere fit(std::uint32_t begin, std::uint32_t end, Vector3 center) const {
     Sphere best{center, std::numeric_limits<double>::infinity(), begin, end, 0};
     for (int step = 2; step < kFitSteps + 2; ++step) {
@@ -78,7 +79,7 @@ class Builder {
     return farthest;
   }
 
-  const Vector3& point(std::uint32_t place) const { return points_[tree_.order[place]]; }
+  const Vector3& point(std::uint32_t position) const { return points_[tree_.order[position]]; }
 
   std::span<const Vector3> points_;
   SphereTree tree_;
@@ -86,6 +87,6 @@ class Builder {
 
 }  // namespace
 
-SphereTree sphereTree(std::span<const Vector3> points) { return Builder(points).build(); }
+SphereTree buildSphereTree(std::span<const Vector3> points) { return Builder(points).build(); }
 
 }  // namespace hpsdf::physics

@@ -9,21 +9,20 @@
 #include <utility>
 
 #include "hpsdf/error.h"
-#include "sphere_tree.h"
 
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kCandidates = 5;  // a sample
+constexpr std::size_t kCandidates = 5;  // random candidates for each sample
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// The mixing function of SplitMix64 (Steele, Lea, Flood 2014).
 std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;
   x = (x ^ x >> 27) * 0x94d049bb133111eb;
   return x ^ x >> 31;
 }
 
-/// Three numbers in [0, 1) that depend on a seed and a place in the sequence alone.
+/// Three random numbers in [0, 1) that depend only on a seed and a number in the sequence.
 std::array<double, 3> randomNumbers(std::uint64_t seed, std::uint64_t number) {
   std::uint64_t state = mixed(mixed(seed) + number);
   std::array<double, 3> result;
@@ -36,9 +35,9 @@ struct Candidate {
   std::uint32_t triangle;
 };
 
-/// The mesh's areas and normals, checked.
+/// Areas and normals of a mesh, whose data is checked.
 struct Surface {
-  std::vector<double> areasUpTo;  ///< of the triangles up to each, itself included
+  std::vector<double> areasUpTo;  ///< total area of each triangle and all before it
   std::vector<Vector3> normals;
 
   explicit Surface(const TriangleMesh& mesh) {
@@ -69,7 +68,7 @@ std::size_t countOf(const SampleOptions& options, double area) {
   if (options.spacing && (!(*options.spacing > 0) || !std::isfinite(*options.spacing)))
     throw Error("samples: the spacing must be a number above 0");
   if (options.count == std::size_t{0}) throw Error("samples: the count must be 1 or more");
-  // an area over a tiny square may be more than any whole number
+  // The quotient of an area and a tiny square may exceed every integer type.
   const double count =
       options.count ? double(*options.count) : std::max(1.0, std::round(area / *options.spacing / *options.spacing));
   if (!(count <= double(kMaxSamples)))
@@ -78,7 +77,7 @@ std::size_t countOf(const SampleOptions& options, double area) {
   return static_cast<std::size_t>(count);
 }
 
-/// One in each of as many equal parts of the area, in the order of the triangles.
+/// Draws one candidate in each of `count` parts of equal area, in the order of the triangles.
 std::vector<Candidate> drawCandidates(const TriangleMesh& mesh, const Surface& surface, std::size_t count,
                                       std::uint64_t seed) {
   std::vector<Candidate> candidates(count);
@@ -96,17 +95,18 @@ std::vector<Candidate> drawCandidates(const TriangleMesh& mesh, const Surface& s
   return candidates;
 }
 
-/// Finds candidates near each other: sorted by the cells of a grid, x fastest, that are as wide as `reach` or wider.
+/// Finds candidates within a radius. It sorts them by the cells of a grid, x fastest, whose cells are at least as wide
+/// as the radius.
 class Neighbours {
  public:
-  Neighbours(std::vector<Candidate>& candidates, double reach) : reach_(reach) {
+  Neighbours(std::vector<Candidate>& candidates, double radius) : radius_(radius) {
     Box box;
     for (const Candidate& candidate : candidates) box.extend(candidate.point);
     lower_ = box.min();
-    cell_ = std::max(reach, box.sizes().maxCoeff() / kMostCells);
+    cell_ = std::max(radius, box.sizes().maxCoeff() / kMostCells);
     std::vector<std::pair<std::uint64_t, std::uint32_t>> order(candidates.size());
     for (std::size_t i = 0; i < order.size(); ++i)
-      order[i] = {keyOf(placeOf(candidates[i].point)), static_cast<std::uint32_t>(i)};
+      order[i] = {keyOf(cellAt(candidates[i].point)), static_cast<std::uint32_t>(i)};
     std::ranges::sort(order);
     std::vector<Candidate> sorted(candidates.size());
     keys_.resize(candidates.size());
@@ -117,43 +117,44 @@ class Neighbours {
     candidates = std::move(sorted);
   }
 
-  /// Calls f(other, distance) for all others within reach.
+  /// Calls f(other, distance) for all other candidates within the radius around candidate `index`.
   template <typename F>
-  void forEach(const std::vector<Candidate>& candidates, std::size_t of, const F& f) const {
-    const auto [x, y, z] = placeOf(candidates[of].point);
+  void forEach(const std::vector<Candidate>& candidates, std::size_t index, const F& f) const {
+    const auto [x, y, z] = cellAt(candidates[index].point);
     for (std::uint64_t k = z - std::min<std::uint64_t>(z, 1); k <= z + 1; ++k)
       for (std::uint64_t j = y - std::min<std::uint64_t>(y, 1); j <= y + 1; ++j) {
         const std::uint64_t first = keyOf({x - std::min<std::uint64_t>(x, 1), j, k}), last = keyOf({x + 1, j, k});
         for (auto at = std::ranges::lower_bound(keys_, first); at != keys_.end() && *at <= last; ++at) {
           const auto other = static_cast<std::size_t>(at - keys_.begin());
-          const double distance = (candidates[other].point - candidates[of].point).norm();
-          if (other != of && distance < reach_) f(other, distance);
+          const double distance = (candidates[other].point - candidates[index].point).norm();
+          if (other != index && distance < radius_) f(other, distance);
         }
       }
   }
 
  private:
-  static constexpr double kMostCells = 0x1p20;  // an axis: their numbers fit a key
+  static constexpr double kMostCells = 0x1p20;  // along an axis, so that three cell indices fit a key of 64 bits
 
-  using Place = std::array<std::uint64_t, 3>;
+  using CellIndex = std::array<std::uint64_t, 3>;
 
-  Place placeOf(const Vector3& point) const {
-    Place place;
-    for (int axis = 0; axis < 3; ++axis) place[axis] = static_cast<std::uint64_t>((point[axis] - lower_[axis]) / cell_);
-    return place;
+  CellIndex cellAt(const Vector3& point) const {
+    CellIndex cell;
+    for (int axis = 0; axis < 3; ++axis) cell[axis] = static_cast<std::uint64_t>((point[axis] - lower_[axis]) / cell_);
+    return cell;
   }
 
-  static std::uint64_t keyOf(const Place& place) { return place[0] | place[1] << 21 | place[2] << 42; }
+  static std::uint64_t keyOf(const CellIndex& cell) { return cell[0] | cell[1] << 21 | cell[2] << 42; }
 
-  double reach_, cell_;
+  double radius_, cell_;
   Vector3 lower_;
   std::vector<std::uint64_t> keys_;
 };
 
-/// Leaves so many: takes away whichever has the most and nearest neighbours, again and again (Yuksel 2015, with the
-/// weights that are proposed there).
+/// Removes the candidate with the greatest weight, i.e. with the most and nearest neighbours, until `count` are left
+/// (Yuksel 2015, with the weights that are proposed there).
 std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surface& surface, std::size_t count) {
-  const double radius = std::sqrt(surface.area() / (2 * std::numbers::sqrt3 * double(count)));  // of the densest disks
+  const double radius =
+      std::sqrt(surface.area() / (2 * std::numbers::sqrt3 * double(count)));  // of the densest packing of disks
   const double least = 0.65 * radius * (1 - std::pow(double(count) / double(candidates.size()), 1.5));
   const Neighbours neighbours(candidates, 2 * radius);
   const auto weightBetween = [&](std::size_t a, std::size_t b, double distance) {
@@ -162,14 +163,15 @@ std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surfac
     return fourth * fourth;
   };
   std::vector<double> weights(candidates.size(), 0.0);
-  // Weights only fall. An entry that is out of date is too high, and comes up in time to be put right.
+  // Weights only decrease. An outdated entry of the queue is too high, so that it comes to the top and can be
+  // corrected.
   std::priority_queue<std::pair<double, std::uint32_t>> heaviest;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     neighbours.forEach(candidates, i,
                        [&](std::size_t other, double distance) { weights[i] += weightBetween(i, other, distance); });
     heaviest.emplace(weights[i], static_cast<std::uint32_t>(i));
   }
-  std::vector<bool> gone(candidates.size(), false);
+  std::vector<bool> removed(candidates.size(), false);
   for (std::size_t left = candidates.size(); left > count;) {
     const auto [weight, i] = heaviest.top();
     heaviest.pop();
@@ -177,15 +179,15 @@ std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surfac
       heaviest.emplace(weights[i], i);
       continue;
     }
-    gone[i] = true;
+    removed[i] = true;
     --left;
     neighbours.forEach(candidates, i, [&](std::size_t other, double distance) {
-      if (!gone[other]) weights[other] -= weightBetween(i, other, distance);
+      if (!removed[other]) weights[other] -= weightBetween(i, other, distance);
     });
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidates.size(); ++i)
-    if (!gone[i]) candidates[kept++] = candidates[i];
+    if (!removed[i]) candidates[kept++] = candidates[i];
   candidates.resize(kept);
   return candidates;
 }
@@ -199,7 +201,7 @@ SurfaceSamples::SurfaceSamples(std::span<const Vector3> points, std::span<const 
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!points[i].allFinite() || !normals[i].allFinite())
       throw Error("samples: number " + std::to_string(i) + " is not finite");
-  SphereTree tree = sphereTree(points);
+  SphereTree tree = buildSphereTree(points);
   for (const std::uint32_t i : tree.order) {
     points_.push_back(points[i]);
     normals_.push_back(normals[i]);

@@ -1,4 +1,4 @@
-// verify and study: how wrong fields are, as the program's user is told.
+// Tests the errors that `verify` and `study` report.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ using testing::IsEmpty;
 
 constexpr const char* kMesh = "builtin:torus,segments=48,sides=24";
 
-/// A torus's field, each cell's constant raised by `offset`.
+/// Writes the field of a torus with `offset` added to the constant coefficient of every cell.
 void writeField(const fs::path& file, double offset) {
   const TriangleMesh mesh = shapes::mesh(kMesh);
   const ExactDistance exact(mesh);
@@ -66,7 +66,7 @@ class Accuracy : public testing::Test {
   support::TemporaryDirectory folder_;
 };
 
-TEST_F(Accuracy, AnOffsetShowsAsTheError) {
+TEST_F(Accuracy, anOffsetShowsAsTheError) {
   writeField(at("right.hpsdf"), 0);
   writeField(at("wrong.hpsdf"), 0.25);
   const Json right = verified({at("right.hpsdf")}), wrong = verified({at("wrong.hpsdf"), kMesh});
@@ -83,7 +83,7 @@ TEST_F(Accuracy, AnOffsetShowsAsTheError) {
   EXPECT_EQ(wrong["thresholds"].size(), 0u);
 }
 
-TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
+TEST_F(Accuracy, anExceededThresholdEndsWithStatus1AndSaysWhich) {
   writeField(at("f.hpsdf"), 0.01);
   const auto with = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words = {"verify", at("f.hpsdf"), "--points", "20000"};
@@ -119,7 +119,7 @@ TEST_F(Accuracy, AnExceededThresholdEndsWithStatus1AndSaysWhich) {
   EXPECT_THAT(with({"--near", "1e30"}).err, HasSubstr("or near means too far"));
 }
 
-TEST_F(Accuracy, NothingStepsAcrossTheFacesOfABlendedField) {
+TEST_F(Accuracy, nothingStepsAcrossTheFacesOfABlendedField) {
   writeField(at("f.hpsdf"), 0);
   ASSERT_EQ(runHere({"blend", at("f.hpsdf"), "-o", at("b.hpsdf")}).status, kExitDone);
   const Json alone = verified({at("f.hpsdf")})["steps"];
@@ -135,7 +135,7 @@ TEST_F(Accuracy, NothingStepsAcrossTheFacesOfABlendedField) {
               AllOf(HasSubstr("greatest steps across faces"), HasSubstr("20,000 points")));
 }
 
-/// Cancels at the first word of this task.
+/// Cancels when the task is reported first.
 struct Canceller : WorkListener {
   explicit Canceller(std::string task) : task_(std::move(task)) {}
   void report(std::string_view task, double) override { heard_ = heard_ || task == task_; }
@@ -147,7 +147,7 @@ struct Canceller : WorkListener {
   std::atomic<bool> heard_ = false;
 };
 
-TEST_F(Accuracy, CancelledBoundsLeaveWhatWasThere) {
+TEST_F(Accuracy, cancelledBoundsLeaveWhatWasThere) {
   writeField(at("f.hpsdf"), 0);
   writeTextFile(at("old.hpsdf"), "old");
   Canceller canceller("finding bounds");
@@ -161,7 +161,7 @@ TEST_F(Accuracy, CancelledBoundsLeaveWhatWasThere) {
   EXPECT_FALSE(fs::exists(at("old.hpsdf.tmp")));
 }
 
-TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {
+TEST_F(Accuracy, aDifferentMeshIsRefusedUnlessAskedFor) {
   writeField(at("f.hpsdf"), 0);
   const Outcome other = runHere({"verify", at("f.hpsdf"), "builtin:gear"});
   EXPECT_EQ(other.status, kExitBadInput);
@@ -174,19 +174,19 @@ TEST_F(Accuracy, ADifferentMeshIsRefusedUnlessAskedFor) {
   EXPECT_GT(verified({at("f.hpsdf"), "builtin:gear", "--any-mesh"})["uniform"]["error"]["rms"], 0.03);
 }
 
-TEST_F(Accuracy, AMeshThatIsNotKnownIsAskedFor) {
+TEST_F(Accuracy, aMeshThatIsNotKnownIsAskedFor) {
   std::ofstream(at("t.off")) << "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--grid", "2"}).status, 0);
   EXPECT_THAT(runHere({"verify", at("t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
   EXPECT_EQ(runHere({"verify", at("t.hpsdf"), at("t.off"), "--points", "1000"}).status, kExitDone);
-  // a normalized field is measured against the mesh as it was normalized
+  // A normalized field is compared with the normalized mesh.
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("n.hpsdf"), "--target-error", "1e-2", "--grid", "2", "--normalize"})
                 .status,
             0);
   EXPECT_LT(verified({at("n.hpsdf"), at("t.off")})["uniform"]["error"]["rms"], 0.1);
 }
 
-TEST_F(Accuracy, TheSameSeedGivesTheSameBytesForAnyNumberOfThreads) {
+TEST_F(Accuracy, theSameSeedGivesTheSameBytesForAnyNumberOfThreads) {
   writeField(at("f.hpsdf"), 0);
   const Json one = verified({at("f.hpsdf"), "--threads", "1"}), three = verified({at("f.hpsdf"), "--threads", "3"});
   EXPECT_EQ(one.dump(), three.dump());
@@ -196,7 +196,7 @@ TEST_F(Accuracy, TheSameSeedGivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_NE(band["uniform"], one["uniform"]);
 }
 
-TEST_F(Accuracy, TheScriptFliesToTheWorstPoints) {
+TEST_F(Accuracy, theScriptFliesToTheWorstPoints) {
   writeField(at("f.hpsdf"), 0);
   const Outcome outcome =
       runHere({"verify", at("f.hpsdf"), "--points", "20000", "--worst", "2", "--script", at("worst.hps"), "--json"});
@@ -213,7 +213,7 @@ TEST_F(Accuracy, TheScriptFliesToTheWorstPoints) {
     std::getline(numbers, number, ',');
     EXPECT_EQ(std::stod(number), point[axis].get<double>());
   }
-  // the lines run, but for the pictures
+  // The script's lines run without errors; its pictures are left out.
   std::string lookOnly;
   for (std::istringstream all(script); std::getline(all, found);)
     if (!found.starts_with("shot")) lookOnly += found + "\n";
@@ -222,8 +222,6 @@ TEST_F(Accuracy, TheScriptFliesToTheWorstPoints) {
   EXPECT_EQ(looked.status, kExitDone) << looked.err;
   EXPECT_THAT(looked.out, HasSubstr("zoom="));
 }
-
-// study
 
 std::vector<std::vector<std::string>> rowsOf(const std::string& csv) {
   std::vector<std::vector<std::string>> rows;
@@ -236,7 +234,7 @@ std::vector<std::vector<std::string>> rowsOf(const std::string& csv) {
   return rows;
 }
 
-TEST_F(Accuracy, ConvergenceOfATorusFallsAndHpIsAhead) {
+TEST_F(Accuracy, convergenceOfATorusFallsAndHpIsAhead) {
   const std::vector<std::string> words = {"study",   "convergence", "analytic:torus", "-o",
                                           at("out"), "--json",      "--no-plot",      "--max-coefficients",
                                           "60000",   "--points",    "20000"};
@@ -269,7 +267,7 @@ TEST_F(Accuracy, ConvergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_GT(equal["h2"]["over_hp"], 1);
   EXPECT_GT(equal["h1"]["over_hp"], equal["h2"]["over_hp"].get<double>());
   EXPECT_LT(2 * std::stod(curves["hp"].back()[6]), std::stod(curves["h2"].back()[6]));
-  // by default at what the weakest reaches
+  // By default the strategies are compared at the error that all of them reach.
   EXPECT_NEAR(equal["measured_rms"], std::stod(curves["h1"].back()[6]), 1e-12);
   EXPECT_EQ(json["meshes"][0]["curves"]["h1"].size(), curves["h1"].size());
   EXPECT_EQ(Json::parse(readTextFile(at("out/convergence.json"))), json);
@@ -282,7 +280,7 @@ TEST_F(Accuracy, ConvergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_EQ(readTextFile(at("again/convergence.csv")), readTextFile(at("out/convergence.csv")));
 }
 
-TEST_F(Accuracy, ConvergenceComparesAtTheErrorThatIsAskedFor) {
+TEST_F(Accuracy, convergenceComparesAtTheErrorThatIsAskedFor) {
   const auto comparison = [&](const std::string& at) {
     const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", this->at("out"), "--no-plot",
                                      "--max-coefficients", "30000", "--points", "5000", "--json", "--at", at});
@@ -298,7 +296,7 @@ TEST_F(Accuracy, ConvergenceComparesAtTheErrorThatIsAskedFor) {
   EXPECT_TRUE(mesh["equal_error"]["h1"]["coefficients"].is_null()) << "out of reach";
 }
 
-TEST_F(Accuracy, ConvergenceIsDrawnByGnuplot) {
+TEST_F(Accuracy, convergenceIsDrawnByGnuplot) {
   const char* path = std::getenv("PATH");
   const std::string before = path == nullptr ? "" : path;
   const auto study = [&](const std::string& program) {
@@ -319,7 +317,7 @@ TEST_F(Accuracy, ConvergenceIsDrawnByGnuplot) {
   const Outcome broken = study("echo 'no such terminal' ; exit 3\n");
   EXPECT_THAT(broken.err, HasSubstr("gnuplot failed with status 3 (no such terminal)"));
   EXPECT_FALSE(fs::exists(at("plots"))) << "nothing is left behind";
-  // what it is told: scales, labels, a curve for each strategy and measure
+  // The script sets scales and labels and draws a curve for each strategy and measure.
   const Outcome drawn = study("while read -r line; do echo \"$line\"; done < plot.gp > plot.png\n");
   ASSERT_EQ(drawn.status, kExitDone) << drawn.err;
   const std::string script = readTextFile(at("plots/convergence-torus.png"));
@@ -327,7 +325,7 @@ TEST_F(Accuracy, ConvergenceIsDrawnByGnuplot) {
                             HasSubstr("hp, measured RMS"), HasSubstr("h1, measured maximum")));
 }
 
-TEST_F(Accuracy, GnuplotTakesWhatItIsTold) {
+TEST_F(Accuracy, gnuplotTakesWhatItIsTold) {
   if (!findProgram("gnuplot")) GTEST_SKIP() << "gnuplot is not installed (package gnuplot-nox)";
   const Outcome outcome = runHere(
       {"study", "convergence", "analytic:torus", "-o", at("plots"), "--max-coefficients", "5000", "--points", "1000"});
@@ -337,13 +335,13 @@ TEST_F(Accuracy, GnuplotTakesWhatItIsTold) {
   EXPECT_EQ(picture.height, 560);
 }
 
-TEST_F(Accuracy, AStudyIsWrittenWholeOrNotAtAll) {
+TEST_F(Accuracy, aStudyIsWrittenWholeOrNotAtAll) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> studies = {
       {{"convergence", "--no-plot", "--max-coefficients", "3000"}, "convergence.json"},
       {{"table", "--cpu", "--target-error", "1e-1", "--grid", "2"}, "table.json"},
       {{"continuity", "--target-error", "1e-1", "--grid", "2", "--weights", "1"}, "continuity.json"}};
   for (const auto& [options, late] : studies) {
-    fs::create_directories(at("out/" + late));  // in the way of one of the last files
+    fs::create_directories(at("out/" + late));  // a folder prevents one of the last files from being written
     std::vector<std::string> words = {"study"};
     words.insert(words.end(), options.begin(), options.end());
     words.insert(words.end(), {"analytic:sphere", "-o", at("out"), "--points", "1000"});
@@ -357,7 +355,7 @@ TEST_F(Accuracy, AStudyIsWrittenWholeOrNotAtAll) {
   }
 }
 
-TEST_F(Accuracy, AFieldInAnotherFormKeepsItsSurface) {
+TEST_F(Accuracy, aFieldInAnotherFormKeepsItsSurface) {
   std::ofstream(at("t.off")) << "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
   const Registry registry = makeRegistry();
   for (const char* verb : {"blend", "smooth"}) {
@@ -372,7 +370,7 @@ TEST_F(Accuracy, AFieldInAnotherFormKeepsItsSurface) {
   }
 }
 
-TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
+TEST_F(Accuracy, theTableIsWrittenThreeWays) {
   const Outcome outcome = runHere({"study", "table", kMesh, "builtin:torus,segments=20,sides=10", "analytic:box", "-o",
                                    at("out"), "--cpu", "--target-error", "1e-3", "--target-error", "1e-2",
                                    "--target-error", "1e-1", "--grid", "4", "--points", "5000", "--json"});
@@ -399,7 +397,7 @@ TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
                           testing::Not(HasSubstr("src=\"http")), testing::Not(HasSubstr("src=\"torus"))));
   EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![degrees](torus-2-degree.svg)"),
                            HasSubstr("Degree ![](degree-legend.svg)"), HasSubstr("Depth ![](depth-legend.svg)")));
-  // every row has a cell for each of the heads
+  // Every row has as many cells as the head.
   const auto count = [](const std::string& text, const std::string& what) {
     std::size_t found = 0;
     for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
@@ -411,7 +409,7 @@ TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
   std::istringstream lines(table);
   for (std::string line; std::getline(lines, line) && !line.empty();)
     EXPECT_EQ(std::ranges::count(line, '|'), 16) << line;
-  // the legend has all levels, in the colours of the bars
+  // The legend has all levels, in the colours of the bars.
   const std::string legend = readTextFile(at("out/degree-legend.svg"));
   std::set<std::string> levels;
   for (const Json& mesh : json["meshes"])
@@ -424,12 +422,12 @@ TEST_F(Accuracy, TheTableIsWrittenThreeWays) {
   for (const char* name : {"torus", "torus-2", "box"})
     for (const char* ending : {"-degree.png", "-depth.png", "-degree.svg", "-depth.svg"})
       EXPECT_GT(fs::file_size(at(std::string("out/") + name + ending)), 100u) << name << ending;
-  // a bar's parts take the shares of the volume, in the colours of the legend
+  // The parts of a bar are as long as the shares of the volume and have the legend's colours.
   const std::string bar = readTextFile(at("out/torus-degree.svg"));
   EXPECT_EQ(std::size_t(std::ranges::count(bar, '%')), torus["degree_volume"].size());
 }
 
-TEST_F(Accuracy, MistakesInStudiesAreNamedBeforeLongWork) {
+TEST_F(Accuracy, mistakesInStudiesAreNamedBeforeLongWork) {
   const auto refused = [&](const std::vector<std::string>& words, const std::string& message) {
     std::vector<std::string> all = {"study"};
     all.insert(all.end(), words.begin(), words.end());

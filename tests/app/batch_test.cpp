@@ -1,4 +1,4 @@
-// Many meshes into one folder: by one process, by several, by some that are killed.
+// Batches of meshes, built by one process, by several, and by some that are killed.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -51,9 +51,6 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-// ---------------------------------------------------------------------------------------------------------------------
-// Lists
-
 std::vector<std::string> surfacesIn(std::string_view list) {
   std::vector<std::string> surfaces;
   for (const BatchMesh& mesh : parseBatchList(list)) surfaces.push_back(mesh.surface);
@@ -65,7 +62,7 @@ std::string nameOf(const std::string& surface) {
   return meshes.size() == 1 ? meshes[0].name : "";
 }
 
-TEST(BatchLists, holdAMeshALine) {
+TEST(BatchLists, holdOneMeshALine) {
   EXPECT_THAT(surfacesIn("a.obj\n# no mesh\n\n  b c.stl\t\r\n#d.obj\n./#e.obj\nbuiltin:torus,major=1\nlast.ply"),
               ElementsAre("a.obj", "b c.stl", "./#e.obj", "builtin:torus,major=1", "last.ply"));
   EXPECT_THAT(surfacesIn("\xef\xbb\xbf# as some editors begin\na.obj\r\n"), ElementsAre("a.obj"));
@@ -73,8 +70,8 @@ TEST(BatchLists, holdAMeshALine) {
   EXPECT_THAT(surfacesIn(" \n\r\n# \n"), IsEmpty());
 }
 
-/// As `find -print0` and some editors write them.
-TEST(BatchLists, ofZeroBytesAreRefused) {
+/// `find -print0` and some editors write such files.
+TEST(BatchLists, withZeroBytesAreRefused) {
   const auto complaint = [](std::string_view list) {
     try {
       parseBatchList(list);
@@ -89,7 +86,7 @@ TEST(BatchLists, ofZeroBytesAreRefused) {
   EXPECT_THAT(complaint("\xff\xfe.\0/\0t\0.\0o\0b\0j\0\n\0"sv), StartsWith("line 1 holds a zero byte"));
 }
 
-TEST(BatchLists, namesAreSafeAndOfTheLineAlone) {
+TEST(BatchLists, namesAreSafeAndDependOnTheLineAlone) {
   EXPECT_THAT(nameOf("scans/bunny.obj"), testing::MatchesRegex("bunny-[0-9a-f]{16}"));
   EXPECT_THAT(nameOf("builtin:torus,major=0.7,minor=0.2"), StartsWith("torus_major_0.7_minor_0.2-"));
   EXPECT_THAT(nameOf("../a b$(c)'\"*\xc3\xa4.stl"), StartsWith("a_b__c______-"));
@@ -103,9 +100,6 @@ TEST(BatchLists, namesAreSafeAndOfTheLineAlone) {
     names.insert(nameOf(surface));
   EXPECT_THAT(names, SizeIs(9));
 }
-
-// ---------------------------------------------------------------------------------------------------------------------
-// One process
 
 std::string tetrahedron(double height) {
   return fmt::format("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", height);
@@ -128,10 +122,10 @@ class Batches : public testing::Test {
  protected:
   std::string at(const std::string& name) const { return (folder_ / name).string(); }
   fs::path fields() const { return folder_ / "fields"; }
-  /// Where the field of a line of the list goes.
+  /// Returns the file of the field for a line of the list.
   fs::path fieldOf(const std::string& surface) const { return fields() / (nameOf(surface) + ".hpsdf"); }
 
-  /// The program on what is in `list`, with options.
+  /// Returns a call that builds the given list with options.
   Call batch(const std::string& list, const std::vector<std::string>& options = {}) const {
     writeFile(folder_ / "list", list);
     Call call{.words = {"build", "--batch", "list", "-o", "fields"}, .folder = folder_.path()};
@@ -139,7 +133,7 @@ class Batches : public testing::Test {
     return call;
   }
 
-  /// What a construction by itself gives.
+  /// Returns the bytes of the field that a single construction gives.
   std::string loneBytes(const std::string& surface, const std::vector<std::string>& options) const {
     Call call{.words = {"build", surface, "-o", "lone.hpsdf"}, .folder = folder_.path()};
     call.words.insert(call.words.end(), options.begin(), options.end());
@@ -148,7 +142,7 @@ class Batches : public testing::Test {
     return readFile(folder_ / "lone.hpsdf");
   }
 
-  /// Without what the batch keeps for itself.
+  /// Returns the names of the fields, without the batch's own folder.
   std::set<std::string> fieldNames() const {
     std::set<std::string> names = namesIn(fields());
     EXPECT_EQ(names.erase(".batch"), 1u);
@@ -175,7 +169,7 @@ std::vector<std::string> coarseAnd(const std::vector<std::string>& more) {
   return options;
 }
 
-TEST_F(Batches, aBadMeshDoesNotStopTheOthers) {
+TEST_F(Batches, badMeshDoesNotStopTheOthers) {
   writeFile(folder_ / "t.obj", tetrahedron(1));
   writeFile(folder_ / "bad.obj", "this is no mesh\n");
   const Outcome outcome = run(batch("t.obj\nbad.obj\nbuiltin:tours\n# no mesh\nanalytic:sphere\n", kCoarse));
@@ -196,7 +190,7 @@ TEST_F(Batches, aBadMeshDoesNotStopTheOthers) {
   EXPECT_TRUE(lines[1].at("leaves").is_null());
   EXPECT_TRUE(lines[3].at("sign").is_null()) << "no mesh, no way to find its sign";
   EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: error: 2 of 4: bad.obj: "));
-  EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: error: 3 of 4: shape 'builtin:tours': there is no shape"));
+  EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: error: 3 of 4: builtin:tours: there is no shape"));
   EXPECT_THAT(outcome.err, HasSubstr("\n4 of 4: analytic:sphere: built, "));
   EXPECT_THAT(outcome.err, EndsWith("hpsdf: error: list: 2 of 4 meshes failed; the lines above say why\n"));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf", nameOf("t.obj") + ".hpsdf"));
@@ -204,7 +198,7 @@ TEST_F(Batches, aBadMeshDoesNotStopTheOthers) {
     EXPECT_TRUE(readFile(fieldOf(surface)) == loneBytes(surface, kCoarse)) << surface;
 }
 
-TEST_F(Batches, whatIsFinishedIsSkipped) {
+TEST_F(Batches, finishedFieldsAreSkipped) {
   writeFile(folder_ / "t.obj", tetrahedron(1));
   const Call call = batch("t.obj\nbuiltin:box\nanalytic:box\n", coarseAnd({"--normalize"}));
   ASSERT_EQ(run(call).status, 0);
@@ -220,25 +214,25 @@ TEST_F(Batches, whatIsFinishedIsSkipped) {
   for (const auto& entry : fs::recursive_directory_iterator(fields()))
     EXPECT_EQ(entry.last_write_time(), written.at(entry.path())) << entry.path();
   EXPECT_TRUE(readFile(fieldOf("t.obj")) == before);
-  // neither threads nor what else is in the list, nor a checkpoint, makes another field
+  // The field depends neither on threads nor on the rest of the list nor on checkpoints.
   EXPECT_THAT(
       statusesOf(run(batch("builtin:box\nt.obj", coarseAnd({"--normalize", "--threads", "1", "--checkpoint"})))),
       ElementsAre("skipped", "skipped"));
 }
 
-TEST_F(Batches, whatHasChangedIsBuiltAnew) {
+TEST_F(Batches, changedMeshesAndOptionsAreBuiltAgain) {
   writeFile(folder_ / "t.obj", tetrahedron(1));
   writeFile(folder_ / "other.obj", tetrahedron(1));
   const std::string list = "t.obj\nother.obj\n";
   const auto statuses = [&](const std::vector<std::string>& options) { return statusesOf(run(batch(list, options))); };
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
-  // the mesh, its size and its time as before
+  // The mesh changes; its size and its time stay.
   const auto time = fs::last_write_time(folder_ / "t.obj");
   writeFile(folder_ / "t.obj", tetrahedron(2));
   fs::last_write_time(folder_ / "t.obj", time);
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "skipped"));
   EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", kCoarse));
-  // options
+  // An option changes.
   for (const char* option : {"--bounds", "--normalize"}) {
     EXPECT_THAT(statuses(coarseAnd({option})), ElementsAre("built", "built")) << option;
     EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", coarseAnd({option})));
@@ -248,13 +242,13 @@ TEST_F(Batches, whatHasChangedIsBuiltAnew) {
       << "the default, which is not what --paper takes";
   EXPECT_THAT(statuses(coarseAnd({"--paper", "--quadrature", "3"})), ElementsAre("skipped", "skipped"));
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
-  // a mesh that is gone: its field stays
+  // The mesh is removed; its field stays.
   fs::remove(folder_ / "t.obj");
   EXPECT_THAT(statuses(kCoarse), ElementsAre("failed", "skipped"));
   EXPECT_TRUE(fs::exists(fieldOf("t.obj")));
 }
 
-TEST_F(Batches, whatIsDamagedIsBuiltAnew) {
+TEST_F(Batches, damagedFieldsAreBuiltAgain) {
   const std::string list = "builtin:box\nbuiltin:box,width=1\n";
   const Call call = batch(list, kCoarse);
   ASSERT_EQ(run(call).status, 0);
@@ -270,16 +264,16 @@ TEST_F(Batches, whatIsDamagedIsBuiltAnew) {
     EXPECT_THAT(statusesOf(outcome), ElementsAre("built", "skipped"));
     EXPECT_TRUE(readFile(field) == good);
     if (bytes == flipped) {
-      EXPECT_THAT(outcome.err, AllOf(HasSubstr("hpsdf: note: "), HasSubstr("; building it anew\n")));
+      EXPECT_THAT(outcome.err, AllOf(HasSubstr("hpsdf: note: "), HasSubstr("; building it again\n")));
     }
   }
-  // without what tells of which options it is
+  // The record of the options is missing.
   fs::remove(fields() / ".batch" / (nameOf("builtin:box") + ".json"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "skipped"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
 }
 
-/// The binary kind of a glTF file: its header, JSON and the first buffer as chunks.
+/// Returns a binary glTF file: its header, and JSON and the first buffer as chunks.
 std::string binaryGltf(std::string json, const std::string& buffer) {
   const auto words = [](const std::vector<std::uint32_t>& numbers) {
     return std::string(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof numbers[0]);
@@ -290,8 +284,8 @@ std::string binaryGltf(std::string json, const std::string& buffer) {
          words({bufferSize, 0x004e4942}) + buffer;
 }
 
-/// The files themselves stay the same.
-TEST_F(Batches, whatAGltfFileNamesCounts) {
+/// The glTF files stay the same while the files to which they refer change.
+TEST_F(Batches, filesOfAGltfFileCount) {
   const auto corners = [&](float height) {
     const std::array<float, 12> numbers = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, height};
     writeFile(folder_ / "t.bin", {reinterpret_cast<const char*>(numbers.data()), sizeof numbers});
@@ -317,8 +311,8 @@ TEST_F(Batches, whatAGltfFileNamesCounts) {
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "built"));
 }
 
-/// One that is built, with a word about its sign, one that is no mesh and one that is not there.
-TEST_F(Batches, namesMoveNoCursor) {
+/// The list names an open mesh, whose inside test is reported, a file that is not a mesh, and a missing file.
+TEST_F(Batches, controlCharactersInNamesAreNotPrinted) {
   const std::string open = tetrahedron(1).substr(0, tetrahedron(1).rfind("f ")), clear = "\x1b[2J";
   writeFile(folder_ / (clear + "open.obj"), open);
   writeFile(folder_ / (clear + "bad.obj"), "this is no mesh\n");
@@ -332,14 +326,14 @@ TEST_F(Batches, namesMoveNoCursor) {
   EXPECT_EQ(linesOf(outcome)[0].at("file"), clear + "open.obj") << "as the list has it";
 }
 
-TEST_F(Batches, listsMayBeTyped) {
+TEST_F(Batches, listsAreReadFromStandardInput) {
   Call call{.words = {"build", "--batch", "-", "-o", at("fields"), "--json"}, .input = "builtin:box\n"};
   call.words.insert(call.words.end(), kCoarse.begin(), kCoarse.end());
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf("builtin:box") + ".hpsdf"));
 }
 
-TEST_F(Batches, scriptsTakeThem) {
+TEST_F(Batches, scriptsBuildBatches) {
   writeFile(folder_ / "list", "builtin:box\nmissing.obj\n");
   const Outcome outcome = run(
       {.words = {"run", "-e", "build batch=list output=fields target-error=1e-3 grid=2"}, .folder = folder_.path()});
@@ -367,15 +361,15 @@ TEST_F(Batches, mistakesAreRefusedBeforeWork) {
   expectRefused(call, "fields: cannot make this folder (");
 }
 
-TEST_F(Batches, listsThatAreNoTextAreRefused) {
+TEST_F(Batches, listsThatAreNotTextAreRefused) {
   expectRefused({{"build", "--batch", "/dev/zero", "-o", at("fields")}}, "/dev/zero: is a device");
   const Call call = batch("builtin:box\n");
   fs::resize_file(folder_ / "list", kMostTextBytes + 1);
   expectRefused(call, "list: is longer than 67108864 bytes");
 }
 
-/// Before the mesh is read, which would take its time and fail, too.
-TEST_F(Batches, whatCannotBeWrittenIsNotBuilt) {
+/// The error appears before the mesh is read, which would take time and fail too.
+TEST_F(Batches, unwritableFieldsAreNotBuilt) {
   const auto errorOf = [&](const char* surface) {
     const Outcome outcome = run(batch(surface, kCoarse));
     EXPECT_EQ(outcome.status, 3);
@@ -384,7 +378,7 @@ TEST_F(Batches, whatCannotBeWrittenIsNotBuilt) {
   };
   fs::create_directories(fieldOf("none.obj"));
   EXPECT_THAT(errorOf("none.obj"), EndsWith(".hpsdf: is a folder; give a file name"));
-  // in place of the mark, which is to be removed, or to be written
+  // A folder replaces the mark, which can be neither removed nor written then.
   const fs::path mark = fields() / ".batch" / (nameOf("analytic:box") + ".begun");
   fs::create_directories(mark / "full");
   EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
@@ -396,7 +390,7 @@ TEST_F(Batches, whatCannotBeWrittenIsNotBuilt) {
                                          "permissions");
 }
 
-TEST_F(Batches, aReaderThatGoesEndsTheWork) {
+TEST_F(Batches, closedStandardOutputEndsTheWork) {
   Call call = batch("builtin:box\nbuiltin:gear\n", kCoarse);
   call.stdoutClosed = true;
   const Outcome outcome = run(call);
@@ -406,7 +400,7 @@ TEST_F(Batches, aReaderThatGoesEndsTheWork) {
   EXPECT_THAT(fieldNames(), SizeIs(1));
 }
 
-TEST_F(Batches, anInterruptLeavesWhatIsDone) {
+TEST_F(Batches, interruptKeepsFinishedFields) {
   const std::string list = "analytic:sphere\nbuiltin:gear\nbuiltin:box\n";
   Process process(batch(list, {"--target-error", "1e-10"}));
   process.waitForLines(1);
@@ -414,15 +408,13 @@ TEST_F(Batches, anInterruptLeavesWhatIsDone) {
   const Outcome outcome = process.finish();
   EXPECT_EQ(outcome.status, 130);
   EXPECT_THAT(statusesOf(outcome), ElementsAre("built"));
-  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; 1 of 3 meshes were done and stay; the same command goes on with "
-                                    "the others\n"));
+  EXPECT_THAT(outcome.err,
+              EndsWith("hpsdf: cancelled; 1 of 3 meshes are finished and kept; the same command continues with "
+                       "the others\n"));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf"));
 }
 
-// ---------------------------------------------------------------------------------------------------------------------
-// Several processes
-
-/// Whether a process has taken some mesh of the folder.
+/// True where a process holds the lock of some mesh of the folder.
 bool isAtWork(const fs::path& fields) {
   const int file = open((fields / ".batch" / "claims").c_str(), O_RDWR | O_CLOEXEC);
   if (file < 0) return false;
@@ -434,10 +426,10 @@ bool isAtWork(const fs::path& fields) {
   return range.l_type != F_UNLCK;
 }
 
-/// The one has a mesh and is made to stand still; the other waits for it.
+/// The first process holds a mesh and is stopped; the second one waits for it.
 class TwoProcesses : public Batches {
  protected:
-  /// Takes some tenths of a second.
+  /// A mesh whose construction takes some tenths of a second.
   const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
   const std::string kShape = "builtin:gear";
 
@@ -452,7 +444,7 @@ class TwoProcesses : public Batches {
   std::unique_ptr<Process> first_, second_;
 };
 
-TEST_F(TwoProcesses, theOneTakesOverFromTheOtherThatIsKilled) {
+TEST_F(TwoProcesses, survivorTakesOverFromAKilledProcess) {
   first_->send(SIGKILL);
   const Outcome outcome = second_->finish();
   EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -461,7 +453,7 @@ TEST_F(TwoProcesses, theOneTakesOverFromTheOtherThatIsKilled) {
   EXPECT_TRUE(readFile(fieldOf(kShape)) == loneBytes(kShape, kOptions));
 }
 
-TEST_F(TwoProcesses, theOneWaitsForTheOther) {
+TEST_F(TwoProcesses, oneWaitsForTheOther) {
   first_->send(SIGCONT);
   const Outcome outcome = second_->finish();
   EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -470,10 +462,10 @@ TEST_F(TwoProcesses, theOneWaitsForTheOther) {
   EXPECT_TRUE(fs::exists(fieldOf(kShape)));
 }
 
-/// The one is made to stand still in the middle of its work, without the lock on it.
+/// The first process is stopped in the middle of its work and has lost its lock.
 class LostLocks : public Batches {
  protected:
-  /// Takes some tenths of a second.
+  /// A mesh whose construction takes some tenths of a second.
   const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
   const std::string kShape = "builtin:gear";
 
@@ -484,7 +476,7 @@ class LostLocks : public Batches {
     fs::remove(fields() / ".batch" / "claims");
   }
 
-  /// What becomes of it when it goes on.
+  /// Returns the outcome of the first process after it continues.
   void expectGoesOn(const char* status) {
     process_->send(SIGCONT);
     const Outcome outcome = process_->finish();
@@ -496,33 +488,34 @@ class LostLocks : public Batches {
   std::unique_ptr<Process> process_;
 };
 
-TEST_F(LostLocks, whatTheOtherHasBuiltIsTaken) {
+TEST_F(LostLocks, fieldOfTheOtherProcessIsAccepted) {
   EXPECT_THAT(statusesOf(run(batch(kShape, kOptions))), ElementsAre("built"));
-  const rlimit none = {16, 16};  // bytes of a file: writing fails
+  const rlimit none = {16, 16};  // limits the size of files, so that writing fails
   ASSERT_EQ(prlimit(process_->id(), RLIMIT_FSIZE, &none, nullptr), 0);
   expectGoesOn("elsewhere");
 }
 
-TEST_F(LostLocks, whatWasSweptAwayIsWrittenAgain) {
-  // the first 100 names that it takes for a half-written field are those of others: the first writing fails
+TEST_F(LostLocks, removedFilesAreWrittenAgain) {
+  // Other files have the first 100 temporary names, so that the first attempt to write fails.
   for (int n = 0; n <= 100; ++n)
     writeFile(fmt::format("{}.part-{}-{}", fieldOf(kShape).string(), process_->id(), n), "");
   expectGoesOn("built");
 }
 
-TEST_F(TwoProcesses, whoWaitsCanBeInterrupted) {
+TEST_F(TwoProcesses, waitingProcessCanBeInterrupted) {
   second_->send(SIGINT);
   const Outcome outcome = second_->finish();
   EXPECT_EQ(outcome.status, 130);
-  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; 0 of 1 meshes were done and stay; the same command goes on with "
-                                    "the others\n"));
+  EXPECT_THAT(outcome.err,
+              EndsWith("hpsdf: cancelled; 0 of 1 meshes are finished and kept; the same command continues with "
+                       "the others\n"));
   EXPECT_THAT(outcome.out, IsEmpty());
   first_->send(SIGKILL);
   first_->finish();
 }
 
-/// What a killed process has left half-written or half-done is gone on with or swept away.
-TEST_F(Batches, aCheckpointIsTakenOver) {
+/// Checkpoints of a killed process are continued; its unfinished files are removed.
+TEST_F(Batches, checkpointIsTakenOver) {
   const std::string shape = "builtin:gear";
   const auto options = [](const char* target) {
     return std::vector<std::string>{"--target-error", target, "--checkpoint", "--checkpoint-seconds", "0"};
@@ -536,7 +529,7 @@ TEST_F(Batches, aCheckpointIsTakenOver) {
     ASSERT_FALSE(fs::exists(fieldOf(shape)));
   };
   kill();
-  // nobody else is at work on it, though a process of that number runs here: the writer's machine was another
+  // A process of this number runs here, but the writer ran on another machine: nobody is building the mesh.
   for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome other = run(batch(shape, options("1e-3")));
   EXPECT_EQ(other.status, 3);
@@ -548,8 +541,8 @@ TEST_F(Batches, aCheckpointIsTakenOver) {
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
 }
 
-/// Which takes long where many fields are.
-TEST_F(Batches, theFolderIsLookedThroughAfterADeathAlone) {
+/// Searching a folder of many fields takes long.
+TEST_F(Batches, folderIsSearchedOnlyAfterAProcessDied) {
   const std::string shape = "analytic:box";
   const fs::path mark = fields() / ".batch" / (nameOf(shape) + ".begun"), half = fieldOf(shape).string() + ".part-1-0";
   fs::create_directories(mark.parent_path());
@@ -563,8 +556,8 @@ TEST_F(Batches, theFolderIsLookedThroughAfterADeathAlone) {
   EXPECT_FALSE(fs::exists(mark));
 }
 
-/// Kept by a process that was killed: neither does it stay for ever, nor does it stop a later one.
-TEST_F(Batches, aCheckpointGoesWhenTheFieldIsThere) {
+/// A checkpoint of a killed process neither stays forever nor stops a later construction.
+TEST_F(Batches, checkpointIsRemovedWithTheFieldFinished) {
   const std::string shape = "analytic:box";
   const fs::path state = fieldOf(shape).string() + ".checkpoint";
   fs::create_directory(fields());
@@ -588,7 +581,7 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
 
   std::vector<std::unique_ptr<Process>> processes;
   processes.push_back(std::make_unique<Process>(call));
-  processes[0]->waitForLines(1);  // alone, it has built that one
+  processes[0]->waitForLines(1);  // the first process alone has built this field
   for (int i = 1; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
   processes[0]->waitForLines(2);
   processes[0]->send(SIGKILL);
@@ -608,7 +601,7 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
     }
   }
   EXPECT_GE(builtByVictim, 1) << "it was in the middle of its work";
-  // killed after a field was whole and before it could say so: then nobody tells of that one
+  // Nobody reports a field whose process was killed after writing it and before reporting it.
   EXPECT_GE(timesBuilt.size(), std::size_t{kShapes - 1});
   for (const auto& [shape, times] : timesBuilt) EXPECT_EQ(times, 1) << shape;
   EXPECT_THAT(fieldNames(), SizeIs(kShapes)) << "and nothing half-written";

@@ -1,4 +1,4 @@
-// `hpsdf check` and `hpsdf accept` on folders made here: each kind of failure must be found, and told from the others.
+// Tests `hpsdf check` and `hpsdf accept` on small folders: each kind of failure must be found and named.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ void writeFile(const fs::path& file, const std::string& text) {
 const std::string kBuild = "build analytic:sphere target-error=1e-2 grid=2\n";
 const std::string kLook = "slice cpu=true size=96x64 ";
 
-/// Whether each element is closed where it should be.
+/// True if the elements of an XML or HTML text are closed in the right order.
 bool isWellFormed(const std::string& xml) {
   static const std::regex tag(R"(<(/?)([a-z]+)((?:\s+[a-z]+="[^"<>]*")*)\s*(/?)>)");
   std::vector<std::string> open;
@@ -60,7 +60,7 @@ bool isWellFormed(const std::string& xml) {
   return open.empty() && rest.starts_with("<?xml ") && std::ranges::count(rest, '<') == 1;
 }
 
-/// A folder with the script `looks`, and its results beside it.
+/// A folder with the script `looks`, and a folder for its results.
 class Check : public testing::Test {
  protected:
   void script(const std::string& text, const std::string& name = "looks") {
@@ -76,7 +76,7 @@ class Check : public testing::Test {
     words.insert(words.end(), names.begin(), names.end());
     return runHere(words);
   }
-  /// "SCRIPT/PICTURE: RESULT", in order; a control's picture with a !.
+  /// The lines "SCRIPT/PICTURE: RESULT" in order; a ! marks the picture of a negative control.
   std::vector<std::string> results(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"--json"};
     words.insert(words.end(), more.begin(), more.end());
@@ -87,7 +87,7 @@ class Check : public testing::Test {
                       (item.at("control_line").is_null() ? "" : "!") + ": " + item.at("result").get<std::string>());
     return found;
   }
-  /// Runs the script once and takes its pictures.
+  /// Runs the script once and accepts its pictures.
   void take(const std::vector<std::string>& names) const {
     EXPECT_EQ(check().status, 1);
     const Outcome accepted = accept(names);
@@ -129,7 +129,7 @@ TEST_F(Check, aWrongPictureIsShownWithItsDifference) {
                             HasSubstr("--only looks"), HasSubstr("hpsdf accept")));
 }
 
-TEST_F(Check, thePageNeedsNothingButItself) {
+TEST_F(Check, thePageNeedsNoOtherFile) {
   script(kBuild + kLook + "output=$out/a.png\n" + kLook + "output=\"$out/<b>&.png\"\n", "a&b");
   take({"a&b/a.png", "a&b/<b>&.png"});
   script(kBuild + kLook + "offset=0.2 output=$out/a.png\n" + kLook + "offset=0.2 output=\"$out/<b>&.png\"\n", "a&b");
@@ -232,7 +232,7 @@ TEST_F(Check, controlsOfIncludedScriptsAreComments) {
   EXPECT_THAT(results(), ElementsAre("looks/a.png: ok", "looks/b.png: ok", "looks/a.png!: ok", "looks/b.png!: ok"));
 }
 
-TEST_F(Check, acceptTakesWhatIsNamedAndNothingElse) {
+TEST_F(Check, acceptTakesOnlyNamedPictures) {
   script(kBuild + kLook + "output=$out/a.png\n" + kLook + "output=$out/b.png\n");
   EXPECT_EQ(check().status, 1);
   EXPECT_THAT(accept({"looks/a.pgn"}).err, HasSubstr("did you mean 'looks/a.png'?"));
@@ -306,7 +306,7 @@ TEST_F(Check, badCallsAreRefused) {
   writeFile(folder_ / "mine/thesis.txt", "years of work");
   const Outcome mine = runHere({"check", pictures_, "--out", folder_ / "mine"});
   EXPECT_EQ(mine.status, 2);
-  EXPECT_THAT(mine.err, HasSubstr("holds other things"));
+  EXPECT_THAT(mine.err, HasSubstr("holds files that are not earlier results"));
   EXPECT_EQ(readFile(folder_ / "mine/thesis.txt"), "years of work");
   EXPECT_EQ(runHere({"check", pictures_, "--out", folder_ / "mine/thesis.txt"}).status, 2);
 
@@ -315,7 +315,7 @@ TEST_F(Check, badCallsAreRefused) {
   EXPECT_THAT(runHere({"accept", folder_ / "other", "looks/a.png", "--from", results_}).err, HasSubstr("a check of"));
 }
 
-TEST_F(Check, noPictureAndNoScriptIsPassedOverInSilence) {
+TEST_F(Check, everyScriptAndPictureIsReported) {
   script(kBuild + kLook + "output=$out/a.PNG\nslice cpu=true size=20x20 output=$out/v.CSV\n");
   script(kBuild, "quiet");
   EXPECT_THAT(results(), ElementsAre("looks/a.PNG: no baseline", "looks/v.CSV: no baseline", "quiet/: ok"));
@@ -324,15 +324,13 @@ TEST_F(Check, noPictureAndNoScriptIsPassedOverInSilence) {
   EXPECT_EQ(check().status, 0);
 }
 
-TEST_F(Check, nothingOfAnEarlierCheckStays) {
+TEST_F(Check, resultsOfAnEarlierCheckAreRemoved) {
   script(kBuild + kLook + "output=$out/a.png\n" + kLook + "output=$out/b.png\n");
   take({"looks/a.png", "looks/b.png"});
   script(kBuild + kLook + "output=$out/a.png\n");
   EXPECT_THAT(results(), ElementsAre("looks/a.png: ok", "looks/b.png: no picture"));
   EXPECT_THAT(accept({"looks/b.png"}).err, HasSubstr("wrote no picture 'looks/b.png'"));
 }
-
-// Raw values
 
 TEST(DataTable, valuesWithinTheBoundAgree) {
   const DataTable table{.columns = 2, .rows = 2, .values = {1, 2, 3, 4}};
@@ -351,7 +349,7 @@ TEST(DataTable, valuesWithinTheBoundAgree) {
   EXPECT_NE(problem(compare(table, other, 1e-6), 1e-6, 1), "");
 }
 
-TEST(DataTable, noNumberAgreesWithNoNumberOnly) {
+TEST(DataTable, nanAgreesWithNanOnly) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const DataTable table{.columns = 1, .rows = 2, .values = {nan, 1}};
   EXPECT_EQ(compare(table, table, 0).differing, 0u);
@@ -378,9 +376,7 @@ TEST(DataTable, brokenFilesAreRefusedByName) {
   EXPECT_EQ(table.values[2], -2e3);
 }
 
-// XML
-
-TEST(JUnit, whatXmlCannotHoldIsReplaced) {
+TEST(JUnit, invalidXmlCharactersAreReplaced) {
   CheckOutcome outcome;
   CheckedItem item{
       .script = "a", .picture = "b\x01\xff.png", .verdict = Verdict::differs, .problem = "x < \"y\" & z\n"};

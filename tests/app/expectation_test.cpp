@@ -23,7 +23,7 @@ std::string refusal(std::string_view text) {
   return {};
 }
 
-TEST(Expectation, IsReadWithOrWithoutBlanks) {
+TEST(Expectation, isReadWithOrWithoutBlanks) {
   for (const char* text : {"pick(640,360).gradient.1 <= -2.5e-3", "pick( 640 , 360 ) . gradient . 1<=-2.5e-3"}) {
     const Expectation e = parseExpectation(text);
     EXPECT_EQ(e.source, "pick");
@@ -35,7 +35,7 @@ TEST(Expectation, IsReadWithOrWithoutBlanks) {
   EXPECT_EQ(parseExpectation("stats.leaves == 4 within 0.5").tolerance, 0.5);
 }
 
-TEST(Expectation, ComparesAsItSays) {
+TEST(Expectation, comparesByItsOperator) {
   const auto holds = [](std::string_view text, double found) { return parseExpectation(text).holds(found); };
   EXPECT_TRUE(holds("stats.leaves < 3", 2));
   EXPECT_FALSE(holds("stats.leaves < 3", 3));
@@ -56,9 +56,9 @@ TEST(Expectation, ComparesAsItSays) {
     EXPECT_FALSE(holds(text, nan)) << text;
 }
 
-TEST(Expectation, MistakesAreNamed) {
+TEST(Expectation, mistakesAreNamed) {
   EXPECT_THAT(refusal("stat.leaves < 3"), HasSubstr("did you mean 'stats'?"));
-  EXPECT_THAT(refusal("weather.rain < 3"), HasSubstr("there are stats, jumps, pick(x,y), at(x,y,z)"));
+  EXPECT_THAT(refusal("weather.rain < 3"), HasSubstr("expected stats, jumps, pick(x,y), at(x,y,z)"));
   EXPECT_THAT(refusal("stats < 3"), HasSubstr("stats.NAME"));
   EXPECT_THAT(refusal("stats. < 3"), HasSubstr("a name after the point"));
   EXPECT_THAT(refusal("stats.leaves 3"), HasSubstr("expected =="));

@@ -1,4 +1,4 @@
-// The explorer without a window: what its commands, its widgets and its mouse do to what it shows.
+// Tests the explorer without a window: the effects of its commands, widgets and mouse on its state and pictures.
 
 #include "explorer/explorer.h"
 
@@ -24,7 +24,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// A session of its own, without a terminal.
+/// An explorer with a session of its own and no terminal.
 struct Bench {
   Registry registry = makeRegistry();
   std::istringstream in;
@@ -74,7 +74,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
   EXPECT_TRUE(same(other.explorer().frame(), bench.explorer().frame()));
   EXPECT_FALSE(same(other.explorer().frame(), before));
 
-  // whatever was shown before
+  // The lines set every part of the state, so that the state before does not matter.
   other.run(
       "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
   other.run(script);
@@ -100,14 +100,14 @@ TEST(Explorer, defectsOfTheMeshAreMarked) {
   EXPECT_THAT(bench.failure("surface defects=own"), HasSubstr("an analytic shape has no mesh"));
 }
 
-TEST(Explorer, whatIsShownIsUndoneAndDoneAgainStepByStep) {
+TEST(Explorer, undoAndRedoChangeTheStateStepByStep) {
   Bench bench;
   bench.run(kTorus);
   const ViewState first = bench.view();
   bench.run("show slice");
   const ViewState second = bench.view();
   bench.run("color depth");
-  bench.run("color depth");  // changes nothing, and is no step
+  bench.run("color depth");  // changes nothing, so that it adds no step to the history
   bench.run("undo");
   EXPECT_TRUE(bench.view() == second);
   bench.run("undo");
@@ -116,11 +116,11 @@ TEST(Explorer, whatIsShownIsUndoneAndDoneAgainStepByStep) {
   EXPECT_TRUE(bench.view() == second);
   bench.run("show surface");
   EXPECT_THAT(bench.failure("redo"), HasSubstr("nothing to redo"));
-  bench.run("undo; undo");  // but not the size
+  bench.run("undo; undo");  // undo never changes the frame's size
   EXPECT_THAT(bench.failure("undo"), HasSubstr("test:1:1: there is nothing to undo"));
 }
 
-TEST(Explorer, whatTheMouseDoesInOneGoIsOneStep) {
+TEST(Explorer, undoTakesBackAWholeGesture) {
   Bench bench;
   bench.run(kTorus);
   const ViewState before = bench.view();
@@ -164,7 +164,7 @@ TEST(Explorer, aPointStaysUnderTheMouseThatDragsIt) {
     const auto after = render::pickAt(bench.session.current().field, *bench.explorer().picture(),
                                       int(x - canvas.x0) + 32, int(y - canvas.y0) - 80 + 48);
     ASSERT_TRUE(before && after) << view;
-    // of a surface in perspective, points away from the target's plane move by a little more or less
+    // In perspective, points that are not in the target's plane move by slightly more or less than the mouse.
     EXPECT_LT((before->position - after->position).norm(), slice ? 0.004 : 0.1) << view;
   }
 }
@@ -196,12 +196,12 @@ TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
   bench.run("ui key z control=true");
   EXPECT_FALSE(bench.view().sliceTarget);
   bench.run("panel view=false; ui type build/target-error 1e-3; ui click build/rebuild");
-  EXPECT_EQ(bench.session.current().field.metadata().targetError, 1e-3);
+  EXPECT_EQ(bench.session.current().field.metadata().settings.targetError.weighted(), 1e-3);
   EXPECT_THAT(bench.failure("ui type build/target-error abc; ui click build/rebuild"),
               HasSubstr("target-error: expected a number"));
 }
 
-TEST(Explorer, widgetsThatAreNotThereOrTakeNoInputAreErrors) {
+TEST(Explorer, missingAndDisabledWidgetsAreErrors) {
   Bench bench;
   EXPECT_THAT(bench.failure("ui click bar/slice"), HasSubstr("no field"));
   bench.run(kTorus);
@@ -216,7 +216,7 @@ TEST(Explorer, widgetsThatAreNotThereOrTakeNoInputAreErrors) {
   EXPECT_THAT(bench.failure("ui key entr"), HasSubstr("did you mean 'enter'?"));
 }
 
-TEST(Explorer, theReadoutIsWhatQueriesSay) {
+TEST(Explorer, theReadoutAgreesWithQueries) {
   Bench bench;
   bench.run(std::string(kTorus) + "show slice; ui hover canvas");
   bench.explorer().frame();
@@ -230,7 +230,7 @@ TEST(Explorer, theReadoutIsWhatQueriesSay) {
   EXPECT_NEAR(readout->pick.value, readout->value, 1e-5);
   ASSERT_TRUE(readout->exact);
   EXPECT_NEAR(*readout->exact, 0.7 - 0.3, 0.01) << "in the middle of the torus";
-  // the nearest face by all its interfaces' corners: none of the cell's faces is nearer
+  // No interface of the cell is nearer than the one that the readout names.
   const Cell cell = field.cellAt(x);
   double nearest = 1e30;
   for (int axis = 0; axis < 3; ++axis)
@@ -241,7 +241,7 @@ TEST(Explorer, theReadoutIsWhatQueriesSay) {
   EXPECT_FALSE(bench.explorer().readout()) << "over a panel";
 }
 
-TEST(Explorer, picksOfAShotAreWhatTheFieldSays) {
+TEST(Explorer, picksOfAShotAgreeWithTheField) {
   HPSDF_REQUIRE_GL();
   Bench bench;
   const support::TemporaryDirectory folder;
@@ -268,7 +268,7 @@ TEST(Explorer, picksOfAShotAreWhatTheFieldSays) {
   bench.run("expect pick(450,200).jump.value < 1");
 }
 
-/// Where the middle of the explorer's picture is, of the surface or of a slice, after a script.
+/// The point in the middle of the explorer's picture after a script.
 std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, const std::string& script) {
   bench.run(kTorus + ("show " + kind + "; " + script));
   bench.explorer().frame();
@@ -299,16 +299,16 @@ TEST(Explorer, flyingToAPointPutsItInTheMiddle) {
   EXPECT_THAT(bench.failure("fly"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
 }
 
-TEST(Explorer, aRebuildLeavesOutWhatTheContinuityNoLongerTakes) {
+TEST(Explorer, aRebuildDropsParametersOfAnotherContinuity) {
   Bench bench;
   bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
   bench.run("settings continuity=weak ; rebuild");
   EXPECT_EQ(bench.session.current().field.data().blend, 0);
-  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0.5);
+  EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, 0.5);
   bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
   bench.run("settings continuity=exact ; rebuild");
   EXPECT_EQ(bench.session.current().field.data().blend, 0.1);
-  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0);
+  EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, std::nullopt);
 }
 
 TEST(Explorer, aRebuildUnchangedIsTheSameField) {
@@ -339,11 +339,11 @@ TEST(Explorer, aRebuildKeepsContinuity) {
   bench.run("rebuild");
   const Field& again = bench.session.current().field;
   EXPECT_EQ(again.data().coefficients, before.coefficients);
-  EXPECT_TRUE(again.metadata().enriched);
-  EXPECT_EQ(again.metadata().continuityWeight, 0.5);
+  EXPECT_TRUE(again.metadata().settings.enrich);
+  EXPECT_EQ(again.metadata().settings.continuityWeight, 0.5);
   bench.run("settings continuity=none enrich=false ; rebuild");
-  EXPECT_FALSE(bench.session.current().field.metadata().enriched);
-  EXPECT_EQ(bench.session.current().field.metadata().continuityWeight, 0);
+  EXPECT_FALSE(bench.session.current().field.metadata().settings.enrich);
+  EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, std::nullopt);
 }
 
 TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
@@ -358,21 +358,21 @@ TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   bench.run("ui click build/continuity ; ui click build/continuity/both");
   bench.run("ui type build/continuity-weight 0.7 ; ui type build/blend-width 0.1 ; ui click build/bounds");
   bench.run("ui click build/rebuild");
-  EXPECT_EQ(current().metadata().criterion, Criterion::optimal);
-  EXPECT_EQ(current().metadata().estimator, Estimator::residual);
-  EXPECT_EQ(current().metadata().continuityWeight, 0.7);
+  EXPECT_EQ(current().metadata().settings.criterion, Criterion::optimal);
+  EXPECT_EQ(current().metadata().settings.estimator, Estimator::residual);
+  EXPECT_EQ(current().metadata().settings.continuityWeight, 0.7);
   EXPECT_EQ(current().data().blend, 0.1);
   EXPECT_FALSE(current().data().bounds.empty());
-  // a weight that was set does not stand in the way of doing without
+  // A weight that was set earlier is ignored without weak continuity.
   bench.run("ui click build/continuity ; ui click build/continuity/none ; ui click build/bounds");
   EXPECT_FALSE(offers("build/continuity-weight"));
   EXPECT_FALSE(offers("build/blend-width"));
   bench.run("ui click build/rebuild");
-  EXPECT_EQ(current().metadata().continuityWeight, 0);
+  EXPECT_EQ(current().metadata().settings.continuityWeight, std::nullopt);
   EXPECT_EQ(current().data().blend, 0);
   EXPECT_TRUE(current().data().bounds.empty());
-  EXPECT_EQ(current().metadata().criterion, Criterion::optimal);
-  // shown as the field has them
+  EXPECT_EQ(current().metadata().settings.criterion, Criterion::optimal);
+  // The panel shows the parameters of the current field.
   bench.run("build analytic:torus target-error=1e-2 continuity=exact blend-width=0.05 bounds=true");
   EXPECT_TRUE(offers("build/blend-width"));
   EXPECT_FALSE(offers("build/continuity-weight"));
@@ -381,7 +381,7 @@ TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   EXPECT_FALSE(current().data().bounds.empty());
 }
 
-TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
+TEST(Explorer, aFieldBesideHasTheSameView) {
   Bench bench;
   const support::TemporaryDirectory folder;
   const std::string same = folder / "same.hpsdf", coarse = folder / "coarse.hpsdf";
@@ -390,7 +390,7 @@ TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
   const auto halves = [&] {
     const render::Image frame = bench.explorer().frame();
     std::size_t differing = 0;
-    for (int y = 40; y < frame.height; ++y)  // below the names
+    for (int y = 40; y < frame.height; ++y)  // below the names of the fields
       for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
     return differing;
   };
@@ -414,7 +414,7 @@ TEST(Explorer, aFieldBesideIsSeenInTheSameWay) {
   EXPECT_GT(halves(), 1000u) << "one picture over the whole width";
 }
 
-TEST(Explorer, aFieldBesideAndOneThatItDiffersFromMayBeTwo) {
+TEST(Explorer, theFieldBesideMayDifferFromTheFieldOfColorDifference) {
   Bench bench;
   const support::TemporaryDirectory folder;
   const std::string twin = folder / "twin.hpsdf", sphere = folder / "sphere.hpsdf";
@@ -425,13 +425,13 @@ TEST(Explorer, aFieldBesideAndOneThatItDiffersFromMayBeTwo) {
     bench.run(view);
     const render::Image frame = bench.explorer().frame();
     std::size_t differing = 0;
-    for (int y = 40; y < frame.height; ++y)  // below the names
+    for (int y = 40; y < frame.height; ++y)  // below the names of the fields
       for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
     EXPECT_EQ(differing, 0u) << "left the field, right its twin, both against the sphere";
   }
 }
 
-TEST(Explorer, aFileBesideThatIsWrittenAnewIsReadAnew) {
+TEST(Explorer, aChangedFileBesideIsReadAgain) {
   Bench bench;
   const support::TemporaryDirectory folder;
   const std::string other = folder / "other.hpsdf";
@@ -444,10 +444,10 @@ TEST(Explorer, aFileBesideThatIsWrittenAnewIsReadAnew) {
   EXPECT_FALSE(same(bench.explorer().frame(), before));
   std::filesystem::remove(other);
   bench.run("color depth");
-  bench.explorer().frame();  // of what was read
+  bench.explorer().frame();  // draws the file as it was read first
 }
 
-TEST(Explorer, whatCannotBeDrawnIsSaidAndTakenBack) {
+TEST(Explorer, aViewThatCannotBeDrawnIsReportedAndUndone) {
   Bench bench;
   const support::TemporaryDirectory folder;
   const std::string thin = folder / "thin.hpsdf";
@@ -463,7 +463,7 @@ TEST(Explorer, whatCannotBeDrawnIsSaidAndTakenBack) {
   EXPECT_TRUE(same(bench.explorer().picture()->image, before));
 }
 
-TEST(Explorer, panelsGiveWhatAPictureLacks) {
+TEST(Explorer, panelsSetTheFileThatAPictureNeeds) {
   Bench bench;
   const support::TemporaryDirectory folder;
   const std::string mesh = folder / "corner.obj", file = folder / "corner.hpsdf";
@@ -494,7 +494,7 @@ TEST(Explorer, aCopiedViewForgetsFilesThatItDoesNotName) {
   EXPECT_TRUE(bench.view() == wanted) << scriptOf(bench.view());
 }
 
-TEST(Explorer, commandsOfAScriptAreStepsThoughAFieldIsBeingEdited) {
+TEST(Explorer, scriptLinesAreStepsWhileATextFieldIsEdited) {
   Bench bench;
   bench.run(std::string(kTorus) + "show size=1280x720; ui click build/mesh; show slice");
   const ViewState slice = bench.view();
@@ -527,7 +527,7 @@ TEST(Explorer, aFrameThatFailsIsEnded) {
   EXPECT_TRUE(same(painted(), before));
 }
 
-TEST(Explorer, whatIsTypedIsCheckedByTheCommand) {
+TEST(Explorer, typedTextIsCheckedByTheCommand) {
   Bench bench;
   bench.run(std::string(kTorus) + "show slice size=1280x720; color slope range=0.5,2");
   EXPECT_THAT(bench.failure("ui type view/low abc"), HasSubstr("range: expected"));
@@ -565,7 +565,7 @@ TEST(Explorer, framesAreTheSameOnAGraphicsDevice) {
   EXPECT_LT(differing, cpu.pixels.size() / 500);
 }
 
-/// Adds a command of its own: a polygon as a fan of triangles.
+/// Adds a polygon as a fan of triangles, in a draw command of its own.
 void addFan(ImDrawList& list, const std::vector<ImVec2>& corners, ImU32 color, const ImVec4& clip) {
   ImDrawCmd command;
   command.ClipRect = clip;
@@ -581,7 +581,7 @@ void addFan(ImDrawList& list, const std::vector<ImVec2>& corners, ImU32 color, c
 
 TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
   ImDrawList list(nullptr);
-  // half transparent: a pixel drawn twice would be too dark
+  // The colour is half transparent, so that a pixel that is drawn twice is too dark.
   addFan(list, {{4, 4}, {60, 4}, {60, 60}, {4, 60}}, IM_COL32(0, 0, 0, 128), {0, 0, 64, 64});
   addFan(list, {{1, 1}, {20, 1}, {20, 20}}, IM_COL32(255, 0, 0, 255), {0, 0, 10, 64});
   ImDrawList* lists[] = {&list};
@@ -594,8 +594,8 @@ TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
       const bool inSquare = x >= 4 && x < 60 && y >= 4 && y < 60;
-      const bool inTriangle = x >= 1 && x < 10 && y >= 1 && y < x;  // below its slope, before the clip
-      if (y == x && x < 10) continue;                               // through the centres: either is right
+      const bool inTriangle = x >= 1 && x < 10 && y >= 1 && y < x;  // below the diagonal and within the clip rectangle
+      if (y == x && x < 10) continue;  // the edge passes through these centres, so that both results are right
       const render::Color expected = inTriangle ? render::Color{255, 0, 0}
                                      : inSquare ? render::Color{100, 100, 100}
                                                 : render::Color{200, 200, 200};

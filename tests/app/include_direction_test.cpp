@@ -1,4 +1,5 @@
-// Reads the #include lines of every room and fails on one that runs against core → render → app, core → physics → app.
+// Reads the #include lines of every room and holds them against the tables of docs/design.md: which room may know
+// which, which folder of a room may know which, and that neither folders nor units include each other in a circle.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,8 +7,11 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <optional>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -19,6 +23,8 @@ namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
 constexpr std::array<std::string_view, 4> kRooms = {"core", "render", "physics", "app"};
+constexpr std::size_t kMostFilesInFolder = 20;
+constexpr std::size_t kMostFilesInAppItself = 4;
 
 bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end(), name) != kRooms.end(); }
 
@@ -48,8 +54,8 @@ std::vector<std::string> parts(const fs::path& path) {
 fs::path target(const fs::path& file, const std::string& include) {
   const auto names = parts(include);
   if (names[0] == "hpsdf") {
-    const bool ofOtherRoom = names.size() > 2 && isRoom(names[1]);
-    return fs::path(ofOtherRoom ? names[1] : "core") / "include" / include;
+    const bool isOfAnotherRoom = names.size() > 2 && isRoom(names[1]);
+    return fs::path(isOfAnotherRoom ? names[1] : "core") / "include" / include;
   }
   if (names[0] == "..") return (file.parent_path() / include).lexically_normal();
   if (isRoom(names[0])) return include;
@@ -57,10 +63,10 @@ fs::path target(const fs::path& file, const std::string& include) {
 }
 
 bool isStandardOrEigen(const std::string& include) {
-  const auto isPlain = [](char c) {
+  const auto isInStandardName = [](char c) {
     return std::islower(static_cast<unsigned char>(c)) || std::isdigit(c) || c == '_';
   };
-  return include.starts_with("Eigen/") || std::all_of(include.begin(), include.end(), isPlain);
+  return include.starts_with("Eigen/") || std::all_of(include.begin(), include.end(), isInStandardName);
 }
 
 bool isGraphics(const std::string& include) {
@@ -70,7 +76,7 @@ bool isGraphics(const std::string& include) {
                      [&](std::string_view name) { return include.starts_with(name); });
 }
 
-/// What is wrong with an include of `file` (relative to the repository, in a room); empty if nothing.
+/// The fault of an include of `file` (relative to the repository, in a room); empty if there is none.
 std::string fault(const fs::path& file, const Include& include) {
   const std::string room = *parts(file).begin();
   const bool isPublic = parts(file).at(1) == "include";
@@ -87,17 +93,21 @@ std::string fault(const fs::path& file, const Include& include) {
   return {};
 }
 
+/// Calls `visit(line number, include)` for each #include line of a text.
+void forEachInclude(const std::string& text, const std::function<void(int, const Include&)>& visit) {
+  std::istringstream stream(text);
+  std::string line;
+  for (int number = 1; std::getline(stream, line); ++number)
+    if (const auto include = parseInclude(line)) visit(number, *include);
+}
+
 /// The faults of a file's text, a line each: "path:line: include: fault".
 Lines faults(const fs::path& file, const std::string& text) {
   Lines result;
-  std::istringstream stream(text);
-  std::string line;
-  for (int number = 1; std::getline(stream, line); ++number) {
-    const auto include = parseInclude(line);
-    if (!include) continue;
-    if (const std::string what = fault(file, *include); !what.empty())
-      result.push_back(file.string() + ":" + std::to_string(number) + ": " + include->path + ": " + what);
-  }
+  forEachInclude(text, [&](int number, const Include& include) {
+    if (const std::string found = fault(file, include); !found.empty())
+      result.push_back(file.string() + ":" + std::to_string(number) + ": " + include.path + ": " + found);
+  });
   return result;
 }
 
@@ -121,16 +131,214 @@ std::string read(const fs::path& file) {
   return text.str();
 }
 
+/// Files by their paths relative to the repository, with their texts.
+using Sources = std::map<fs::path, std::string>;
+
+Sources readSources(const fs::path& root) {
+  Sources sources;
+  for (const fs::path& file : sourceFiles(root)) sources[file] = read(root / file);
+  return sources;
+}
+
+/// A row of the folder tables of docs/design.md.
+struct Folder {
+  std::set<std::string> mayInclude;  ///< folders of the same room, as in the table
+  std::set<std::string> headers;     ///< public headers that have no .cpp and belong to this folder
+};
+using Folders = std::map<std::string, Folder>;
+
+/// The words of a table's cell that stand in backticks.
+std::set<std::string> quotedWords(const std::string& cell) {
+  static const std::regex word("`([^`]+)`");
+  std::set<std::string> words;
+  for (std::sregex_iterator at(cell.begin(), cell.end(), word), end; at != end; ++at) words.insert((*at)[1]);
+  return words;
+}
+
+/// Rows "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
+Folders parseFolders(const std::string& design) {
+  static const std::regex row(R"(^\| `((?:core|render|physics|app)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+  Folders folders;
+  std::istringstream stream(design);
+  std::string line;
+  while (std::getline(stream, line)) {
+    std::smatch match;
+    if (std::regex_match(line, match, row)) folders[match[1]] = {quotedWords(match[3]), quotedWords(match[4])};
+  }
+  return folders;
+}
+
+/// Units: a header and the .cpp of the same name in the same room are one, named after the .cpp without its extension.
+class Units {
+ public:
+  Units(const Sources& sources, const Folders& folders) : folders_(folders) {
+    for (const auto& [file, text] : sources)
+      if (file.extension() == ".cpp") implementations_[{*file.begin(), file.stem()}] = withoutExtension(file);
+  }
+
+  std::string unitOf(const fs::path& file) const {
+    fs::path bare = withoutExtension(file);
+    if (bare.filename().string().ends_with("-inl")) bare = bare.string().substr(0, bare.string().size() - 4);
+    if (!isInInterface(file)) return bare.string();
+    const auto found = implementations_.find({*file.begin(), bare.filename()});
+    return (found == implementations_.end() ? bare : found->second).string();
+  }
+
+  /// The folder that a unit belongs to; empty for a public header that neither has a .cpp nor stands in the tables.
+  std::string folderOf(const fs::path& file) const {
+    const fs::path unit = unitOf(file);
+    if (!isInInterface(unit)) return unit.parent_path().string();
+    for (const auto& [name, folder] : folders_)
+      if (name.starts_with((*file.begin()).string() + "/") && folder.headers.contains(file.filename().string()))
+        return name;
+    return {};
+  }
+
+ private:
+  static fs::path withoutExtension(fs::path file) { return file.replace_extension(); }
+  static bool isInInterface(const fs::path& file) { return file.string().find("/include/") != std::string::npos; }
+
+  const Folders& folders_;
+  std::map<std::pair<fs::path, fs::path>, fs::path> implementations_;
+};
+
+using Graph = std::map<std::string, std::set<std::string>>;
+
+/// A circle of the graph as "a -> b -> a"; empty if there is none. Depth-first search.
+std::string findCircle(const Graph& graph) {
+  std::set<std::string> finished;
+  Lines path;
+  std::string circle;
+  const std::function<bool(const std::string&)> visit = [&](const std::string& node) {
+    if (finished.contains(node)) return false;
+    if (const auto open = std::find(path.begin(), path.end(), node); open != path.end()) {
+      for (auto at = open; at != path.end(); ++at) circle += *at + " -> ";
+      circle += node;
+      return true;
+    }
+    path.push_back(node);
+    if (const auto edges = graph.find(node); edges != graph.end())
+      for (const std::string& next : edges->second)
+        if (visit(next)) return true;
+    path.pop_back();
+    finished.insert(node);
+    return false;
+  };
+  for (const auto& [node, edges] : graph)
+    if (visit(node)) break;
+  return circle;
+}
+
+/// The umbrella header includes all public headers, and nothing of ours includes it.
+bool isUmbrella(const fs::path& file) { return file.filename() == "hpsdf.h"; }
+
+/// Which faults the structure of these sources has, held against the tables.
+Lines structureFaults(const Sources& sources, const Folders& folders) {
+  Lines result;
+  const Units units(sources, folders);
+  Graph unitGraph, folderGraph;
+  for (const auto& [file, text] : sources) {
+    if (isUmbrella(file)) continue;
+    const std::string folder = units.folderOf(file);
+    if (!folders.contains(folder)) result.push_back(file.string() + ": belongs to no folder of docs/design.md");
+    forEachInclude(text, [&](int number, const Include& include) {
+      const fs::path included = target(file, include.path);
+      if (!sources.contains(included)) return;
+      if (units.unitOf(included) != units.unitOf(file)) unitGraph[units.unitOf(file)].insert(units.unitOf(included));
+      const std::string other = units.folderOf(included);
+      if (other == folder || *included.begin() != *file.begin()) return;
+      folderGraph[folder].insert(other);
+      const auto known = folders.find(folder);
+      if (known != folders.end() && !known->second.mayInclude.contains(other))
+        result.push_back(file.string() + ":" + std::to_string(number) + ": " + folder + " must not know " + other);
+    });
+  }
+  if (const std::string circle = findCircle(unitGraph); !circle.empty()) result.push_back("circle of units: " + circle);
+  if (const std::string circle = findCircle(folderGraph); !circle.empty())
+    result.push_back("circle of folders: " + circle);
+  return result;
+}
+
+/// Folders with more files than a reader takes in at a glance.
+Lines crowdedFolders(const Sources& sources) {
+  std::map<std::string, std::size_t> counts;
+  for (const auto& [file, text] : sources) ++counts[file.parent_path().string()];
+  Lines result;
+  for (const auto& [folder, count] : counts)
+    if (count > (folder == "app/src" ? kMostFilesInAppItself : kMostFilesInFolder))
+      result.push_back(folder + ": " + std::to_string(count) + " files");
+  return result;
+}
+
 TEST(IncludeDirection, runsOneWayInEveryRoom) {
   const fs::path root = HPSDF_SOURCE_DIR;
-  const auto files = sourceFiles(root);
+  const Sources sources = readSources(root);
   std::size_t seen = 0;
-  for (const fs::path& file : files) {
-    const std::string text = read(root / file);
+  for (const auto& [file, text] : sources) {
     seen += text.find("#include") != std::string::npos ? 1 : 0;
     for (const std::string& line : faults(file, text)) ADD_FAILURE() << line;
   }
-  EXPECT_GT(seen, 20u) << "of " << files.size() << " files: the rooms were not found under " << root;
+  EXPECT_GT(seen, 20u) << "of " << sources.size() << " files: the rooms were not found under " << root;
+}
+
+TEST(IncludeDirection, followsTheTablesOfTheDesign) {
+  const fs::path root = HPSDF_SOURCE_DIR;
+  const Folders folders = parseFolders(read(root / "docs/design.md"));
+  EXPECT_GT(folders.size(), 20u) << "the tables of docs/design.md were not found";
+  for (const auto& [name, folder] : folders) EXPECT_TRUE(fs::is_directory(root / name)) << name;
+  for (const std::string& line : structureFaults(readSources(root), folders)) ADD_FAILURE() << line;
+}
+
+TEST(IncludeDirection, findsNoCrowdedFolder) {
+  for (const std::string& line : crowdedFolders(readSources(HPSDF_SOURCE_DIR))) ADD_FAILURE() << line;
+}
+
+TEST(IncludeDirection, noticesACrowdedFolder) {
+  Sources sources;
+  for (std::size_t i = 0; i < kMostFilesInAppItself; ++i) sources["app/src/" + std::to_string(i) + ".h"];
+  EXPECT_EQ(crowdedFolders(sources), Lines{});
+  sources["app/src/one_more.h"];
+  EXPECT_EQ(crowdedFolders(sources).size(), 1u);
+}
+
+constexpr const char* kSampleTables =
+    "| folder | contents | may include | headers |\n"
+    "|---|---|---|---|\n"
+    "| `core/src/util` | vectors | – | `types.h` |\n"
+    "| `core/src/mesh` | meshes | `core/src/util` | – |\n";
+
+TEST(IncludeDirection, readsTheTables) {
+  const Folders folders = parseFolders(kSampleTables);
+  ASSERT_EQ(folders.size(), 2u);
+  EXPECT_EQ(folders.at("core/src/util").headers, std::set<std::string>{"types.h"});
+  EXPECT_EQ(folders.at("core/src/mesh").mayInclude, std::set<std::string>{"core/src/util"});
+}
+
+TEST(IncludeDirection, acceptsASoundStructure) {
+  const Sources sources = {{"core/include/hpsdf/types.h", "#include <Eigen/Core>\n"},
+                           {"core/include/hpsdf/mesh.h", "#include \"hpsdf/types.h\"\n"},
+                           {"core/src/mesh/mesh.cpp", "#include \"hpsdf/mesh.h\"\n#include \"mesh/parts.h\"\n"},
+                           {"core/src/mesh/parts.h", "#include \"hpsdf/mesh.h\"\n"}};
+  Sources sound = sources;
+  sound["core/src/mesh/mesh.cpp"] = "#include \"hpsdf/mesh.h\"\n";
+  EXPECT_EQ(structureFaults(sound, parseFolders(kSampleTables)), Lines{});
+  // mesh.cpp and mesh.h are one unit, which parts.h must not be included by and include
+  EXPECT_EQ(structureFaults(sources, parseFolders(kSampleTables)),
+            Lines{"circle of units: core/src/mesh/mesh -> core/src/mesh/parts -> core/src/mesh/mesh"});
+}
+
+TEST(IncludeDirection, noticesFoldersThatKnowEachOther) {
+  const Sources sources = {{"core/src/util/vector.h", "#include \"mesh/mesh.h\"\n"},
+                           {"core/src/mesh/mesh.h", ""},
+                           {"core/src/mesh/parts.h", "#include \"util/vector.h\"\n"}};
+  EXPECT_EQ(structureFaults(sources, parseFolders(kSampleTables)),
+            (Lines{"core/src/util/vector.h:1: core/src/util must not know core/src/mesh",
+                   "circle of folders: core/src/mesh -> core/src/util -> core/src/mesh"}));
+}
+
+TEST(IncludeDirection, noticesAFolderThatNoTableHas) {
+  EXPECT_EQ(structureFaults({{"core/src/other/x.h", ""}}, parseFolders(kSampleTables)),
+            Lines{"core/src/other/x.h: belongs to no folder of docs/design.md"});
 }
 
 struct Sample {
@@ -138,7 +346,7 @@ struct Sample {
   const char* text;
 };
 
-TEST(IncludeDirection, acceptsWhatRunsTheRightWay) {
+TEST(IncludeDirection, acceptsIncludesInTheRightDirection) {
   const Sample samples[] = {
       {"core/src/field/build/build.cpp",
        "#include \"hpsdf/build.h\"\n#include \"basis/legendre.h\"\n#include <tbb/task_group.h>"},
@@ -155,7 +363,7 @@ TEST(IncludeDirection, acceptsWhatRunsTheRightWay) {
     EXPECT_EQ(faults(sample.file, sample.text), Lines{}) << sample.file << "\n" << sample.text;
 }
 
-TEST(IncludeDirection, refusesWhatRunsTheWrongWay) {
+TEST(IncludeDirection, refusesIncludesInTheWrongDirection) {
   const Sample samples[] = {
       {"core/src/field/build/build.cpp", "#include \"hpsdf/render/view.h\""},
       {"core/src/field/build/build.cpp", "#include <hpsdf/render/view.h>"},
@@ -182,7 +390,7 @@ TEST(IncludeDirection, refusesForeignHeadersInPublicOnes) {
       {"render/include/hpsdf/render/renderer.h", "#include <epoxy/gl.h>"},
       {"render/include/hpsdf/render/image.h", "#include <stb_image.h>"},
       {"physics/include/hpsdf/physics/contacts.h", "#include <tbb/parallel_for.h>"},
-      {"physics/include/hpsdf/physics/contacts.h", "#include \"sphere_tree.h\""},
+      {"physics/include/hpsdf/physics/contacts.h", "#include \"rigid_transform.h\""},
   };
   for (const Sample& sample : samples)
     EXPECT_EQ(faults(sample.file, sample.text).size(), 1u) << sample.file << "\n" << sample.text;

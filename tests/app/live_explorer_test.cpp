@@ -1,5 +1,5 @@
-// The explorer as a window leads it, without a window: recordings do again what was done, long work can be watched and
-// cancelled.
+// Tests the explorer as the window uses it, but without a window: recordings repeat a session, and long work shows its
+// progress and can be cancelled.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -60,14 +60,14 @@ class Desk {
   Session session_{registry_, {in_, out_, err_}};
 };
 
-/// What the states before look like, the last first.
+/// The scripts of the present state and all states before, the most recent first. Undoes every change.
 std::vector<std::string> history(Explorer& explorer) {
   std::vector<std::string> states = {scriptOf(explorer.view())};
   while (explorer.undo()) states.push_back(scriptOf(explorer.view()));
   return states;
 }
 
-TEST(Recording, holdsOneLineAGesture) {
+TEST(Recording, holdsOneLinePerGesture) {
   Desk desk;
   Recording recording(desk.explorer(), {});
   desk.explorer().run(kFirst);
@@ -78,13 +78,13 @@ TEST(Recording, holdsOneLineAGesture) {
   EXPECT_EQ(recording.lines(), 2u) << recording.script();
   desk.press(1);
   desk.move(470, 300);
-  desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});  // another kind of line within the gesture
+  desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});  // a line of another kind within the same gesture
   desk.move(480, 300);
   desk.release(1);
   EXPECT_EQ(recording.lines(), 5u) << recording.script();
 }
 
-TEST(Recording, anUndoTakesNoOthersPlace) {
+TEST(Recording, anUndoReplacesNoLine) {
   Desk desk;
   desk.run("camera 1,2,1 ; camera 3,4,1 ; camera 5,6,1");
   Recording recording(desk.explorer(), {});
@@ -117,7 +117,7 @@ TEST(Recording, theFramesSizeIsNotUndone) {
   EXPECT_FALSE(desk.explorer().canUndo());
 }
 
-/// Something that a person might do.
+/// Moves the mouse to a random widget and uses it.
 void doAnything(Desk& desk, std::mt19937& random) {
   const auto below = [&](int n) { return int(random() % unsigned(n)); };
   std::vector<std::string> targets;
@@ -156,7 +156,7 @@ void doAnything(Desk& desk, std::mt19937& random) {
   }
 }
 
-TEST(Recording, whateverIsDoneReplaysToTheSameFrameAndHistory) {
+TEST(Recording, randomInputReplaysToTheSameFrameAndHistory) {
   std::size_t lines = 0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -166,13 +166,13 @@ TEST(Recording, whateverIsDoneReplaysToTheSameFrameAndHistory) {
     std::mt19937 random(seed);
     for (int i = 0; i < 60; ++i) try {
         doAnything(desk, random);
-      } catch (const Error&) {  // a value out of range: the window tells and goes on
+      } catch (const Error&) {  // a value out of range, which a window shows as an error
       }
-    desk.explorer().letGo();
+    desk.explorer().releaseInput();
     for (bool drawn = false; !drawn;) try {
         desk.explorer().frame();
         drawn = true;
-      } catch (const Error&) {  // of a plane beside the domain
+      } catch (const Error&) {  // a plane outside of the domain cannot be drawn
         desk.explorer().run("undo");
       }
     desk.explorer().message.clear();
@@ -185,7 +185,7 @@ TEST(Recording, whateverIsDoneReplaysToTheSameFrameAndHistory) {
     EXPECT_EQ(history(desk.explorer()), history(again.explorer())) << recording.script();
     lines += recording.lines();
   }
-  EXPECT_GT(lines, 100u);  // or nothing was put to the test
+  EXPECT_GT(lines, 100u);  // otherwise the test has tested nothing
 }
 
 TEST(Recording, anotherScriptGivesAnotherFrame) {
@@ -202,7 +202,7 @@ TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
   desk.click("view/low");
   desk.type("many");
   EXPECT_THROW(desk.key(Key::enter), Error);
-  desk.explorer().letGo();
+  desk.explorer().releaseInput();
   EXPECT_NO_THROW(desk.explorer().frame());
 }
 
@@ -224,7 +224,7 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
       for (const auto& [path, widget] : widgets)
         EXPECT_EQ(widget.enabled, path == "build/cancel" || path == "canvas") << path;
       furthest = std::max(furthest, explorer.work->fraction);
-      // other widgets do nothing
+      // No other widget may have an effect during the work.
       const ViewState before = explorer.view();
       desk.click("bar/slice");
       desk.moveTo("canvas");
@@ -242,18 +242,18 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
   EXPECT_TRUE(desk.explorer().widgets().contains("build/rebuild"));
 }
 
-TEST(LiveWork, escapeCancelsWhereThePanelIsClosed) {
+TEST(LiveWork, escapeCancelsWhileThePanelIsClosed) {
   Desk desk;
   desk.run(std::string(kFirst) + "\npanel all=false\nsettings target-error=1e-30");
   desk.explorer().frame();
   LiveWork work(desk.explorer(), [&] { desk.key(Key::escape); });
   EXPECT_THROW(desk.explorer().run("rebuild"), Cancelled);
-  // and the next construction runs to its end
+  // The next construction runs to its end.
   desk.run("settings target-error=1e-3");
   EXPECT_NO_THROW(desk.explorer().run("rebuild"));
 }
 
-TEST(LiveWork, whatAFrameNeedsCannotBeCancelled) {
+TEST(LiveWork, measurementsForAFrameCannotBeCancelled) {
   Desk desk;
   desk.run(kFirst);
   desk.explorer().frame();

@@ -66,7 +66,7 @@ ImportedMesh tetrahedron() {
   return {std::move(mesh),
           {.vertices = 4,
            .faces = 4,
-           .parts = 1,
+           .components = 1,
            .boundaryEdges = 2,
            .nonManifoldEdges = 3,
            .inconsistentEdges = 5,
@@ -78,7 +78,7 @@ ImportedMesh tetrahedron() {
            .duplicateFaces = 10,
            .degeneratePosition = {12, 13, 14},
            .duplicatePosition = {15, 16, 17},
-           .turned = true,
+           .reversed = true,
            .volume = 2.5,
            .area = 12.5,
            .box = Box(Vector3(5, 6, 0), Vector3(6, 8, 7))}};
@@ -108,7 +108,7 @@ TEST(MeshReplies, bringAMeshAndAllOfItsReport) {
   EXPECT_EQ(mesh.triangles, sent.mesh.triangles);
   EXPECT_EQ(report.vertices, 4u);
   EXPECT_EQ(report.faces, 4u);
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
   EXPECT_EQ(report.boundaryEdges, 2u);
   EXPECT_EQ(report.nonManifoldEdges, 3u);
   EXPECT_EQ(report.inconsistentEdges, 5u);
@@ -120,7 +120,7 @@ TEST(MeshReplies, bringAMeshAndAllOfItsReport) {
   EXPECT_EQ(report.degenerateFaces, 8u);
   EXPECT_EQ(report.flippedFaces, 9u);
   EXPECT_EQ(report.duplicateFaces, 10u);
-  EXPECT_TRUE(report.turned);
+  EXPECT_TRUE(report.reversed);
   EXPECT_EQ(report.volume, 2.5);
   EXPECT_EQ(report.area, 12.5);
   EXPECT_EQ(report.box.min(), sent.report.box.min());

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "commands/commands.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/render/picture.h"
@@ -60,12 +60,13 @@ TEST(Registry, everyCommandExplainsItself) {
       SCOPED_TRACE(parameter.name);
       EXPECT_TRUE(parameters.insert(parameter.name).second);
       EXPECT_FALSE(parameter.help.empty());
-      EXPECT_THAT(commandHelp(command), HasSubstr(parameter.positional ? parameter.valueName : "--" + parameter.name));
+      EXPECT_THAT(commandHelp(command, HelpDetail::all),
+                  HasSubstr(parameter.positional ? parameter.valueName : "--" + parameter.name));
     }
   }
 }
 
-TEST(Registry, holdsTheNamesToKeep) {
+TEST(Registry, keepsPublishedNames) {
   const Registry registry = makeRegistry();
   const std::vector<std::pair<std::string, std::vector<std::string>>> fixed = {
       {"build",
@@ -90,10 +91,10 @@ TEST(Registry, examplesAreValid) {
   std::size_t checked = 0;
   for (const Command& command : registry.commands())
     for (const std::string& example : command.examples) {
-      // a shell's quotes and pipes are not ours to read
+      // Examples with quotes and pipes need a shell.
       if (example.find_first_of("'|") != std::string::npos) continue;
       ++checked;
-      if (command.includesScript) {  // of a file that is not there
+      if (command.includesScript) {  // the example names a file that does not exist
         const auto words = wordsOf(example);
         EXPECT_NO_THROW(parseArguments(command, std::span(words).subspan(1), Origin::script)) << example;
         continue;
@@ -112,7 +113,7 @@ TEST(Registry, examplesAreValid) {
 }
 
 void expectEqual(const BuildOptions& a, const BuildOptions& b) {
-  EXPECT_EQ(a.targetError, b.targetError);
+  EXPECT_EQ(a.targetError.weighted(), b.targetError.weighted());
   EXPECT_EQ(a.grid, b.grid);
   EXPECT_EQ(a.nearness, b.nearness);
   EXPECT_EQ(a.maxDegree, b.maxDegree);
@@ -157,7 +158,7 @@ TEST(BuildArguments, allAreRead) {
                                                   "m.obj -o f --target-error 2.5e-7 --grid 3,4,5 --strategy h1 "
                                                   "--coefficients double --band 0.25 --cubature product "
                                                   "--threads 3 --max-steps 0"));
-  EXPECT_EQ(options.targetError, 2.5e-7);
+  EXPECT_EQ(options.targetError.weighted(), 2.5e-7);
   EXPECT_EQ(options.grid, (std::array<std::uint32_t, 3>{3, 4, 5}));
   EXPECT_EQ(options.strategy, Strategy::h1);
   EXPECT_EQ(options.coefficients, CoefficientType::float64);
@@ -165,6 +166,14 @@ TEST(BuildArguments, allAreRead) {
   EXPECT_EQ(options.cubature, CubatureKind::product);
   EXPECT_EQ(options.threads, 3);
   EXPECT_EQ(options.maxSteps, 0u);
+}
+
+TEST(BuildArguments, targetErrorAndErrorsByDistanceExcludeEachOther) {
+  const BuildOptions options = buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2"));
+  EXPECT_EQ(options.targetError.byDistance().near, 1e-3);
+  EXPECT_EQ(options.targetError.byDistance().far, 1e-2);
+  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2 --target-error 1e-5")),
+               Error);
 }
 
 /// Where nothing says how fine the field is to be, some memory must do.
@@ -182,7 +191,7 @@ TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   EXPECT_EQ(limit(" --memory-limit 3e9 --target-error 1e-6"), 3'000'000'000u);
 }
 
-TEST(BuildArguments, continuityIsRead) {
+TEST(BuildArguments, readContinuity) {
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none")).continuityWeight, std::nullopt);
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak")).continuityWeight, WeakContinuity{}.weight);
   const BuildOptions options =
@@ -192,7 +201,7 @@ TEST(BuildArguments, continuityIsRead) {
   EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --continuity-weight 7")), Error);
 }
 
-TEST(Arguments, bothOriginsReadTheSame) {
+TEST(Arguments, agreeForScriptsAndCommandLine) {
   const Registry registry = makeRegistry();
   const Command& command = registry.command("slice");
   const std::vector<Word> script = {{.text = "f.hpsdf", .column = 7},
@@ -241,7 +250,7 @@ struct Mistake {
   const char* message;
 };
 
-TEST(Arguments, mistakesSayWhatWasExpected) {
+TEST(Arguments, mistakesNameTheExpectedValue) {
   const Mistake mistakes[] = {
       {"build", "m -o f --target-error 0", "--target-error: expected a number above 0, found '0'"},
       {"build", "m -o f --target-error -1e-6", "expected a number above 0, found '-1e-6'"},
@@ -300,7 +309,7 @@ TEST(Arguments, cameraAndPlaneAreChecked) {
   EXPECT_THROW(slicePicture(parse("slice", "f -o x.png --plane 0,0,0,1,1,0 --axis x")), Error);
 }
 
-TEST(Arguments, picturesTakeThem) {
+TEST(Arguments, definePictures) {
   const auto slice =
       slicePicture(parse("slice", "f -o x.png --axis y --offset 0.5 --color distance --size 64x48 --samples 2"));
   ASSERT_TRUE(std::holds_alternative<render::AxisPlane>(slice.plane));
@@ -330,18 +339,40 @@ TEST(Registry, unknownCommandNamesTheNearest) {
   }
 }
 
-TEST(Registry, parametersNotInItAreAFault) {
+TEST(Registry, optionsHaveASecondSpelling) {
+  EXPECT_TRUE(parse("build", "m -o f --outer-hull").flag("hull"));
+  EXPECT_TRUE(parse("build", "m -o f --hull").flag("hull"));
+  const Registry registry = makeRegistry();
+  const auto script = parseScript(registry, "s", "build m output=f outer-hull=true", {});
+  EXPECT_TRUE(script.front().arguments.flag("hull"));
+  EXPECT_THAT(complaint("build", "m -o f --outer-hull --hull"), HasSubstr("given 2 times"));
+}
+
+TEST(Help, showsOptionsByGroupAndAdvancedOnesOnRequest) {
+  const Registry registry = makeRegistry();
+  const Command& build = registry.command("build");
+  const std::string common = commandHelp(build, HelpDetail::common), all = commandHelp(build, HelpDetail::all);
+  EXPECT_THAT(common, HasSubstr("\nWhat you ask for:\n  --target-error NUMBER\n"));
+  EXPECT_THAT(common, HasSubstr("--outer-hull"));
+  EXPECT_EQ(common.find("--nearness-kind"), std::string::npos);
+  EXPECT_THAT(common, HasSubstr("\n'hpsdf build --help-all' also explains "));
+  EXPECT_THAT(all, HasSubstr("--nearness-kind"));
+  EXPECT_EQ(all.find("--help-all"), std::string::npos);
+  EXPECT_LT(all.find("\nThe paper's settings:\n"), all.find("\nGeneral:\n"));
+}
+
+TEST(Registry, unknownParametersAreAFaultOfTheProgram) {
   EXPECT_THROW(parse("info", "f").text("no-such-parameter"), std::logic_error);
 }
 
-TEST(Documentation, commandsPageIsTheRegistrys) {
+TEST(Documentation, commandsPageIsUpToDate) {
   const auto page = std::filesystem::path(HPSDF_SOURCE_DIR) / "docs/commands.md";
   std::ifstream stream(page);
   ASSERT_TRUE(stream) << page;
   std::stringstream text;
   text << stream.rdbuf();
   EXPECT_TRUE(text.str() == commandsMarkdown(makeRegistry()))
-      << "docs/commands.md is not what the program prints; write it anew: hpsdf docs -o docs/commands.md";
+      << "docs/commands.md is not up to date; write it with: hpsdf docs -o docs/commands.md";
 }
 
 }  // namespace

@@ -18,10 +18,10 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A registry of two small commands that write down how they were called.
-class ScriptTest : public testing::Test {
+/// A registry of two small commands that record their arguments.
+class Script : public testing::Test {
  protected:
-  ScriptTest() {
+  Script() {
     registry_.add(
         {.name = "say",
          .parameters = {{.name = "words", .positional = true, .repeatable = true},
@@ -79,57 +79,57 @@ class ScriptTest : public testing::Test {
   std::vector<std::string> said_;
 };
 
-TEST_F(ScriptTest, readsLinesWordsAndComments) {
+TEST_F(Script, readsLinesWordsAndComments) {
   EXPECT_THAT(run("say a b\n\n  # nothing here\n\tsay c # and no more\r\nsay d#e"),
               ElementsAre("[a][b]", "[c]", "[d#e]"));
   EXPECT_THAT(run(""), ElementsAre());
   EXPECT_THAT(run(" \n;;\n# x"), ElementsAre());
 }
 
-TEST_F(ScriptTest, semicolonsSeparate) {
+TEST_F(Script, semicolonsSeparateCommands) {
   EXPECT_THAT(run("say a; say b;say c ;\nsay \"d;e\""), ElementsAre("[a]", "[b]", "[c]", "[d;e]"));
 }
 
-TEST_F(ScriptTest, parametersHaveThreeSpellings) {
+TEST_F(Script, parametersHaveThreeSpellings) {
   EXPECT_THAT(
       run("say a count=3 loud=true output=f\nsay a --count 3 --loud -o f\nsay --count=3 --loud=true --output=f a"),
       ElementsAre("LOUD[a]x3>f", "LOUD[a]x3>f", "LOUD[a]x3>f"));
 }
 
-TEST_F(ScriptTest, onlyAPlainNameBeforeTheEqualsIsAParameter) {
+TEST_F(Script, onlyANameBeforeTheEqualsSignIsAParameter) {
   EXPECT_THAT(run("say builtin:torus,major=0.7\nsay \"count=3\"\nsay \"count\"=3\nsay =3"),
               ElementsAre("[builtin:torus,major=0.7]", "[count=3]", "[count=3]", "[=3]"));
 }
 
-TEST_F(ScriptTest, quotesKeepBlanksAndEscapes) {
+TEST_F(Script, quotesKeepBlanksAndEscapes) {
   EXPECT_THAT(run(R"(say "a b" c" d"e output="x y.png"
 say "\"q\" \\ \n" back\slash)"),
               ElementsAre("[a b][c de]>x y.png", R"(["q" \ \n][back\slash])"));
 }
 
-TEST_F(ScriptTest, variablesAreReplacedAndStayOneWord) {
+TEST_F(Script, variablesAreReplacedAndStayOneWord) {
   const Variables variables = {{"mesh", "my mesh.obj"}, {"n", "3"}, {"trap", "count=2"}};
   EXPECT_THAT(run("say $mesh ${n}x$n \"<$mesh>\" $$n count=$n\nsay $trap", variables),
               ElementsAre("[my mesh.obj][3x3][<my mesh.obj>][$n]x3", "[count=2]"));
 }
 
-TEST_F(ScriptTest, setGivesVariablesToTheLinesBelow) {
+TEST_F(Script, setDefinesVariablesForTheLinesBelow) {
   EXPECT_THAT(run("say $n\nset n=2 other=\"a b\"\nsay $n $other\nset n=$n$n\nsay $n", {{"n", "1"}}),
               ElementsAre("[1]", "[2][a b]", "[22]"));
   EXPECT_THAT(complaint("set n=1 2nd=3"), HasSubstr("expected name=value, found '2nd=3'"));
 }
 
-TEST_F(ScriptTest, muchTextFromFewVariablesIsRefused) {
+TEST_F(Script, hugeExpansionsOfVariablesAreRefused) {
   const auto doubled = [](int times) {
     std::string text = "set a=0123456789\n";
     for (int n = 0; n < times; ++n) text += "set a=$a$a\n";
     return text;
   };
   EXPECT_EQ(complaint(doubled(19)), "no complaint");
-  EXPECT_THAT(complaint(doubled(60)), HasSubstr("variables make more than 16777216 characters"));
+  EXPECT_THAT(complaint(doubled(60)), HasSubstr("variables expand to more than 16777216 characters"));
 }
 
-TEST_F(ScriptTest, mistakesNameFileLineAndColumn) {
+TEST_F(Script, mistakesNameFileLineAndColumn) {
   EXPECT_EQ(complaint("say a\n  sya b"), "test.hps:2:3: unknown command 'sya'; did you mean 'say'?");
   EXPECT_EQ(complaint("say a\nsay b  coutn=2"), "test.hps:2:8: say: unknown option 'coutn'; did you mean 'count'?");
   EXPECT_EQ(complaint("say a; say b --coutn 2"), "test.hps:1:14: say: unknown option '--coutn'; did you mean 'count'?");
@@ -137,23 +137,23 @@ TEST_F(ScriptTest, mistakesNameFileLineAndColumn) {
   EXPECT_EQ(complaint("say a count="), "test.hps:1:7: count: needs a value");
   EXPECT_THAT(complaint("\n\nsay \"open\nsay b"), HasSubstr("test.hps:3:5: this quote is not closed"));
   EXPECT_THAT(complaint("say ä $x"), HasSubstr("test.hps:1:7: unknown variable $x"));
-  EXPECT_EQ(complaint("say $mseh", {{"mesh", "m"}}), "test.hps:1:5: unknown variable $mseh; did you mean $mesh?");
+  EXPECT_EQ(complaint("say $mseh", {{"mesh", "m"}}), "test.hps:1:5: unknown variable $mseh; did you mean '$mesh'?");
   EXPECT_THAT(complaint("say a$"), HasSubstr("test.hps:1:6: expected a variable's name"));
   EXPECT_THAT(complaint("say ${a", {{"a", "b"}}), HasSubstr("test.hps:1:5: expected }"));
 }
 
-TEST_F(ScriptTest, isCheckedWholeBeforeAnythingRuns) {
+TEST_F(Script, isCheckedCompletelyBeforeAnythingRuns) {
   EXPECT_THAT(complaint("say a\nsay count=0"), HasSubstr("test.hps:2:5"));
   EXPECT_THAT(said_, ElementsAre());
 }
 
-TEST_F(ScriptTest, stopsAtTheFirstCommandThatFails) {
+TEST_F(Script, stopsAtTheFirstCommandThatFails) {
   EXPECT_EQ(complaint("say a\n fail\nsay b"), "test.hps:2:2: it failed");
   EXPECT_THAT(said_, ElementsAre("[a]"));
 }
 
-/// Scripts in a folder that is not the current one.
-class IncludeTest : public ScriptTest {
+/// Scripts in a folder other than the current one.
+class Include : public Script {
  protected:
   std::string at(const std::string& name) const { return (folder_ / name).string(); }
 
@@ -165,22 +165,22 @@ class IncludeTest : public ScriptTest {
   support::TemporaryDirectory folder_;
 };
 
-TEST_F(IncludeTest, putsTheLinesOfAnotherScriptInItsPlace) {
-  write("b.hps", "say b $n\nset n=2 m=3");  // no newline at its end
+TEST_F(Include, insertsTheLinesOfAnotherScript) {
+  write("b.hps", "say b $n\nset n=2 m=3");  // the file does not end in a newline
   EXPECT_THAT(runNamed(at("a.hps"), "say a\nset n=1\ninclude b.hps; say c $n $m\ninclude b.hps"),
               ElementsAre("[a]", "[b][1]", "[c][2][3]", "[b][2]"));
   write("empty.hps", "# nothing\n");
   EXPECT_THAT(runNamed(at("a.hps"), "include empty.hps"), ElementsAre());
 }
 
-TEST_F(IncludeTest, looksBesideTheScriptThatIncludes) {
+TEST_F(Include, searchesBesideTheIncludingScript) {
   write("parts/b.hps", "include c.hps");
   write("parts/c.hps", "say c");
   EXPECT_THAT(runNamed(at("a.hps"), "include parts/b.hps"), ElementsAre("[c]"));
   EXPECT_THAT(run("include " + at("parts/b.hps")), ElementsAre("[c]"));
 }
 
-TEST_F(IncludeTest, mistakesNameTheIncludedFileAndWhoIncludedIt) {
+TEST_F(Include, mistakesNameTheIncludedAndTheIncludingFile) {
   write("b.hps", "say b\n  sya b");
   write("c.hps", "\ninclude b.hps");
   write("fails.hps", "say b\nfail");
@@ -199,7 +199,7 @@ TEST_F(IncludeTest, mistakesNameTheIncludedFileAndWhoIncludedIt) {
             at("a.hps") + ":2:1: unknown command 'sya'; did you mean 'say'?");
 }
 
-TEST_F(IncludeTest, scriptsThatIncludeThemselvesAreRefused) {
+TEST_F(Include, scriptsThatIncludeThemselvesAreRefused) {
   write("self.hps", "say a\n include self.hps");
   write("one.hps", "include two.hps");
   write("two.hps", "include ../" + folder_.path().filename().string() + "/one.hps");
@@ -208,7 +208,7 @@ TEST_F(IncludeTest, scriptsThatIncludeThemselvesAreRefused) {
   EXPECT_THAT(complaintNamed(at("one.hps"), "include two.hps"), HasSubstr("two.hps:1:1: "));
 }
 
-TEST_F(IncludeTest, includesGoSixteenScriptsDeep) {
+TEST_F(Include, sixteenLevelsOfIncludesAreAllowed) {
   for (int depth = 1; depth < 18; ++depth)
     write("d" + std::to_string(depth) + ".hps", "include d" + std::to_string(depth + 1) + ".hps");
   write("d18.hps", "say deep");
@@ -217,7 +217,7 @@ TEST_F(IncludeTest, includesGoSixteenScriptsDeep) {
   EXPECT_THAT(said_, ElementsAre("[deep]"));
 }
 
-TEST_F(IncludeTest, manyCommandsFromFewLinesAreRefused) {
+TEST_F(Include, hugeNumbersOfCommandsAreRefused) {
   for (int depth = 1; depth < 6; ++depth) {
     std::string ten;
     for (int n = 0; n < 10; ++n) ten += "include d" + std::to_string(depth + 1) + ".hps\n";
@@ -228,8 +228,8 @@ TEST_F(IncludeTest, manyCommandsFromFewLinesAreRefused) {
   EXPECT_EQ(complaintNamed(at("a.hps"), "include d2.hps"), "no complaint");
 }
 
-/// Cut short, a script or a list would be taken for a whole one.
-TEST_F(IncludeTest, filesAreReadToTheirEnd) {
+/// A truncated script or list would be taken for a complete one.
+TEST_F(Include, filesAreReadCompletely) {
   write("long", "");
   std::filesystem::resize_file(at("long"), kMostTextBytes + 1);
   const auto complaintOf = [](const std::string& file) {
@@ -244,15 +244,15 @@ TEST_F(IncludeTest, filesAreReadToTheirEnd) {
   std::filesystem::resize_file(at("long"), kMostTextBytes);
   EXPECT_EQ(complaintOf(at("long")), "no complaint");
   EXPECT_EQ(complaintOf("/dev/zero"), "/dev/zero: is a device; give a file");
-  // nothing of a process lies at address 0
+  // No memory is mapped at address 0 of a process.
   EXPECT_EQ(complaintOf("/proc/self/mem"), "/proc/self/mem: cannot be read to its end; check where it lies");
 }
 
-TEST_F(IncludeTest, devicesAreNotRead) {
+TEST_F(Include, devicesAreNotRead) {
   EXPECT_THAT(complaintNamed(at("a.hps"), "include /dev/zero"), HasSubstr("/dev/zero: is not a regular file"));
 }
 
-TEST_F(IncludeTest, includedCallsBelongToTheLineOfTheInclude) {
+TEST_F(Include, includedCallsBelongToTheLineOfTheInclude) {
   write("b.hps", "say 1\nsay 2\n");
   const auto calls = parseScript(registry_, at("a.hps"), "say a\n\ninclude b.hps\nsay c", {});
   std::vector<int> lines;

@@ -1,4 +1,4 @@
-// The scenes of `simulate`, in small.
+// Tests the scenes of `simulate` with few bodies and short durations.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ std::vector<std::string> inSmall(const std::string& scene, const std::string& ca
   return words;
 }
 
-TEST(Simulate, EverySceneKeepsItsBodiesAndEndsTheSameForAnyThreads) {
+TEST(Simulate, everySceneKeepsItsBodiesAndEndsTheSameForAnyThreads) {
   const support::TemporaryDirectory folder;
   for (const SceneKind& kind : scenes()) {
     std::vector<std::string> words = inSmall(kind.name, folder.path().string());
@@ -55,7 +55,7 @@ TEST(Simulate, EverySceneKeepsItsBodiesAndEndsTheSameForAnyThreads) {
   }
 }
 
-TEST(Simulate, TheSeedDecides) {
+TEST(Simulate, theSeedChangesTheState) {
   const support::TemporaryDirectory folder;
   std::vector<std::string> words = inSmall("poles", folder.path().string());
   words.insert(words.end(), {"--seconds", "0.5", "--json"});
@@ -69,7 +69,7 @@ TEST(Simulate, TheSeedDecides) {
   EXPECT_NE(state("1"), state("2"));
 }
 
-TEST(Simulate, AMarbleFollowsTheGrooveDownwards) {
+TEST(Simulate, aMarbleFollowsTheGrooveDownwards) {
   const support::TemporaryDirectory folder;
   const Outcome outcome = runHere({"simulate", "helix", "--ground", "builtin:helix-bowl,cells=48", "--seconds", "6",
                                    "--target-error", "1e-6", "--json"});
@@ -78,8 +78,6 @@ TEST(Simulate, AMarbleFollowsTheGrooveDownwards) {
   EXPECT_EQ(figures["lost"], 0);
   EXPECT_LT(figures["penetration"]["last_second"], 0.02 * figures["penetration"]["size"].get<double>());
 }
-
-// Pictures
 
 std::string readFile(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -91,7 +89,7 @@ std::vector<std::string> joined(std::vector<std::string> words, const std::vecto
   return words;
 }
 
-TEST(Simulate, AFilmShowsItAndChangesNothing) {
+TEST(Simulate, aFilmShowsItAndChangesNothing) {
   const support::TemporaryDirectory folder;
   const std::string cache = folder.path() / "cache";
   const auto at = [&](const std::string& name) { return (folder.path() / name).string(); };
@@ -119,7 +117,7 @@ TEST(Simulate, AFilmShowsItAndChangesNothing) {
     }
     EXPECT_EQ(different.size(), 7u) << "what moves is seen to move";
 
-    // on one thread, and the last frame alone
+    // A still of the last frame, simulated on one thread, has the same pixels.
     ASSERT_EQ(runHere(joined(joined(words, look), {"--fps", "8", "-o", at("again"), "--threads", "1"})).status, 0);
     for (int frame = 0; frame < 7; ++frame) {
       const std::string name = "/frame-000" + std::to_string(frame) + ".png";
@@ -133,7 +131,7 @@ TEST(Simulate, AFilmShowsItAndChangesNothing) {
   }
 }
 
-TEST(Simulate, AStillIsThePictureOfAScript) {
+TEST(Simulate, aStillIsThePictureOfAScript) {
   const support::TemporaryDirectory folder;
   const std::string still =
       "simulate helix ground=builtin:helix-bowl,cells=32 target-error=1e-4 seconds=0.1 cpu=true "
@@ -153,7 +151,7 @@ struct Impatient final : WorkListener {
   bool simulating = false;
 };
 
-TEST(Simulate, OneThatIsBrokenOffLeavesNoPictures) {
+TEST(Simulate, anInterruptedFilmLeavesNoPictures) {
   const support::TemporaryDirectory folder;
   const std::string output = folder.path() / "frames";
   Impatient listener;
@@ -179,7 +177,7 @@ TEST(Simulate, OneThatIsBrokenOffLeavesNoPictures) {
   EXPECT_FALSE(std::filesystem::exists(output));
 }
 
-/// A cube of this side around the origin; without its last two triangles it is open.
+/// A cube around the origin. It is open without its last two triangles.
 std::string cubeFile(const support::TemporaryDirectory& folder, const std::string& name, double side, bool open) {
   const std::string file = (folder / name).string();
   std::ofstream out(file);
@@ -191,7 +189,7 @@ std::string cubeFile(const support::TemporaryDirectory& folder, const std::strin
   return file;
 }
 
-TEST(Simulate, WhatFallsForeverOrDoesNotComeIsTold) {
+TEST(Simulate, lostAndWaitingBodiesAreReported) {
   const support::TemporaryDirectory folder;
   const auto figures = [&](std::vector<std::string> words) {
     words.push_back("--json");
@@ -199,7 +197,7 @@ TEST(Simulate, WhatFallsForeverOrDoesNotComeIsTold) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return Json::parse(outcome.out);
   };
-  // steps of a second, in which cloth passes the ground and its table
+  // With steps of one second the cloth passes through the ground and the table.
   std::vector<std::string> words = {"simulate",  "cloth", "--nodes",        "16",   "--rate",   "1",
                                     "--seconds", "20",    "--target-error", "1e-3", "--points", "100"};
   EXPECT_EQ(figures(words)["lost"], 1);
@@ -210,7 +208,7 @@ TEST(Simulate, WhatFallsForeverOrDoesNotComeIsTold) {
   EXPECT_THAT(runHere(words).out, HasSubstr("still to come       1 bodies"));
 }
 
-TEST(Simulate, ARunHasBodiesOfAllMeshes) {
+TEST(Simulate, aRunHasBodiesOfAllMeshes) {
   const support::TemporaryDirectory folder;
   const auto state = [&](const std::vector<std::string>& bodies) {
     std::vector<std::string> words = inSmall("run", folder.path().string());
@@ -221,7 +219,7 @@ TEST(Simulate, ARunHasBodiesOfAllMeshes) {
   EXPECT_NE(state({"builtin:torus"}), state({"builtin:torus", "builtin:gear"}));
 }
 
-TEST(Simulate, OpenMeshesAreWarnedOf) {
+TEST(Simulate, openMeshesCauseAWarning) {
   const support::TemporaryDirectory folder;
   const auto warning = [&](bool open) {
     const Outcome outcome = runHere({"simulate", "cloth", "--ground", cubeFile(folder, "cube.obj", 1, open), "--nodes",
@@ -240,11 +238,11 @@ void refused(const std::vector<std::string>& words, const std::string& message) 
   std::istringstream lines(outcome.err);
   int errors = 0;
   for (std::string line; std::getline(lines, line);)
-    if (line.find(" %, ") == std::string::npos) ++errors;  // others say how far it has come
+    if (line.find(" %, ") == std::string::npos) ++errors;  // lines with % report progress
   EXPECT_EQ(errors, 1) << outcome.err;
 }
 
-TEST(Simulate, ACacheHoldsWhatIsAskedForOrIsRefused) {
+TEST(Simulate, aCacheWithAnotherFieldIsRefused) {
   const support::TemporaryDirectory folder;
   const auto words = [&](const std::string& cache, const std::string& error) {
     return std::vector<std::string>{"simulate", "cloth", "--nodes", "16",  "--seconds",      "0.01",
@@ -255,7 +253,7 @@ TEST(Simulate, ACacheHoldsWhatIsAskedForOrIsRefused) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(cache)) files.push_back(entry.path());
   ASSERT_EQ(files.size(), 2u);  // ground and table
-  // another target error, however near, is another field
+  // Any other target error needs another field.
   ASSERT_EQ(runHere(words(cache, "1.0000001e-2")).status, 0);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(cache), {}), 4);
 
@@ -267,7 +265,7 @@ TEST(Simulate, ACacheHoldsWhatIsAskedForOrIsRefused) {
   const auto overwrite = std::filesystem::copy_options::overwrite_existing;
   std::filesystem::copy_file(files[1], files[0], overwrite);
   refused(words(cache, "1e-2"), files[0].string() + ": is the field of another mesh");
-  // of the same mesh, but coarser
+  // A coarser field of the same mesh is refused.
   const std::string coarse = (folder / "coarse").string();
   ASSERT_EQ(runHere(words(coarse, "1")).status, 0);
   const std::string print = files[0].filename().string().substr(0, 16);
@@ -277,11 +275,11 @@ TEST(Simulate, ACacheHoldsWhatIsAskedForOrIsRefused) {
   std::filesystem::copy_file(folder / "good", files[0], overwrite);
   EXPECT_EQ(runHere(words(cache, "1e-2")).status, 0);
 
-  refused(words((folder / "good").string(), "1e-2"), "good: is no folder for fields");
+  refused(words((folder / "good").string(), "1e-2"), "good: cannot be made a folder for fields");
   refused(words("/sys", "1e-2"), "cannot be written");
 }
 
-/// Ends the work as soon as it is at something.
+/// Cancels the work when it reports the given task.
 struct CancelsWhile final : WorkListener {
   explicit CancelsWhile(std::string of) : task(std::move(of)) {}
   void report(std::string_view now, double) override { reached = reached || now == task; }
@@ -292,7 +290,7 @@ struct CancelsWhile final : WorkListener {
   std::atomic<bool> reached = false;
 };
 
-TEST(Simulate, WhatIsCancelledLeavesNothing) {
+TEST(Simulate, aCancelledSimulationLeavesNoFiles) {
   const support::TemporaryDirectory folder;
   std::istringstream in;
   for (const std::string task : {"refining", "simulating"}) {
@@ -309,13 +307,13 @@ TEST(Simulate, WhatIsCancelledLeavesNothing) {
   }
 }
 
-TEST(Simulate, MistakesAreToldInALine) {
+TEST(Simulate, mistakesAreReportedInOneLine) {
   const support::TemporaryDirectory folder;
   refused({"simulate", "bowl", "--bodies", "0"}, "bodies");
   refused({"simulate", "bowls"}, "bowl");
   refused({"simulate", "poles", "--body", "none.obj", "--bodies", "1"}, "none.obj");
-  refused({"simulate", "poles", "--ground", "builtin:torus"}, "ground: is not for the scene poles");
-  refused({"simulate", "cloth", "--bodies", "3"}, "bodies: is not for the scene cloth");
+  refused({"simulate", "poles", "--ground", "builtin:torus"}, "ground: the scene poles does not take it");
+  refused({"simulate", "cloth", "--bodies", "3"}, "bodies: the scene cloth does not take it");
   refused({"simulate", "poles", "--size", "64x48"}, "size: is for pictures: give output");
   refused({"simulate", "poles", "--fps", "10"}, "fps: is for pictures: give output");
   refused({"simulate", "poles", "-o", "x.png", "--fps", "10"}, "fps: is for films");
@@ -323,7 +321,7 @@ TEST(Simulate, MistakesAreToldInALine) {
   refused({"simulate", "poles", "-o", "x", "--seconds", "3600"}, "more than 10000 frames");
   refused({"simulate", "poles", "-o", "x.png", "--camera", "0,99,1"}, "elevation");
   refused({"simulate", "poles", "-o", "x.gif"}, "x.gif");
-  // before anything is built: the mesh is not even looked for
+  // Arguments are checked before the mesh is read, which does not exist here.
   refused({"simulate", "poles", "-o", "none/x.png", "--body", "none.obj"}, "none/x.png");
   refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
           "builtin:torus,major=0.3,minor=0.1: nothing lies below");

@@ -1,4 +1,4 @@
-// Pictures of simulations show the bodies where they are.
+// Tests that pictures of simulations show the bodies at their positions.
 
 #include "simulate/studio.h"
 
@@ -55,7 +55,7 @@ Eigen::Isometry3d meshFromWorld(const Scene& scene, std::size_t body) {
   return shape != nullptr ? shape->bodyFromMesh().inverse() * bodyFromWorld : bodyFromWorld;
 }
 
-/// How far a point in the world is from the surface of a rigid body, by what collides.
+/// Distance of a point in the world from the surface of a rigid body's collision shape.
 double distanceTo(const Scene& scene, std::size_t n, const Vector3& x) {
   const btRigidBody& body = scene.world().body(n);
   if (const auto* shape = fieldShape(body)) return std::abs(shape->field().field().value(meshFromWorld(scene, n) * x));
@@ -73,11 +73,11 @@ double distanceToNodes(const btSoftBody& body, const Vector3& x) {
 }
 
 struct Seen {
-  std::set<std::size_t> bodies = {};       // numbers of the world's rigid bodies, then those of soft ones
-  double ground = 0, rigid = 0, soft = 0;  // the farthest that pixels are from what they are said to show
+  std::set<std::size_t> bodies = {};       // indices of the rigid bodies, followed by those of the soft bodies
+  double ground = 0, rigid = 0, soft = 0;  // greatest distance of a pixel from the body that it shows
 };
 
-/// What a picture of a scene shows, held against the scene `truth`.
+/// Compares the points that a picture shows with the bodies of the scene `truth`.
 Seen look(const Scene& scene, const Scene& truth) {
   render::SurfacePicture picture{.camera = {}, .width = 320, .height = 240};
   picture.camera.elevationDegrees = 50;
@@ -85,7 +85,7 @@ Seen look(const Scene& scene, const Scene& truth) {
   Studio studio(scene, "scene", picture, {.cpu = true});
   const SimulationShot shot = studio.shot();
   const physics::World& world = truth.world();
-  std::size_t ground = 0;  // the body whose field the picture has
+  std::size_t ground = 0;  // index of the body whose field is traced
   while (fieldShape(scene.world().body(ground)) == nullptr ||
          &fieldShape(scene.world().body(ground))->field().field() != &shot.field ||
          !(meshFromWorld(scene, ground).linear().isIdentity(1e-9)))
@@ -97,7 +97,7 @@ Seen look(const Scene& scene, const Scene& truth) {
   for (int y = 0; y < buffers.height; ++y)
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t pixel = std::size_t(y) * buffers.width + x;
-      if (!buffers.covered(pixel) || buffers.crack[pixel] != 0) continue;  // in a crack the field has two values
+      if (!buffers.covered(pixel) || buffers.crack[pixel] != 0) continue;  // the field has two values in a crack
       const Vector3 point = worldFromField * (render::pixelEye(view.camera, x, y, buffers.width, buffers.height) +
                                               double(buffers.distance[pixel]) *
                                                   render::pixelRay(view.camera, x, y, buffers.width, buffers.height));
@@ -115,13 +115,13 @@ Seen look(const Scene& scene, const Scene& truth) {
   return seen;
 }
 
-TEST(Studio, EveryPixelShowsTheBodyThatIsThere) {
+TEST(Studio, everyPixelShowsTheBodyAtItsPoint) {
   for (const SceneKind& kind : scenes()) {
     const std::unique_ptr<Scene> scene = sceneAfter(kind.name, 100);
     const physics::World& world = scene->world();
     const Seen seen = look(*scene, *scene);
     const double pixel = kind.name == "poles" || kind.name == "slope" ? 0.08 : 0.03;
-    EXPECT_LT(seen.ground, 5e-3) << kind.name;  // the fields jump by so much
+    EXPECT_LT(seen.ground, 5e-3) << kind.name;  // the jumps of the fields are as large as this
     EXPECT_LT(seen.rigid, pixel) << kind.name;
     EXPECT_LT(seen.soft, 0.15) << kind.name;
     for (std::size_t n = 0; n < world.bodies(); ++n)
@@ -131,21 +131,21 @@ TEST(Studio, EveryPixelShowsTheBodyThatIsThere) {
   }
 }
 
-TEST(Studio, ItWouldBeNoticedIfBodiesWereElsewhere) {
+TEST(Studio, aMovedBodyIsNoticed) {
   const std::unique_ptr<Scene> then = sceneAfter("poles", 60), now = sceneAfter("poles", 100);
   EXPECT_GT(look(*then, *now).rigid, 0.3);
   const std::unique_ptr<Scene> flat = sceneAfter("cloth", 5), fallen = sceneAfter("cloth", 100);
   EXPECT_GT(look(*flat, *fallen).soft, 0.2);
 }
 
-TEST(Studio, WhatIsStillToComeIsNotShown) {
+TEST(Studio, waitingBodiesAreNotShown) {
   const std::unique_ptr<Scene> scene = sceneAfter("slope", 1);
   EXPECT_FALSE(scene->drops().empty());
   const Seen seen = look(*scene, *scene);
   for (const std::size_t body : seen.bodies) EXPECT_LT(body, scene->world().bodies() + scene->world().softBodies());
 }
 
-TEST(CoarseMesh, LeavesOutWhatIsSmallAndNothingElse) {
+TEST(CoarseMesh, removesSmallDetailOnly) {
   const TriangleMesh fine = shapes::mesh("sphere,subdivisions=5");
   for (const double size : {0.05, 0.2}) {
     const TriangleMesh less = coarse(fine, size);
@@ -156,7 +156,7 @@ TEST(CoarseMesh, LeavesOutWhatIsSmallAndNothingElse) {
     for (const auto& [a, b, c] : less.triangles) EXPECT_TRUE(a != b && b != c && c != a);
   }
   const TriangleMesh box = shapes::mesh("box");
-  for (const double size : {0.0, 0.5, 100.0}) {  // nothing to leave out; everything
+  for (const double size : {0.0, 0.5, 100.0}) {  // a box has no detail to remove, and must not lose all triangles
     const TriangleMesh same = coarse(box, size);
     EXPECT_EQ(same.triangles.size(), box.triangles.size()) << size;
     EXPECT_EQ(signedVolume(same), signedVolume(box)) << size;

@@ -1,4 +1,4 @@
-// Every verb and every control of the explorer is used by a script that `check` runs.
+// Scripts that `check` runs must use every command and every control of the explorer.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ std::vector<fs::path> scripts() {
   return found;
 }
 
-/// A control and what stands for it: the entries of a list are one, and so are the rows of a table.
+/// Maps a control to its kind: all entries of a list count as one control, and so do the rows of a table.
 std::string controlOf(const std::string& path) {
   const std::size_t panel = path.find('/');
   if (panel == std::string::npos) return path;
@@ -50,11 +50,12 @@ std::string controlOf(const std::string& path) {
   return name.find_first_not_of("0123456789") == std::string::npos ? path.substr(0, panel) + "/…" : path;
 }
 
-TEST(Usage, everyVerbIsInAScriptThatIsChecked) {
+TEST(Usage, everyCommandIsInACheckedScript) {
   const Registry registry = makeRegistry();
   const support::TemporaryDirectory folder;
-  // what a script of check cannot do: check itself, and a window, nor what needs a library that may be missing
-  // (simulate_test.cpp); what `include` brings is checked where it stands
+  // Scripts of `check` cannot run `check`, open a window or depend on a library that may be missing (simulate_test.cpp
+  // covers that). Commands of included scripts are checked with the including one; `include` itself is searched as
+  // text.
   std::set<std::string> unused;
   for (const Command& command : registry.commands()) unused.insert(command.name);
   for (const char* exempt : {"check", "accept", "view", "simulate"}) unused.erase(exempt);
@@ -65,7 +66,7 @@ TEST(Usage, everyVerbIsInAScriptThatIsChecked) {
   EXPECT_THAT(unused, IsEmpty());
 }
 
-TEST(Usage, everyControlOfTheExplorerIsUsedByAScriptThatIsChecked) {
+TEST(Usage, everyControlOfTheExplorerIsInACheckedScript) {
   HPSDF_REQUIRE_GL();
   const Registry registry = makeRegistry();
   const support::TemporaryDirectory folder;
@@ -80,8 +81,8 @@ TEST(Usage, everyControlOfTheExplorerIsUsedByAScriptThatIsChecked) {
   }
   std::set<std::string> unused;
   std::ranges::set_difference(seen, used, std::inserter(unused, unused.end()));
-  unused.erase("build/progress");  // tells, and takes nothing
-  unused.erase("build/cancel");    // only while a construction is under way: see the window's tests
+  unused.erase("build/progress");  // has no input
+  unused.erase("build/cancel");    // exists during a construction only; the tests of the window cover it
   EXPECT_THAT(unused, IsEmpty());
   EXPECT_GT(seen.size(), 60u);
   for (const char* control : {"view/cells/…", "worst/…", "build/rebuild", "canvas", "beside"})

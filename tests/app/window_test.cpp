@@ -1,4 +1,4 @@
-// The window as a person meets it: a display of its own (Xvfb), a real mouse and keyboard (xdotool).
+// Tests the window on a display of its own (Xvfb), with the mouse and keyboard events of xdotool.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -52,7 +52,7 @@ bool comesTrue(const Condition& condition) {
   return false;
 }
 
-/// Another program at work in `folder`; what it says goes to out.txt and err.txt there.
+/// Another program that runs in `folder`. Its output goes to out.txt and err.txt there.
 class Child {
  public:
   Child(std::vector<std::string> words, const fs::path& folder, const std::string& display) : folder_(folder) {
@@ -72,7 +72,7 @@ class Child {
     posix_spawnattr_init(&attributes);
     sigset_t defaults;
     sigemptyset(&defaults);
-    sigaddset(&defaults, SIGINT);  // a test run in the background inherits an ignored one
+    sigaddset(&defaults, SIGINT);  // a test that runs in the background inherits an ignored SIGINT
     posix_spawnattr_setsigdefault(&attributes, &defaults);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
     const auto pointers = [](std::vector<std::string>& texts) {
@@ -101,7 +101,7 @@ class Child {
     status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     return true;
   }
-  /// Exit status, or -signal.
+  /// Waits for the end. Returns the exit status, or the negative number of the signal that ended it.
   int wait() {
     if (!comesTrue([&] { return ended(); })) ADD_FAILURE() << "does not end; it said: " << err();
     return status_.value_or(-SIGKILL);
@@ -125,7 +125,7 @@ std::string problem() {
   return support::glProblem();
 }
 
-/// The state that the window is in, followed step by step: where its widgets stand.
+/// An explorer that repeats the window's session step by step, in order to know the positions of its widgets.
 class Follower {
  public:
   explicit Follower(const std::string& field) {
@@ -166,7 +166,7 @@ class WindowTest : public testing::Test {
 
   fs::path file(const std::string& name) const { return folder_ / name; }
 
-  /// The program in the folder, to its end.
+  /// Runs the program in the folder to its end.
   int program(std::vector<std::string> words, const std::string& display = "") {
     words.insert(words.begin(), HPSDF_PROGRAM);
     Child child(std::move(words), folder_.path(), display);
@@ -186,7 +186,7 @@ class WindowTest : public testing::Test {
     desktop({"windowfocus", "--sync", id_});
   }
 
-  /// Ctrl+Q, or what another way of closing it gives.
+  /// Closes the window by Ctrl+Q or by another event.
   int close() {
     desktop({"key", "ctrl+q"});
     return window_->wait();
@@ -217,9 +217,10 @@ class WindowTest : public testing::Test {
     desktop({"key", "Return"});
   }
 
-  /// What the display shows at the window's place, over a part of a frame, where it agrees with the frame.
+  /// Compares the display's pixels with a part of a frame, at the window's position.
   bool screenShows(const render::Image& frame, const UiRect& part) {
-    const std::string screen = contents(folder_ / "x" / "Xvfb_screen0");  // the format of xwd: big-endian words first
+    const std::string screen =
+        contents(folder_ / "x" / "Xvfb_screen0");  // an xwd file, which begins with big-endian words
     const auto word = [&](std::size_t index) {
       std::uint32_t value = 0;
       for (std::size_t byte = 0; byte < 4; ++byte)
@@ -229,7 +230,7 @@ class WindowTest : public testing::Test {
     const std::size_t pixels = word(0) + 12 * word(19), line = word(12);
     for (int y = int(part.y0); y < int(part.y1); ++y)
       for (int x = int(part.x0); x < int(part.x1); ++x)
-        for (std::size_t channel = 0; channel < 3; ++channel) {  // blue first
+        for (std::size_t channel = 0; channel < 3; ++channel) {  // the display stores blue first
           const char shown = screen[pixels + std::size_t(y) * line + 4 * std::size_t(x) + 2 - channel];
           if (static_cast<std::uint8_t>(shown) != frame.at(x, y)[channel]) return false;
         }
@@ -270,7 +271,7 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
   const render::Image shot = render::loadPng(file("hpsdf-0001.png"));
   EXPECT_TRUE(comesTrue([&] { return screenShows(shot, follower.canvas()); }));
   move(canvas);
-  click(follower.middleOf("view/axis"));  // a list that stays open
+  click(follower.middleOf("view/axis"));  // opens a list, which stays open
   ASSERT_EQ(close(), 0) << window_->err();
 
   const std::string script = contents(file("session.hps"));
@@ -297,7 +298,7 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   const std::string field = "analytic:torus";
   ASSERT_NO_FATAL_FAILURE(open(field));
   Follower follower(field);
-  click(follower.middleOf("bar/view"));  // room for the construction's
+  click(follower.middleOf("bar/view"));  // makes room for the construction panel
   follower.run("panel view=false");
   click(follower.middleOf("build/grid"));
   type("many");
@@ -320,7 +321,7 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
 TEST_F(WindowTest, anotherSizeIsRecorded) {
   ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
   desktop({"windowsize", id_, "700", "500"});
-  desktop({"key", "F12"});  // closed before its first frame, it has no last one
+  desktop({"key", "F12"});  // a window that is closed before its first frame has no last frame
   ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
   ASSERT_EQ(close(), 0) << window_->err();
   EXPECT_THAT(contents(file("session.hps")), HasSubstr("show size=960x640 gl=software\nshow size=700x500\n"));
@@ -329,7 +330,7 @@ TEST_F(WindowTest, anotherSizeIsRecorded) {
   EXPECT_EQ(last.height, 500);
 }
 
-TEST_F(WindowTest, anInterruptionEndsItWithItsFilesWritten) {
+TEST_F(WindowTest, anInterruptionWritesTheFiles) {
   ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
   desktop({"key", "F12"});
   ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
@@ -339,7 +340,7 @@ TEST_F(WindowTest, anInterruptionEndsItWithItsFilesWritten) {
   EXPECT_TRUE(contents(file("last.png")) == contents(file("hpsdf-0001.png")));
 }
 
-TEST_F(WindowTest, withoutADisplayItSaysSo) {
+TEST_F(WindowTest, aMissingDisplayIsAnError) {
   EXPECT_EQ(program({"view", "analytic:torus", "--record", "session.hps"}), 2);
   EXPECT_THAT(said_, HasSubstr("no window can be opened here"));
   EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;

@@ -26,8 +26,8 @@ std::vector<Cell> cellsOf(const Field& field) {
   return cells;
 }
 
-/// Faces of several levels beside each other, in cells that are no cubes.
-Field rude(unsigned seed) {
+/// Makes a random field with leaves of several depths side by side, whose cells are not cubes.
+Field irregular(unsigned seed) {
   return randomField(seed, {.domain = Box(Vector3(-1, -0.5, -2), Vector3(1, 1, 1)),
                             .grid = {2, 1, 3},
                             .refinement = 0.35,
@@ -36,8 +36,8 @@ Field rude(unsigned seed) {
                             .maxDegree = 5});
 }
 
-/// Points anywhere, and such that lie on or close to faces, edges and corners of leaves.
-std::vector<Vector3> tellingPoints(const Field& field, std::size_t count, unsigned seed) {
+/// Draws points inside leaves and points on or close to their faces, edges and corners.
+std::vector<Vector3> pointsNearFaces(const Field& field, std::size_t count, unsigned seed) {
   const std::vector<Cell> cells = cellsOf(field);
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -55,7 +55,7 @@ std::vector<Vector3> tellingPoints(const Field& field, std::size_t count, unsign
   return points;
 }
 
-/// The definition, by every leaf of the field: slow and plain.
+/// Evaluates the definition of blending over all leaves of a field. Slow and simple.
 class Definition {
  public:
   Definition(const Field& field, double width) : field_(field), width_(width), cells_(cellsOf(field)) {
@@ -72,7 +72,7 @@ class Definition {
       for (int axis = 0; axis < 3 && w > 0; ++axis)
         for (int side = 0; side < 2; ++side) {
           const double delta = deltas_[n][axis][side];
-          if (delta == 0) continue;  // the domain's wall
+          if (delta == 0) continue;  // The face lies on the domain's boundary.
           const double t =
               (side == 0 ? x[axis] - cells_[n].box.min()[axis] : cells_[n].box.max()[axis] - x[axis]) / delta;
           const double s = t <= -1 ? 0 : t >= 1 ? 1 : (2 + 3 * t - t * t * t) / 4;
@@ -118,8 +118,8 @@ class Definition {
     const Vector3 half = cell.box.sizes() / 2, u = (x - cell.box.center()).cwiseQuotient(half);
     return std::visit(
         [&](const auto& c) {
-          ValueAndGradient result = evaluateWithGradient(c.data() + node::offset(field_.data().nodes[cell.id]),
-                                                         cell.degree, {u.x(), u.y(), u.z()});
+          ValueAndGradient result = query::evaluateWithGradient(c.data() + node::offset(field_.data().nodes[cell.id]),
+                                                                cell.degree, {u.x(), u.y(), u.z()});
           result.gradient = result.gradient.cwiseQuotient(half);
           return result;
         },
@@ -132,8 +132,8 @@ class Definition {
   std::vector<Deltas> deltas_;
 };
 
-/// With so many coefficients that queries start below the base cells, at a depth that some leaves do not reach.
-Field rudeWithDirectory(unsigned seed) {
+/// Makes a field with so many coefficients that its lookup grid lies deeper than some leaves.
+Field irregularWithLookupGrid(unsigned seed) {
   return randomField(seed, {.grid = {1, 2, 1},
                             .refinement = 0.5,
                             .maxDepth = 4,
@@ -142,14 +142,15 @@ Field rudeWithDirectory(unsigned seed) {
                             .maxDegree = 8});
 }
 
-TEST(Blend, IsWhatItsDefinitionSays) {
+TEST(Blend, EqualsItsDefinition) {
   std::size_t most = 0;
-  ASSERT_GT(rudeWithDirectory(1).lookupGrid().depth, 0);
+  ASSERT_GT(irregularWithLookupGrid(1).lookupGrid().depth, 0);
   for (const unsigned seed : {1u, 2u, 3u, 4u})
     for (const double width : {0.03, 0.25}) {
-      const Field field = seed % 2 == 0 ? rude(seed) : rudeWithDirectory(seed), smooth = blended(field, width);
+      const Field field = seed % 2 == 0 ? irregular(seed) : irregularWithLookupGrid(seed),
+                  smooth = blended(field, width);
       const Definition definition(field, width);
-      for (const Vector3& x : tellingPoints(field, 1500, seed)) {
+      for (const Vector3& x : pointsNearFaces(field, 1500, seed)) {
         std::size_t leaves = 0;
         const auto [value, gradient] = definition.at(x, &leaves);
         most = std::max(most, leaves);
@@ -162,8 +163,7 @@ TEST(Blend, IsWhatItsDefinitionSays) {
   EXPECT_EQ(most, 8u) << "corners at which eight leaves meet are among the points";
 }
 
-/// The greatest steps of value and gradient between a point and those next to it in floating point, on every side of
-/// all three planes through it.
+/// The greatest differences of value and gradient between the eight neighbours of a point in floating point.
 struct Step {
   double value = 0, gradient = 0;
 };
@@ -174,19 +174,19 @@ Step greatestStep(const Field& field, const std::vector<Vector3>& points) {
     std::optional<ValueAndGradient> first;
     Vector3 firstAt = Vector3::Zero();
     for (int corner = 0; corner < 8; ++corner) {
-      Vector3 beside;
+      Vector3 neighbour;
       for (int axis = 0; axis < 3; ++axis) {
-        // by some units in the last place, since a face may lie between two numbers
+        // A few units in the last place, because a face may lie between two representable numbers.
         const double by = 1e-15 * field.domain().sizes()[axis];
-        beside[axis] = std::clamp(x[axis] + (corner >> axis & 1 ? by : -by), field.domain().min()[axis],
-                                  field.domain().max()[axis]);
+        neighbour[axis] = std::clamp(x[axis] + (corner >> axis & 1 ? by : -by), field.domain().min()[axis],
+                                     field.domain().max()[axis]);
       }
-      const ValueAndGradient result = field.valueAndGradient(beside);
+      const ValueAndGradient result = field.valueAndGradient(neighbour);
       if (!first) {
         first = result;
-        firstAt = beside;
+        firstAt = neighbour;
       }
-      const double slope = first->gradient.dot(beside - firstAt);  // of a steep field no step
+      const double slope = first->gradient.dot(neighbour - firstAt);  // A steep field is not a jump.
       step.value = std::max(step.value, std::abs(result.value - first->value - slope));
       step.gradient = std::max(step.gradient, (result.gradient - first->gradient).norm());
     }
@@ -194,10 +194,10 @@ Step greatestStep(const Field& field, const std::vector<Vector3>& points) {
   return step;
 }
 
-TEST(Blend, NothingJumpsAcrossFacesEdgesAndCorners) {
+TEST(Blend, RemovesJumpsAcrossFacesEdgesAndCorners) {
   for (const unsigned seed : {4u, 5u, 6u, 7u}) {
-    const Field field = seed % 2 == 0 ? rude(seed) : rudeWithDirectory(seed);
-    const std::vector<Vector3> points = tellingPoints(field, 20'000, seed);
+    const Field field = seed % 2 == 0 ? irregular(seed) : irregularWithLookupGrid(seed);
+    const std::vector<Vector3> points = pointsNearFaces(field, 20'000, seed);
     const Step jumps = greatestStep(field, points), none = greatestStep(blended(field), points);
     EXPECT_GT(jumps.value, 0.1) << "the field without blending, which the check must find to jump";
     EXPECT_GT(jumps.gradient, 1);
@@ -210,9 +210,9 @@ TEST(Blend, GradientIsTheDerivativeEverywhere) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
   for (const unsigned seed : {8u, 9u}) {
-    const Field field = rude(seed), smooth = blended(field, 0.1);
+    const Field field = irregular(seed), smooth = blended(field, 0.1);
     double worst = 0, worstWithout = 0;
-    for (const Vector3& x : tellingPoints(field, 20'000, seed)) {
+    for (const Vector3& x : pointsNearFaces(field, 20'000, seed)) {
       const Vector3 direction = Vector3(normal(random), normal(random), normal(random)).normalized();
       const double by = 1e-7;
       const Vector3 before = x - by * direction, after = x + by * direction;
@@ -228,8 +228,8 @@ TEST(Blend, GradientIsTheDerivativeEverywhere) {
   }
 }
 
-TEST(Blend, WhatAllLeavesAgreeOnStays) {
-  const Field field = rude(10);
+TEST(Blend, ReproducesFunctionsThatAllLeavesShare) {
+  const Field field = irregular(10);
   const Vector3 slope(0.3, -2, 1.5);
   const auto with = [&](const Vector3& gradient) {
     FieldData data = field.data();
@@ -247,7 +247,7 @@ TEST(Blend, WhatAllLeavesAgreeOnStays) {
     return Field(std::move(data));
   };
   const Field constant = with(Vector3::Zero()), linear = with(slope);
-  for (const Vector3& x : tellingPoints(field, 5000, 10)) {
+  for (const Vector3& x : pointsNearFaces(field, 5000, 10)) {
     ASSERT_EQ(constant.value(x), 0.7);
     ASSERT_EQ(constant.valueAndGradient(x).gradient, Vector3::Zero());
     const auto [value, gradient] = linear.valueAndGradient(x);
@@ -256,11 +256,11 @@ TEST(Blend, WhatAllLeavesAgreeOnStays) {
   }
 }
 
-TEST(Blend, AwayFromFacesLeavesAnswerAlone) {
+TEST(Blend, ChangesNothingOutsideBlendZones) {
   const double width = 0.1;
-  const Field field = rude(11), smooth = blended(field, width);
+  const Field field = irregular(11), smooth = blended(field, width);
   std::size_t inner = 0, changed = 0;
-  for (const Vector3& x : tellingPoints(field, 20'000, 11)) {
+  for (const Vector3& x : pointsNearFaces(field, 20'000, 11)) {
     const Cell cell = field.cellAt(x);
     const Vector3 local = (x - cell.box.center()).cwiseQuotient(cell.box.sizes() / 2);
     const bool same = smooth.value(x) == field.value(x);
@@ -276,10 +276,10 @@ TEST(Blend, AwayFromFacesLeavesAnswerAlone) {
   EXPECT_GT(changed, 5000u);
 }
 
-TEST(Blend, BatchesAnswerTheSame) {
+TEST(Blend, BatchesEqualSingleQueries) {
   for (const bool single : {false, true}) {
     const Field smooth = blended(randomField(12, {.maxDepth = 5, .maxDegree = 7, .single = single}), 0.15);
-    std::vector<Vector3> points = tellingPoints(smooth, 5000, 12);
+    std::vector<Vector3> points = pointsNearFaces(smooth, 5000, 12);
     for (std::size_t i = 0; i < points.size(); i += 7) points[i] *= 1.5;
     constexpr double kInfinity = std::numeric_limits<double>::infinity(), kNaN = NAN;
     points.insert(points.end(), {Vector3(kInfinity, 0, 0), Vector3(kNaN, 0, 0), Vector3(0, -kInfinity, kInfinity)});
@@ -299,12 +299,12 @@ TEST(Blend, BatchesAnswerTheSame) {
   }
 }
 
-TEST(Blend, NothingJumpsOutsideTheDomainEither) {
-  const Field field = rude(13), smooth = blended(field);
+TEST(Blend, RemovesJumpsOutsideTheDomain) {
+  const Field field = irregular(13), smooth = blended(field);
   const auto outside = [&] {
-    std::vector<Vector3> points = tellingPoints(field, 5000, 13);
+    std::vector<Vector3> points = pointsNearFaces(field, 5000, 13);
     for (Vector3& x : points) x.z() = -2.5;
-    std::erase_if(points, [&](const Vector3& x) {  // beside a wall, whose gradient jumps
+    std::erase_if(points, [&](const Vector3& x) {  // The gradient jumps at the domain's boundary.
       return std::min({x.x() + 1, 1 - x.x(), x.y() + 0.5, 1 - x.y()}) < 1e-9;
     });
     return points;
@@ -323,8 +323,8 @@ TEST(Blend, NothingJumpsOutsideTheDomainEither) {
   EXPECT_LT(none.gradient, 1e-9);
 }
 
-TEST(Blend, JumpsAndLinesMeasureTheBlendedField) {
-  const Field field = rude(14), smooth = blended(field);
+TEST(Blend, IsMeasuredByJumpsAndLines) {
+  const Field field = irregular(14), smooth = blended(field);
   const Jumps before = findJumps(field), after = findJumps(smooth);
   EXPECT_EQ(before.interfaces.size(), after.interfaces.size());
   EXPECT_GT(before.value.max, 0.1);
@@ -347,17 +347,17 @@ TEST(Blend, JumpsAndLinesMeasureTheBlendedField) {
   EXPECT_GT(jumped, 0.01);
 }
 
-TEST(Blend, OfVeryDeepCells) {
+TEST(Blend, WorksInVeryDeepCells) {
   const Field field = randomField(15, {.refinement = 0, .maxDepth = kMaxDepth, .deepAt = Vector3(0.1, 0.2, 0.3)});
   const Field smooth = blended(field);
-  const std::vector<Vector3> points = tellingPoints(field, 5000, 15);
+  const std::vector<Vector3> points = pointsNearFaces(field, 5000, 15);
   EXPECT_LT(greatestStep(smooth, points).value, 1e-12);
   for (const Vector3& x : points) ASSERT_TRUE(smooth.valueAndGradient(x).gradient.allFinite());
 }
 
-/// So narrow that at the domain's far end the width is lost in rounding.
-TEST(Blend, OfZonesWithoutWidth) {
-  const Field field = rude(20);
+/// The zones are so narrow that their width is lost in rounding at the domain's far end.
+TEST(Blend, WorksInZonesWithoutWidth) {
+  const Field field = irregular(20);
   for (const double width : {1e-300, 1e-17, 1e-16, 1e-15, 1e-12}) {
     const Field smooth = blended(field, width);
     std::vector<Vector3> points;
@@ -376,27 +376,27 @@ TEST(Blend, OfZonesWithoutWidth) {
 TEST(Blend, IsKeptInFiles) {
   const support::TemporaryDirectory folder;
   const std::string file = (folder.path() / "blended.hpsdf").string();
-  const Field smooth = blended(rude(16), 0.07);
+  const Field smooth = blended(irregular(16), 0.07);
   save(smooth, file);
   const Field again = load(file);
   EXPECT_EQ(again.data().blend, 0.07);
-  for (const Vector3& x : tellingPoints(smooth, 500, 16)) ASSERT_EQ(again.value(x), smooth.value(x));
+  for (const Vector3& x : pointsNearFaces(smooth, 500, 16)) ASSERT_EQ(again.value(x), smooth.value(x));
 }
 
-TEST(Blend, TakesMemoryThatIsCounted) {
-  const Field field = rude(17);
+TEST(Blend, CountsItsMemory) {
+  const Field field = irregular(17);
   EXPECT_EQ(blended(field, 0).bytes(), field.bytes());
   EXPECT_EQ(blended(field, 0.1).bytes(),
             field.bytes() + 4 * (field.data().nodes.size() + field.lookupGrid().entries.size()));
 }
 
 TEST(Blend, RefusesWidthsOutOfRange) {
-  const Field field = rude(18);
+  const Field field = irregular(18);
   for (const double width : {-0.01, 0.26, double(NAN)}) EXPECT_THROW(blended(field, width), Error) << width;
 }
 
-/// The figures of docs/accuracy.md's rows, for a mesh that is quick to build.
-TEST(Blend, OfAMeshIsAsExact) {
+/// docs/accuracy.md has these figures for larger meshes.
+TEST(Blend, KeepsTheErrorOfAMeshsField) {
   const ExactDistance distance(shapes::mesh("torus"));
   const Field field =
       build(distance, Box(Vector3::Constant(-1.2), Vector3::Constant(1.2)), {.targetError = 1e-6, .grid = {4, 4, 4}});
@@ -416,7 +416,7 @@ TEST(Blend, OfAMeshIsAsExact) {
   };
   EXPECT_LE(rms(after), 1.05 * rms(before));
   EXPECT_LE(double(smooth.bytes()), 1.1 * double(field.bytes()));
-  const Step none = greatestStep(smooth, tellingPoints(field, 50'000, 19));
+  const Step none = greatestStep(smooth, pointsNearFaces(field, 50'000, 19));
   EXPECT_LT(none.value, 1e-12);
   EXPECT_LT(none.gradient, 1e-9);
 }

@@ -327,7 +327,7 @@ TEST(Build, LimitsHold) {
   EXPECT_EQ(statistics(flat).degreeLeaves.size(), 1u);
   const Field linear = build(torus, cube(), {.targetError = 1e-3, .strategy = Strategy::h1});
   EXPECT_EQ(statistics(linear).degreeLeaves.rbegin()->first, 1);
-  EXPECT_EQ(linear.metadata().maxDegree, 1u);
+  EXPECT_EQ(linear.metadata().settings.maxDegree, 1);
   const Field base = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 2, .maxDepth = 0});
   EXPECT_EQ(statistics(base).leaves, 216u);
 }

@@ -78,8 +78,8 @@ std::vector<BuildOptions> everyWay() {
        .maxSteps = 100,
        .enrich = true,
        .coefficients = CoefficientType::float64},
-      {.targetError = 0, .nearError = 3e-4, .farError = 3e-3, .band = 0.3},
-      {.targetError = 0, .nearError = 3e-4, .farError = 3e-4, .criterion = Criterion::optimal},  // puts cells aside
+      {.targetError = NearFarError{3e-4, 3e-3}, .band = 0.3},
+      {.targetError = NearFarError{3e-4, 3e-4}, .criterion = Criterion::optimal},  // puts cells aside
       {.targetError = 0, .maxError = 0.02},
       {.targetError = 1e-5, .maxError = 0.02, .band = 0.2},
       {.targetError = 0, .grid = {3, 3, 3}, .maxError = 0.01, .maxBytes = 150000},

@@ -1,4 +1,4 @@
-// What weak continuity trades on a scanned mesh.
+// Jumps, errors and bytes of weakly continuous fields of a scanned mesh.
 
 #include <gtest/gtest.h>
 
@@ -50,15 +50,15 @@ TEST(ContinuityFigures, Bunny) {
   const Box domain = domainAround(mesh);
   const Meter meter(distance, domain);
   BuildOptions options{.targetError = 1e-5};
-  const Field plain = build(distance, domain, options);
-  const Figures before = meter(plain);
+  const Field discontinuous = build(distance, domain, options);
+  const Figures before = meter(discontinuous);
 
-  const WeaklyContinuous smoothed = weaklyContinuous(plain);
+  const WeaklyContinuous smoothed = weaklyContinuous(discontinuous);
   const Figures after = meter(smoothed.field);
   EXPECT_LT(after.jump, 0.5 * before.jump);
   EXPECT_LT(after.rms, 1.3 * before.rms);
   EXPECT_EQ(after.bytes, before.bytes);
-  EXPECT_NEAR(after.rms, std::hypot(before.rms, smoothed.change), 0.02 * after.rms) << "c₀ is a projection";
+  EXPECT_NEAR(after.rms, std::hypot(before.rms, smoothed.change), 0.02 * after.rms) << "f₀ is a projection";
 
   options.enrich = true;
   options.continuityWeight = 0.4;

@@ -1,4 +1,4 @@
-// Where a mesh meets itself: against separating axes in whole numbers, and on meshes that are known.
+// Tests of self-intersections: against separating axes in integer arithmetic, and on meshes with known crossings.
 
 #include "hpsdf/detail/crossings.h"
 
@@ -22,33 +22,33 @@
 namespace hpsdf {
 namespace {
 
-using Whole = std::array<std::int64_t, 3>;
+using IntegerPoint = std::array<std::int64_t, 3>;
 
-Whole minus(const Whole& a, const Whole& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-std::int64_t dot(const Whole& a, const Whole& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Whole cross(const Whole& a, const Whole& b) {
+IntegerPoint minus(const IntegerPoint& a, const IntegerPoint& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+std::int64_t dot(const IntegerPoint& a, const IntegerPoint& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+IntegerPoint cross(const IntegerPoint& a, const IntegerPoint& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Whether two convex sets, triangles or segments, have no point in common: a plane lies between them that stands on
-/// one of few directions.
-bool apart(const std::vector<Whole>& one, const std::vector<Whole>& other) {
-  std::vector<Whole> normals, edges, directions;
+/// Returns true if a plane separates two convex sets, which are triangles or segments. Only the normals that the
+/// separating-axis theorem names have to be tried.
+bool areSeparate(const std::vector<IntegerPoint>& one, const std::vector<IntegerPoint>& other) {
+  std::vector<IntegerPoint> normals, edges, directions;
   for (const auto* set : {&one, &other}) {
     for (std::size_t i = 0; i < set->size(); ++i) edges.push_back(minus((*set)[(i + 1) % set->size()], (*set)[i]));
     if (set->size() == 3) normals.push_back(cross(minus((*set)[1], (*set)[0]), minus((*set)[2], (*set)[0])));
   }
   directions = edges;
-  for (const Whole& n : normals) {
+  for (const IntegerPoint& n : normals) {
     directions.push_back(n);
-    for (const Whole& e : edges) directions.push_back(cross(n, e));
+    for (const IntegerPoint& e : edges) directions.push_back(cross(n, e));
   }
-  for (const Whole& e : edges)
-    for (const Whole& f : edges) directions.push_back(cross(e, f));
-  return std::ranges::any_of(directions, [&](const Whole& direction) {
-    const auto range = [&](const std::vector<Whole>& set) {
+  for (const IntegerPoint& e : edges)
+    for (const IntegerPoint& f : edges) directions.push_back(cross(e, f));
+  return std::ranges::any_of(directions, [&](const IntegerPoint& direction) {
+    const auto range = [&](const std::vector<IntegerPoint>& set) {
       std::int64_t low = INT64_MAX, high = INT64_MIN;
-      for (const Whole& x : set) {
+      for (const IntegerPoint& x : set) {
         low = std::min(low, dot(direction, x));
         high = std::max(high, dot(direction, x));
       }
@@ -60,34 +60,34 @@ bool apart(const std::vector<Whole>& one, const std::vector<Whole>& other) {
   });
 }
 
-Vector3 inSpace(const Whole& x) { return {double(x[0]), double(x[1]), double(x[2])}; }
+Vector3 inSpace(const IntegerPoint& x) { return {double(x[0]), double(x[1]), double(x[2])}; }
 
-TriangleMesh meshOf(const std::vector<Whole>& corners, std::array<std::uint32_t, 3> second) {
+TriangleMesh meshOf(const std::vector<IntegerPoint>& corners, std::array<std::uint32_t, 3> second) {
   TriangleMesh mesh;
-  for (const Whole& x : corners) mesh.vertices.push_back(inSpace(x));
+  for (const IntegerPoint& x : corners) mesh.vertices.push_back(inSpace(x));
   mesh.triangles = {{0, 1, 2}, second};
   return mesh;
 }
 
-/// Pairs of triangles in a small grid, where points are often in a line or a plane.
+/// Pairs of triangles with corners on a small grid, where points are often collinear or coplanar.
 class GridPairs {
  public:
-  Whole place() {
+  IntegerPoint point() {
     std::uniform_int_distribution<std::int64_t> whole(0, 3);
     const std::int64_t x = whole(random_), y = whole(random_), z = whole(random_);
     return {x, y, z};
   }
 
-  /// Different ones that make triangles with an area: the first three, and `second`.
-  std::vector<Whole> places(std::size_t count, std::array<std::uint32_t, 3> second) {
+  /// Different grid points, of which the first three and those that `second` selects form triangles with an area.
+  std::vector<IntegerPoint> points(std::size_t count, std::array<std::uint32_t, 3> second) {
     for (;;) {
-      std::vector<Whole> all;
+      std::vector<IntegerPoint> all;
       while (all.size() < count) {
-        const Whole x = place();
+        const IntegerPoint x = point();
         if (std::ranges::find(all, x) == all.end()) all.push_back(x);
       }
       const auto hasArea = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-        return cross(minus(all[b], all[a]), minus(all[c], all[a])) != Whole{0, 0, 0};
+        return cross(minus(all[b], all[a]), minus(all[c], all[a])) != IntegerPoint{0, 0, 0};
       };
       if (hasArea(0, 1, 2) && hasArea(second[0], second[1], second[2])) return all;
     }
@@ -97,73 +97,73 @@ class GridPairs {
   std::mt19937_64 random_{7};
 };
 
-bool meet(const TriangleMesh& mesh) { return !findCrossings(mesh).found.empty(); }
+bool intersects(const TriangleMesh& mesh) { return !findCrossings(mesh).found.empty(); }
 
-TEST(Crossings, OfStrangersAreThoseThatNoPlaneParts) {
+/// Compares `findCrossings` with expected(corners) on random pairs of triangles: the first three of `count` points, and
+/// those that `second` selects. Returns the number of pairs that intersect.
+template <typename Expected>
+int countIntersecting(std::size_t count, std::array<std::uint32_t, 3> second, const Expected& expected) {
   GridPairs pairs;
-  int meeting = 0;
-  for (int i = 0; i < 20'000; ++i) {
-    const auto x = pairs.places(6, {3, 4, 5});
-    const bool expected = !apart({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
-    ASSERT_EQ(meet(meshOf(x, {3, 4, 5})), expected) << i;
-    meeting += expected;
+  int intersecting = 0;
+  for (int i = 0; i < 20'000 && !testing::Test::HasFailure(); ++i) {
+    const std::vector<IntegerPoint> x = pairs.points(count, second);
+    const bool isExpected = expected(x);
+    EXPECT_EQ(intersects(meshOf(x, second)), isExpected) << i;
+    intersecting += isExpected;
   }
-  EXPECT_GT(meeting, 4000);
-  EXPECT_LT(meeting, 16'000);
+  return intersecting;
 }
 
-TEST(Crossings, OfNeighboursAtACornerAreThoseElsewhere) {
-  GridPairs pairs;
-  int meeting = 0;
-  for (int i = 0; i < 20'000; ++i) {
-    const auto x = pairs.places(5, {3, 1, 4});
-    const bool expected = !apart({x[0], x[2]}, {x[3], x[1], x[4]}) || !apart({x[3], x[4]}, {x[0], x[1], x[2]});
-    ASSERT_EQ(meet(meshOf(x, {3, 1, 4})), expected) << i;
-    meeting += expected;
-  }
-  EXPECT_GT(meeting, 2000);
-  EXPECT_LT(meeting, 18'000);
+TEST(Crossings, OfTrianglesWithoutSharedCornersAreThoseThatNoPlaneSeparates) {
+  const int intersecting = countIntersecting(6, {3, 4, 5}, [](const auto& x) {
+    return !areSeparate({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
+  });
+  EXPECT_GT(intersecting, 4000);
+  EXPECT_LT(intersecting, 16'000);
 }
 
-TEST(Crossings, OfNeighboursAtASideAreFoldedFlat) {
-  GridPairs pairs;
-  int meeting = 0;
-  for (int i = 0; i < 20'000; ++i) {
-    const auto x = pairs.places(4, {2, 1, 3});
-    const Whole side = minus(x[2], x[1]), normal = cross(side, minus(x[0], x[1]));
+TEST(Crossings, OfNeighboursAtACornerAreBeyondIt) {
+  const int intersecting = countIntersecting(5, {3, 1, 4}, [](const auto& x) {
+    return !areSeparate({x[0], x[2]}, {x[3], x[1], x[4]}) || !areSeparate({x[3], x[4]}, {x[0], x[1], x[2]});
+  });
+  EXPECT_GT(intersecting, 2000);
+  EXPECT_LT(intersecting, 18'000);
+}
+
+TEST(Crossings, OfNeighboursAtAnEdgeAreFoldedFlat) {
+  const int intersecting = countIntersecting(4, {2, 1, 3}, [](const auto& x) {
+    const IntegerPoint side = minus(x[2], x[1]), normal = cross(side, minus(x[0], x[1]));
     const bool flat = dot(normal, minus(x[3], x[1])) == 0;
-    const bool expected = flat && dot(cross(side, minus(x[3], x[1])), normal) > 0;
-    ASSERT_EQ(meet(meshOf(x, {2, 1, 3})), expected) << i;
-    meeting += expected;
-  }
-  EXPECT_GT(meeting, 200);
+    return flat && dot(cross(side, minus(x[3], x[1])), normal) > 0;
+  });
+  EXPECT_GT(intersecting, 200);
 }
 
 TEST(Crossings, AreDecidedWithoutRounding) {
-  // Far from the origin, corners one unit in the last place above a plane, in it and below it.
+  // Points far from the origin lie one unit in the last place above a plane, in it and below it.
   const Vector3 a(1e6, 1e6 + 1, 1e6), b(1e6 + 3, 1e6, 1e6 + 1), c(1e6 + 1, 1e6 + 5, 1e6 + 2);
   const Vector3 inPlane = a + 0.5 * (b - a) + 0.25 * (c - a);  // a multiple of 1/4 in each coordinate
-  EXPECT_EQ(orientation(a, b, c, inPlane), 0);
+  EXPECT_EQ(surface::orientation(a, b, c, inPlane), 0);
   for (int k = 0; k < 3; ++k) {
     Vector3 above = inPlane, below = inPlane;
     above[k] = std::nextafter(above[k], HUGE_VAL);
     below[k] = std::nextafter(below[k], -HUGE_VAL);
-    EXPECT_EQ(orientation(a, b, c, above) * orientation(a, b, c, below), -1) << k;
-    EXPECT_EQ(orientation(a, b, c, above), (b - a).cross(c - a)[k] > 0 ? 1 : -1) << k;
-    EXPECT_EQ(orientation(b, a, c, above), -orientation(a, b, c, above)) << k;
+    EXPECT_EQ(surface::orientation(a, b, c, above) * surface::orientation(a, b, c, below), -1) << k;
+    EXPECT_EQ(surface::orientation(a, b, c, above), (b - a).cross(c - a)[k] > 0 ? 1 : -1) << k;
+    EXPECT_EQ(surface::orientation(b, a, c, above), -surface::orientation(a, b, c, above)) << k;
   }
-  EXPECT_EQ(orientation(std::array{0, 1}, a, b, Vector3(a + 0.5 * (b - a))), 0);
+  EXPECT_EQ(surface::orientation(std::array{0, 1}, a, b, Vector3(a + 0.5 * (b - a))), 0);
 }
 
-TEST(Crossings, OfMeshesThatAreEmbeddedAreNone) {
+TEST(Crossings, DoNotExistInEmbeddedMeshes) {
   for (const char* shape : {"builtin:gear", "builtin:torus", "builtin:box", "builtin:sphere"}) {
     const Crossings crossings = findCrossings(shapes::mesh(shape));
     EXPECT_TRUE(crossings.found.empty()) << shape;
-    EXPECT_TRUE(crossings.all);
+    EXPECT_TRUE(crossings.complete);
   }
 }
 
-/// Two spheres that pass through each other.
+/// Two spheres that intersect each other.
 TriangleMesh lens() {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
   const auto count = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -173,27 +173,27 @@ TriangleMesh lens() {
   return mesh;
 }
 
-TEST(Crossings, LieWhereTheSurfacesPass) {
+TEST(Crossings, LieWhereTheSpheresIntersect) {
   const TriangleMesh mesh = lens();
   const auto half = static_cast<std::uint32_t>(mesh.triangles.size() / 2);
   const Crossings crossings = findCrossings(mesh);
-  EXPECT_TRUE(crossings.all);
+  EXPECT_TRUE(crossings.complete);
   EXPECT_GT(crossings.found.size(), 50u);
   for (const Crossing& crossing : crossings.found) {
     EXPECT_LT(crossing.triangles[0], half);
     EXPECT_GE(crossing.triangles[1], half);
-    EXPECT_NEAR(crossing.place.x(), 0.5, 0.15);
+    EXPECT_NEAR(crossing.position.x(), 0.5, 0.15);
   }
   EXPECT_TRUE(std::ranges::is_sorted(crossings.found, {}, &Crossing::triangles));
 }
 
-TEST(Crossings, AreTheSameForAnyThreadsAndNoMoreThanAskedFor) {
+TEST(Crossings, DoNotDependOnThreadsAndObeyTheLimit) {
   const TriangleMesh mesh = lens();
   const auto trianglesOf = [&](int threads, std::size_t limit) {
     const Crossings crossings = withThreads(threads, [&] { return findCrossings(mesh, limit); });
     std::vector<std::array<std::uint32_t, 2>> triangles;
     for (const Crossing& crossing : crossings.found) triangles.push_back(crossing.triangles);
-    EXPECT_EQ(crossings.all, limit > 1000);
+    EXPECT_EQ(crossings.complete, limit > 1000);
     return triangles;
   };
   const auto all = trianglesOf(1, 1'000'000);
@@ -213,27 +213,27 @@ TEST(Crossings, AreFoundAtAnyScale) {
     const std::size_t count = findCrossings(mesh).found.size();
     for (Vector3& x : mesh.vertices) x *= scale;
     EXPECT_NEAR(double(findCrossings(mesh).found.size()), double(count), 4) << scale;
-    EXPECT_NEAR(findCrossings(mesh).found[0].place.x() / scale, 0.5, 0.15);
+    EXPECT_NEAR(findCrossings(mesh).found[0].position.x() / scale, 0.5, 0.15);
   }
 }
 
-TEST(Crossings, OfTheSameTriangleTwiceIsOne) {
-  EXPECT_TRUE(meet(meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 2, 1})));
-  EXPECT_FALSE(meet(meshOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 2, 1}))) << "without area";
+TEST(Crossings, OfDuplicateTrianglesAreFoundUnlessDegenerate) {
+  EXPECT_TRUE(intersects(meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 2, 1})));
+  EXPECT_FALSE(intersects(meshOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 2, 1}))) << "without area";
 }
 
-TEST(Crossings, OfATriangleAloneAreNone) {
+TEST(Crossings, DoNotExistInASingleTriangle) {
   EXPECT_TRUE(findCrossings({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, "one"}).found.empty());
 }
 
 TEST(Crossings, CanBeCancelled) {
   std::atomic<int> left = 100;
-  EXPECT_THROW(findCrossings(lens(), kMostCrossings, {{}, [&] { return --left < 0; }}), Cancelled);
+  EXPECT_THROW(findCrossings(lens(), kMaxCrossings, {{}, [&] { return --left < 0; }}), Cancelled);
 }
 
-TEST(Crossings, NeedASurface) { EXPECT_THROW(findCrossings({}), Error); }
+TEST(Crossings, RefuseAnEmptyMesh) { EXPECT_THROW(findCrossings({}), Error); }
 
-TEST(Crossings, OfRealMeshesAreWhereTheyAreKnown) {
+TEST(Crossings, OfMeshFilesAreAsKnown) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const auto crossings = [](const char* file) { return findCrossings(importMesh(support::testMesh(file)).mesh); };
   EXPECT_TRUE(crossings("paper/bunny_69k.obj").found.empty());

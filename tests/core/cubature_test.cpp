@@ -8,7 +8,7 @@
 namespace hpsdf {
 namespace {
 
-double integral(const Cubature& rule, int i, int j, int k) {
+double integral(const basis::Cubature& rule, int i, int j, int k) {
   double sum = 0;
   for (std::size_t q = 0; q < rule.points.size(); ++q)
     sum += rule.weights[q] * std::pow(rule.points[q].x(), i) * std::pow(rule.points[q].y(), j) *
@@ -22,10 +22,10 @@ double exact(int i) { return i % 2 == 0 ? 2.0 / (i + 1) : 0; }
 TEST(CompactCubature, IntegratesUpToItsOrderAndNoFurther) {
   const std::map<int, std::size_t> points = {{5, 14}, {7, 34}, {9, 58}, {11, 90}, {13, 148}};
   for (const auto& [order, count] : points) {
-    const auto rule = compactCubature(order);
+    const auto rule = basis::compactCubature(order);
     ASSERT_TRUE(rule);
     EXPECT_EQ(rule->points.size(), count);
-    EXPECT_EQ(compactCubature(order - 1)->points, rule->points);
+    EXPECT_EQ(basis::compactCubature(order - 1)->points, rule->points);
     for (int i = 0; i <= order; ++i)
       for (int j = 0; i + j <= order; ++j)
         for (int k = 0; i + j + k <= order; ++k)
@@ -36,7 +36,7 @@ TEST(CompactCubature, IntegratesUpToItsOrderAndNoFurther) {
       EXPECT_LT(rule->points[q].cwiseAbs().maxCoeff(), 1);
     }
   }
-  EXPECT_FALSE(compactCubature(14));
+  EXPECT_FALSE(basis::compactCubature(14));
 }
 
 }  // namespace

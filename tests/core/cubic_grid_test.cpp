@@ -16,7 +16,7 @@
 namespace hpsdf {
 namespace {
 
-/// Takes numbers off a file's front.
+/// Reads numbers from the bytes of a file.
 class Reader {
  public:
   explicit Reader(const std::string& bytes) : rest_(bytes) {}
@@ -46,14 +46,14 @@ class Reader {
   std::string_view rest_;
 };
 
-/// Where a cell's nodes lie, in thirds of its edges: the order that the loaders' polynomials have.
-constexpr int kPlaces[32][3] = {
+/// Positions of a cell's nodes in thirds of its edges, in the order that the loaders of the files expect.
+constexpr int kNodePositions[32][3] = {
     {0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {3, 3, 0}, {0, 0, 3}, {3, 0, 3}, {0, 3, 3}, {3, 3, 3},   // corners
     {1, 0, 0}, {2, 0, 0}, {1, 0, 3}, {2, 0, 3}, {1, 3, 0}, {2, 3, 0}, {1, 3, 3}, {2, 3, 3},   // along x
     {0, 1, 0}, {0, 2, 0}, {3, 1, 0}, {3, 2, 0}, {0, 1, 3}, {0, 2, 3}, {3, 1, 3}, {3, 2, 3},   // along y
     {0, 0, 1}, {0, 0, 2}, {0, 3, 1}, {0, 3, 2}, {3, 0, 1}, {3, 0, 2}, {3, 3, 1}, {3, 3, 2}};  // along z
 
-TEST(CubicGrid, TheFileHoldsEachCellsNodesInTheFormatsOrder) {
+TEST(CubicGrid, WritesTheNodesOfEachCellInTheOrderOfTheFormat) {
   const Field field = oneLeafField(1, 2);
   const CubicGrid grid = sampleCubicGrid(field, {2, 3, 4});
   const std::string bytes = fileOf(grid);
@@ -77,22 +77,22 @@ TEST(CubicGrid, TheFileHoldsEachCellsNodesInTheFormatsOrder) {
   for (int z = 0; z < 4; ++z)
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 2; ++x)
-        for (const auto& place : kPlaces) {
+        for (const auto& position : kNodePositions) {
           const auto node = reader.number<std::uint32_t>();
           ASSERT_LT(node, nodes.size());
           used.insert(node);
-          const Vector3 at(x + place[0] / 3.0, y + place[1] / 3.0, z + place[2] / 3.0);
+          const Vector3 at(x + position[0] / 3.0, y + position[1] / 3.0, z + position[2] / 3.0);
           EXPECT_NEAR(nodes[node], field.value(lower + size.cwiseProduct(at)), 1e-13);
         }
   EXPECT_EQ(used.size(), nodes.size()) << "neighbours share all their nodes, and none is left over";
-  ASSERT_EQ(reader.size(), 1u) << "lists of the cells' places";
-  std::vector<std::uint32_t> places(24);
-  std::iota(places.begin(), places.end(), 0u);
-  EXPECT_EQ(reader.list<std::uint32_t>(), places);
+  ASSERT_EQ(reader.size(), 1u) << "lists of the cells' positions";
+  std::vector<std::uint32_t> positions(24);
+  std::iota(positions.begin(), positions.end(), 0u);
+  EXPECT_EQ(reader.list<std::uint32_t>(), positions);
   EXPECT_TRUE(reader.atEnd());
 }
 
-TEST(CubicGrid, CubicPolynomialsAreKept) {
+TEST(CubicGrid, ReproducesCubicPolynomials) {
   for (const int degree : {3, 4}) {
     const Field field = oneLeafField(2, degree);
     const CubicGridError error = measureCubicGrid(sampleCubicGrid(field, {2, 1, 3}), field, 1000);
@@ -105,7 +105,7 @@ TEST(CubicGrid, CubicPolynomialsAreKept) {
   }
 }
 
-TEST(CubicGrid, TwiceAsManyCellsAreWrongByASixteenth) {
+TEST(CubicGrid, ConvergesWithFourthOrder) {
   const Field field = oneLeafField(3, 6);
   const auto rms = [&](std::uint32_t n) {
     return measureCubicGrid(sampleCubicGrid(field, {n, n, n}), field, 20000).everywhere.rms;
@@ -114,8 +114,8 @@ TEST(CubicGrid, TwiceAsManyCellsAreWrongByASixteenth) {
   EXPECT_NEAR(rms(16) / rms(32), 16, 1);
 }
 
-TEST(CubicGrid, AtACreaseItIsAHalf) {
-  FieldData data;  // |x|, and odd numbers of cells, so that the crease lies within some
+TEST(CubicGrid, ConvergesWithFirstOrderAtACrease) {
+  FieldData data;  // |x|; with odd numbers of cells the crease lies inside a cell
   data.domain = Box(Vector3(-1, 0, 0), Vector3(1, 1, 1));
   data.grid = {2, 1, 1};
   data.nodes = {node::leaf(1, 0), node::leaf(1, 4)};
@@ -128,7 +128,7 @@ TEST(CubicGrid, AtACreaseItIsAHalf) {
   EXPECT_NEAR(max(21) / max(41), 41.0 / 21, 0.02);
 }
 
-TEST(CubicGrid, ADifferenceIsMeasured) {
+TEST(CubicGrid, MeasuresAKnownDifference) {
   const Field field = oneLeafField(4, 1);
   CubicGrid grid = sampleCubicGrid(field, {3, 3, 3});
   for (double& node : grid.nodes) node += 0.5;
@@ -149,7 +149,7 @@ TEST(CubicGrid, ADifferenceIsMeasured) {
   EXPECT_EQ(none.rms, 0);
 }
 
-TEST(CubicGrid, ResolutionsFollowTheDomain) {
+TEST(CubicGrid, ChoosesNearlyCubicCells) {
   const Box flat(Vector3(0, 0, 0), Vector3(2, 1, 0.01));
   EXPECT_EQ(cubicGridResolution(flat, 9), (GridResolution{9, 5, 1}));
   const GridResolution finest = finestCubicGrid(flat, 1'000'000);
@@ -159,16 +159,16 @@ TEST(CubicGrid, ResolutionsFollowTheDomain) {
   EXPECT_THROW(finestCubicGrid(flat, 559), Error);
 }
 
-TEST(CubicGrid, WhatBulletCannotReadIsRefusedBeforeMemoryIsTaken) {
+TEST(CubicGrid, RefusesFilesTooLargeForBulletBeforeAllocating) {
   const Field field = oneLeafField(5, 1);
   for (const GridResolution& resolution :
        {GridResolution{225, 225, 225}, GridResolution{4'000'000'000, 4'000'000'000, 4'000'000'000},
         GridResolution{0, 5, 5}})
     EXPECT_THROW(sampleCubicGrid(field, resolution), Error);
-  EXPECT_LE(cubicGridBytes({224, 224, 224}), double(kMostCubicGridBytes));
+  EXPECT_LE(cubicGridBytes({224, 224, 224}), double(kMaxCubicGridBytes));
 }
 
-TEST(CubicGrid, AGridThatLacksNodesIsNotWritten) {
+TEST(CubicGrid, RefusesToWriteAGridThatLacksNodes) {
   CubicGrid grid = sampleCubicGrid(oneLeafField(5, 1), {2, 2, 2});
   grid.nodes.pop_back();
   const support::TemporaryDirectory folder;
@@ -176,7 +176,7 @@ TEST(CubicGrid, AGridThatLacksNodesIsNotWritten) {
   EXPECT_THROW(writeCubicGrid(grid, out), Error);
 }
 
-TEST(CubicGrid, ThreadsDoNotMatter) {
+TEST(CubicGrid, DoesNotDependOnTheNumberOfThreads) {
   const Field field = oneLeafField(6, 5);
   const CubicGrid grid = sampleCubicGrid(field, {20, 20, 20}, 1);
   EXPECT_EQ(sampleCubicGrid(field, {20, 20, 20}, 4).nodes, grid.nodes);
@@ -187,7 +187,7 @@ TEST(CubicGrid, ThreadsDoNotMatter) {
   EXPECT_NE(one.everywhere.rms, measureCubicGrid(grid, field, 10000, 8).everywhere.rms) << "other points";
 }
 
-TEST(CubicGrid, AllOfItCanBeCancelled) {
+TEST(CubicGrid, CanBeCancelled) {
   const Field field = oneLeafField(6, 3);
   const CubicGrid grid = sampleCubicGrid(field, {3, 3, 3});
   double fraction = 0;

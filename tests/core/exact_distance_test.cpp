@@ -29,8 +29,8 @@
 namespace hpsdf {
 namespace {
 
-using distance::makeFrame;
-using distance::TriangleFrame;
+using bvh::makeFrame;
+using bvh::TriangleFrame;
 using Triangle = std::array<Vector3, 3>;
 
 class Random {
@@ -57,9 +57,8 @@ Triangle cornersOf(const TriangleMesh& mesh, std::size_t triangle) {
   return {mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]};
 }
 
-// --- a reference for one triangle: another algorithm (plane by normal equations, or the nearest side) in 113 bits,
-// which
-// --- leave enough of the determinant of a sliver of thickness 1e-12
+// --- Reference for one triangle: the normal equations of the plane, or the nearest edge, in 113 bits, so that the
+// --- determinant of a sliver of thickness 1e-12 keeps enough digits.
 
 __extension__ using Quad = __float128;
 using QuadVector = std::array<Quad, 3>;
@@ -87,7 +86,7 @@ double triangleReference(const Vector3& point, const Triangle& corners) {
   if (determinant > 0) {
     Quad u = 0, v = 0;
     QuadVector rest = from;
-    for (int step = 0; step < 3; ++step) {  // refined: one solve loses digits on a thin triangle
+    for (int step = 0; step < 3; ++step) {  // iterative refinement: one solution is inexact on a thin triangle
       u += (ff * dot(rest, e) - ef * dot(rest, f)) / determinant;
       v += (ee * dot(rest, f) - ef * dot(rest, e)) / determinant;
       rest = plus(plus(from, -u, e), -v, f);
@@ -119,18 +118,18 @@ void expectDistancesAround(const Triangle& corners, Random& random) {
   }
 }
 
-TEST(TriangleFrame, DistanceToOrdinaryTriangles) {
+TEST(TriangleFrame, MeasuresDistancesToOrdinaryTriangles) {
   Random random(1);
   for (int i = 0; i < 500; ++i)
     ASSERT_NO_FATAL_FAILURE(expectDistancesAround({random.inCube(1), random.inCube(1), random.inCube(1)}, random));
 }
 
-TEST(TriangleFrame, DistanceToSlivers) {
+TEST(TriangleFrame, MeasuresDistancesToSlivers) {
   Random random(2);
   for (const double thickness : {1e-3, 1e-5, 1e-7, 1e-9, 1e-12})
     for (int i = 0; i < 100; ++i) {
       const Vector3 a = random.inCube(1), b = random.inCube(1);
-      // the apex beside any place of the long side, its ends included
+      // The apex lies beside any position on the long side, including its ends.
       const double t = i % 4 == 0 ? 0.0 : i % 4 == 1 ? 1.0 : random.between(0, 1);
       const Vector3 c = a + t * (b - a) + thickness * random.inCube(1);
       ASSERT_NO_FATAL_FAILURE(expectDistancesAround({a, b, c}, random));
@@ -139,7 +138,7 @@ TEST(TriangleFrame, DistanceToSlivers) {
     }
 }
 
-TEST(TriangleFrame, TrianglesWithoutAreaAnswerByTheirSides) {
+TEST(TriangleFrame, MeasuresDistancesToEdgesOfDegenerateTriangles) {
   Random random(3);
   const Vector3 a(0.25, -0.5, 0.125), b(0.75, 0.5, -0.375);
   for (const Triangle& corners : {Triangle{a, b, (a + b) / 2}, Triangle{a, b, a}, Triangle{a, a, b}, Triangle{b, a, a},
@@ -149,7 +148,7 @@ TEST(TriangleFrame, TrianglesWithoutAreaAnswerByTheirSides) {
   }
 }
 
-TEST(TriangleFrame, FrameIsOrthonormalAndKeepsOrientation) {
+TEST(TriangleFrame, IsOrthonormalAndKeepsOrientation) {
   Random random(4);
   for (int i = 0; i < 300; ++i) {
     const Triangle corners{random.inCube(1), random.inCube(1), random.inCube(1)};
@@ -162,7 +161,7 @@ TEST(TriangleFrame, FrameIsOrthonormalAndKeepsOrientation) {
   }
 }
 
-// --- meshes that need no file
+// --- Procedural meshes
 
 TriangleMesh sphere(int subdivisions) {
   TriangleMesh mesh;
@@ -173,10 +172,10 @@ TriangleMesh sphere(int subdivisions) {
   for (; subdivisions > 0; --subdivisions) {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
     const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [place, isNew] =
+      const auto [entry, isNew] =
           middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(mesh.vertices.size()));
       if (isNew) mesh.vertices.push_back((mesh.vertices[a] + mesh.vertices[b]).normalized());
-      return place->second;
+      return entry->second;
     };
     std::vector<std::array<std::uint32_t, 3>> finer;
     for (const auto& [a, b, c] : mesh.triangles) {
@@ -188,7 +187,7 @@ TriangleMesh sphere(int subdivisions) {
   return mesh;
 }
 
-/// Corner number = x + 2y + 4z.
+/// A box around the origin with these half sizes. The index of a vertex is x + 2y + 4z with x, y, z in {0, 1}.
 TriangleMesh box(const Vector3& half) {
   TriangleMesh mesh;
   mesh.name = "box";
@@ -211,7 +210,7 @@ TriangleMesh tetrahedron(const std::array<Vector3, 4>& corners) {
   return mesh;
 }
 
-/// Inside every face's half-space: for convex meshes.
+/// Returns true if x is inside the half-spaces of all faces. The mesh must be convex.
 bool insideConvex(const TriangleMesh& mesh, const Vector3& x) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle corners = cornersOf(mesh, t);
@@ -220,7 +219,7 @@ bool insideConvex(const TriangleMesh& mesh, const Vector3& x) {
   return true;
 }
 
-// --- brute force over all triangles
+// --- Brute force over all triangles
 
 std::vector<TriangleFrame> framesOf(const TriangleMesh& mesh) {
   std::vector<TriangleFrame> frames;
@@ -232,7 +231,7 @@ std::pair<double, std::uint32_t> bruteForce(const std::vector<TriangleFrame>& fr
   std::pair best{std::numeric_limits<double>::infinity(), std::uint32_t{0}};
   for (const TriangleFrame& frame : frames) {
     const double height = frame.normal.dot(x - frame.origin);
-    if (height * height > best.first * 1.001) continue;  // the plane alone is farther
+    if (height * height > best.first * 1.001) continue;  // even the plane is farther
     const double squared = squaredDistance(frame, x);
     if (squared < best.first) best = {squared, frame.triangle};
   }
@@ -249,7 +248,7 @@ void inTwoThreads(std::size_t count, Function function) {
   other.join();
 }
 
-/// For meshes that are not closed: triangles alone, no patches of holes.
+/// Options for meshes that are not closed: distances to triangles only, without surfaces that close holes.
 const DistanceOptions kByNormals{.insideTest = InsideTest::pseudonormal};
 
 void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& points) {
@@ -266,7 +265,7 @@ void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& poin
     const double expected = std::sqrt(nearest[i].first);
     ASSERT_NEAR(std::abs(closest.signedDistance), expected, 1e-12 * expected + rounding) << points[i].transpose();
     ASSERT_EQ(std::bit_cast<std::uint64_t>(batch[i]), std::bit_cast<std::uint64_t>(closest.signedDistance));
-    // independent of frames: the triangle itself, and the point that was named
+    // The distances to the reported triangle and to the reported point do not depend on frames.
     const double reference = triangleReference(points[i], cornersOf(mesh, closest.triangle));
     const double coordinates = rounding + 1e-15 * points[i].cwiseAbs().maxCoeff();
     ASSERT_NEAR(std::abs(closest.signedDistance), reference, 1e-12 * reference + coordinates) << points[i].transpose();
@@ -274,7 +273,7 @@ void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& poin
   }
 }
 
-/// In and around the domain, near the surface at several distances, on faces, edges and vertices.
+/// Points in and around the domain, near the surface at several distances, and on faces, edges and vertices.
 std::vector<Vector3> probes(const TriangleMesh& mesh, std::size_t count, std::uint64_t seed) {
   Random random(seed);
   const Box bounds = boundingBox(mesh);
@@ -283,31 +282,16 @@ std::vector<Vector3> probes(const TriangleMesh& mesh, std::size_t count, std::ui
   for (std::size_t i = 0; i < count; ++i) {
     const Triangle corners = cornersOf(mesh, random.below(mesh.triangles.size()));
     const Vector3 onSurface = random.onTriangle(corners);
-    switch (i % 8) {
-      case 0:
-        points.push_back(corners[0]);
-        break;
-      case 1:
-        points.push_back((corners[0] + corners[1]) / 2);
-        break;
-      case 2:
-        points.push_back(onSurface);
-        break;
-      case 3:
-        points.push_back(onSurface + random.inCube(1e-6 * half));
-        break;
-      case 4:
-        points.push_back(onSurface + random.inCube(0.02 * half));
-        break;
-      case 5:
-        points.push_back(onSurface + random.inCube(0.2 * half));
-        break;
-      case 6:
-        points.push_back(bounds.center() + random.inCube(3 * half));
-        break;
-      default:
-        points.push_back(bounds.center() + random.inCube(1.1 * half));
-    }
+    constexpr std::array kOffsets = {0.0, 1e-6, 0.02, 0.2};
+    const std::size_t kind = i % 8;
+    if (kind == 0)
+      points.push_back(corners[0]);
+    else if (kind == 1)
+      points.push_back((corners[0] + corners[1]) / 2);
+    else if (kind < 6)
+      points.push_back(onSurface + random.inCube(kOffsets[kind - 2] * half));
+    else
+      points.push_back(bounds.center() + random.inCube((kind == 6 ? 3 : 1.1) * half));
   }
   return points;
 }
@@ -318,12 +302,12 @@ TEST(ExactDistance, EqualsBruteForceOnASphere) {
   expectBruteForce(mesh, probes(mesh, 4000, 10));
 }
 
-TEST(ExactDistance, NearTheAnalyticSphere) {
+TEST(ExactDistance, ApproximatesTheAnalyticSphere) {
   const ExactDistance distance(sphere(5));
   Random random(11);
   for (int i = 0; i < 2000; ++i) {
     const Vector3 x = random.inCube(1.5);
-    EXPECT_NEAR(distance(x), x.norm() - 1, 1e-3);  // the facets' sagitta
+    EXPECT_NEAR(distance(x), x.norm() - 1, 1e-3);  // tolerance for the sagitta of the facets
   }
 }
 
@@ -351,7 +335,7 @@ TEST(ExactDistance, EqualsBruteForceFarFromTheOrigin) {
   const std::vector<Vector3> points = probes(mesh, 2000, 14);
   expectBruteForce(mesh, points);
   const ExactDistance moved(mesh);
-  // 2e4 is kept to 4e-12; on the surface itself the sign is up to that rounding
+  // Coordinates of 2e4 are spaced by 4e-12: the sign is undefined within that distance of the surface.
   for (const Vector3& x : points) EXPECT_NEAR(moved(x), atOrigin(x - shift), 2e-11);
 }
 
@@ -375,14 +359,15 @@ TEST(ExactDistance, EqualsBruteForceFarAway) {
   for (const double far : {1e2, 1e5, 1e8, 1e20, 1e60})
     for (int i = 0; i < 50; ++i) {
       const Vector3 x = random.inCube(1).normalized() * far;
-      // beyond some 1e15 sizes all triangles are equally near, and the sign is that of any
+      // Beyond about 1e15 times the size all triangles are equally near, and the sign is that of any of them.
       EXPECT_NEAR(far < 1e10 ? distance(x) : std::abs(distance(x)), far - 1, 1e-14 * far + 0.06);
       EXPECT_EQ(distance.closestPoint(x).triangle, bruteForce(framesOf(mesh), x).second);
     }
 }
 
-// Boxes that overlap wholly, or shrink by a factor a triangle, defeat any splitting plane: the depth must stay bounded.
-TEST(ExactDistance, StacksOfEqualTriangles) {
+// Boxes that overlap completely, or shrink by a factor from triangle to triangle, have no good splitting plane. The
+// depth of the hierarchy must stay bounded.
+TEST(ExactDistance, HandlesStacksOfEqualTriangles) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   mesh.triangles.assign(200'000, {0, 1, 2});
@@ -393,7 +378,7 @@ TEST(ExactDistance, StacksOfEqualTriangles) {
   }
 }
 
-TEST(ExactDistance, TrianglesShrinkingByAFactorEach) {
+TEST(ExactDistance, HandlesTrianglesThatShrinkByAFactor) {
   TriangleMesh mesh;
   for (std::uint32_t t = 0; t < 900; ++t) {
     const double size = std::pow(0.7, t);
@@ -403,10 +388,10 @@ TEST(ExactDistance, TrianglesShrinkingByAFactorEach) {
   expectBruteForce(mesh, probes(mesh, 2000, 17));
 }
 
-// --- signs
+// --- Signs
 
-/// Many triangles whose centres differ by less than single precision can divide by.
-TEST(ExactDistance, ClustersTooSmallForAnyBin) {
+/// The centers of many triangles differ by less than the smallest divisor in single precision.
+TEST(ExactDistance, HandlesClustersTooSmallForBinning) {
   for (const double size : {1e-37, 1e-38, 1e-39, 1e-41, 1e-44}) {
     TriangleMesh mesh;
     const auto add = [&](const Vector3& a, double length) {
@@ -423,7 +408,7 @@ TEST(ExactDistance, ClustersTooSmallForAnyBin) {
   }
 }
 
-TEST(ExactDistance, AnyFiniteCoordinatesAreTakenWithoutHarm) {
+TEST(ExactDistance, AcceptsAnyFiniteCoordinates) {
   for (const double size : {1e-320, 1e-310, 1e300, 1e307})
     for (const double at : {0.0, 1.6e308}) {
       TriangleMesh mesh = sphere(2);
@@ -432,7 +417,7 @@ TEST(ExactDistance, AnyFiniteCoordinatesAreTakenWithoutHarm) {
     }
 }
 
-TEST(ExactDistance, SignedDistanceOfABox) {
+TEST(ExactDistance, EqualsTheSignedDistanceOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const ExactDistance distance(box(half));
   Random random(20);
@@ -442,7 +427,7 @@ TEST(ExactDistance, SignedDistanceOfABox) {
   }
 }
 
-TEST(ExactDistance, SignNearVerticesAndEdgesOfABox) {
+TEST(ExactDistance, HasTheRightSignNearVerticesAndEdgesOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const TriangleMesh mesh = box(half);
   const ExactDistance distance(mesh);
@@ -457,7 +442,7 @@ TEST(ExactDistance, SignNearVerticesAndEdgesOfABox) {
     }
 }
 
-TEST(ExactDistance, FeatureAndLowestTriangleAreNamed) {
+TEST(ExactDistance, ReportsFeatureAndLowestTriangle) {
   const ExactDistance distance(box(Vector3(1, 1, 1)));
   const ClosestPoint face = distance.closestPoint({0.5, -0.25, 3});
   EXPECT_EQ(face.feature, Feature::face);
@@ -471,12 +456,12 @@ TEST(ExactDistance, FeatureAndLowestTriangleAreNamed) {
   EXPECT_EQ(vertex.feature, Feature::vertex);
   EXPECT_EQ(vertex.point, Vector3(-1, -1, -1));
   EXPECT_EQ(vertex.triangle, 0u);
-  const ClosestPoint center = distance.closestPoint({0, 0, 0});  // all twelve are equally near
+  const ClosestPoint center = distance.closestPoint({0, 0, 0});  // all twelve triangles are equally near
   EXPECT_EQ(center.triangle, 0u);
   EXPECT_EQ(center.signedDistance, -1);
 }
 
-TEST(ExactDistance, SignOfRandomTetrahedra) {
+TEST(ExactDistance, HasTheRightSignForRandomTetrahedra) {
   Random random(22);
   for (int i = 0; i < 200; ++i) {
     const TriangleMesh mesh = tetrahedron({random.inCube(1), random.inCube(1), random.inCube(1), random.inCube(1)});
@@ -491,7 +476,7 @@ TEST(ExactDistance, SignOfRandomTetrahedra) {
   }
 }
 
-/// The prism over a triangle with the angle at its first corner, at the z axis.
+/// The prism over a triangle whose first corner, on the z axis, has this angle.
 TriangleMesh wedge(double angle) {
   TriangleMesh mesh;
   mesh.name = "wedge";
@@ -501,11 +486,11 @@ TriangleMesh wedge(double angle) {
   return mesh;
 }
 
-TEST(ExactDistance, SignAtDihedralWedges) {
+TEST(ExactDistance, HasTheRightSignAtDihedralWedges) {
   Random random(23);
   for (const double angleDegrees : {2.0, 10.0, 45.0, 90.0, 135.0, 175.0}) {
     const TriangleMesh solid = wedge(angleDegrees * std::numbers::pi / 180);
-    TriangleMesh hollow = solid;  // turned inside out, the same edges are reentrant
+    TriangleMesh hollow = solid;  // in the reversed prism the same edges are reentrant
     for (auto& triangle : hollow.triangles) std::swap(triangle[0], triangle[1]);
     const ExactDistance distance(solid), outside(hollow);
     for (int i = 0; i < 3000; ++i) {
@@ -520,8 +505,8 @@ TEST(ExactDistance, SignAtDihedralWedges) {
   }
 }
 
-// The apex of a deep notch and its rim are reentrant and saddle-like: face normals alone would err here.
-TEST(ExactDistance, SignAtANotch) {
+// The apex of a deep notch is reentrant, and its boundary has saddle points. Face normals give wrong signs here.
+TEST(ExactDistance, HasTheRightSignAtANotch) {
   TriangleMesh mesh = box(Vector3(1, 1, 1));
   mesh.vertices.push_back({0.7, 0.6, -0.9});
   std::erase_if(mesh.triangles, [](const auto& t) { return t[0] == 4 && (t[1] == 5 || (t[1] == 7 && t[2] == 6)); });
@@ -543,7 +528,7 @@ TEST(ExactDistance, SignAtANotch) {
   EXPECT_GT(within, 1000);
 }
 
-TEST(ExactDistance, OnTheSurfaceItIsPlusZero) {
+TEST(ExactDistance, IsPositiveZeroOnTheSurface) {
   for (const TriangleMesh& mesh : {box(Vector3(1, 0.5, 0.25)), sphere(3), wedge(0.3)}) {
     const ExactDistance distance(mesh);
     for (const Vector3& vertex : mesh.vertices) {
@@ -567,17 +552,18 @@ TEST(ExactDistance, OnTheSurfaceItIsPlusZero) {
   }
 }
 
-// A T-junction closed by a triangle without area: topology stays closed, and that triangle must not spoil any sign.
-TEST(ExactDistance, CollapsedTriangleWithinAMesh) {
+// A degenerate triangle closes a T-junction, so that the mesh is closed. The triangle must not affect any sign.
+TEST(ExactDistance, IgnoresDegenerateTrianglesForSigns) {
   const Vector3 half(1, 1, 1);
   TriangleMesh mesh = box(half);
-  mesh.vertices.push_back({0, 0, 1});  // the middle of the top's diagonal 4-7
+  mesh.vertices.push_back({0, 0, 1});  // midpoint of the diagonal 4-7 of the top
   std::erase_if(mesh.triangles, [](const auto& t) { return t == std::array<std::uint32_t, 3>{4, 7, 6}; });
   mesh.triangles.push_back({4, 7, 8});
   mesh.triangles.push_back({4, 8, 6});
   mesh.triangles.push_back({8, 7, 6});
-  mesh.triangles.push_back({0, 0, 5});                                                  // two equal corners
-  std::rotate(mesh.triangles.begin(), mesh.triangles.end() - 4, mesh.triangles.end());  // wins every tie
+  mesh.triangles.push_back({0, 0, 5});  // two equal corners
+  std::rotate(mesh.triangles.begin(), mesh.triangles.end() - 4,
+              mesh.triangles.end());  // the lowest indices win every tie
   const ExactDistance distance(mesh);
   Random random(25);
   for (int i = 0; i < 4000; ++i) {
@@ -587,14 +573,14 @@ TEST(ExactDistance, CollapsedTriangleWithinAMesh) {
   }
 }
 
-TEST(ExactDistance, OneTriangleHasTwoSides) {
+TEST(ExactDistance, HasBothSignsAroundOneTriangle) {
   const ExactDistance distance(TriangleMesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, ""}, kByNormals);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, 2)), 2);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, -2)), -2);
   EXPECT_EQ(distance(Vector3(3, 0, 0)), 2);
 }
 
-// --- the same answer however it is asked
+// --- Independence of the kind of query
 
 void expectSameBits(const std::vector<double>& a, const std::vector<double>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -606,7 +592,7 @@ TEST(ExactDistance, SingleBatchedShuffledAndThreadedAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
   std::vector<Vector3> points = probes(mesh, 6000, 30);
-  points.push_back(Vector3::Zero());  // nearly every triangle is equally near
+  points.push_back(Vector3::Zero());  // nearly all triangles are equally near
   std::vector<double> single;
   for (const Vector3& x : points) single.push_back(distance(x));
 
@@ -635,7 +621,7 @@ TEST(ExactDistance, SingleBatchedShuffledAndThreadedAgreeBitForBit) {
   expectSameBits(single, threaded);
 }
 
-/// Every instruction set that this processor has, down to none at all.
+/// Tries every instruction set of this processor, down to the scalar fallback.
 TEST(ExactDistance, InstructionSetsAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
@@ -660,7 +646,7 @@ TEST(ExactDistance, InstructionSetsAgreeBitForBit) {
   EXPECT_GE(names.size(), 2u);
 }
 
-TEST(ExactDistance, TheOrderOfTrianglesDecidesTiesOnly) {
+TEST(ExactDistance, DependsOnTheOrderOfTrianglesForTiesOnly) {
   TriangleMesh mesh = sphere(3);
   const std::vector<Vector3> points = probes(mesh, 3000, 31);
   const ExactDistance distance(mesh);
@@ -670,7 +656,7 @@ TEST(ExactDistance, TheOrderOfTrianglesDecidesTiesOnly) {
   for (const Vector3& x : points) EXPECT_NEAR(shuffled(x), distance(x), 1e-15);
 }
 
-TEST(ExactDistance, NonFinitePointsAreAnsweredWithoutHarm) {
+TEST(ExactDistance, AcceptsNonFinitePoints) {
   const ExactDistance distance(sphere(2));
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::vector<Vector3> points = {{nan, 0, 0}, {2, 0, 0}, {infinity, 0, 0}, {0, -infinity, infinity}, {0, 0, 3}};
@@ -689,8 +675,8 @@ TEST(ExactDistance, NonFinitePointsAreAnsweredWithoutHarm) {
     }
 }
 
-/// Points near, far and too far for float share packets with no numbers.
-TEST(ExactDistance, NonFinitePointsLeaveTheirNeighboursAlone) {
+/// Points near the mesh, far away and beyond single precision share packets with points that are not finite.
+TEST(ExactDistance, NonFinitePointsDoNotAffectTheirPacket) {
   const ExactDistance distance(sphere(2));
   std::vector<Vector3> points;
   for (const double far : {1e-3, 1e10, 1e20})
@@ -707,9 +693,9 @@ TEST(ExactDistance, NonFinitePointsLeaveTheirNeighboursAlone) {
   }
 }
 
-// --- the object
+// --- The object
 
-TEST(ExactDistance, SourceSizeAndMove) {
+TEST(ExactDistance, KnowsItsSourceAndSizeAndCanBeMoved) {
   TriangleMesh mesh = sphere(2);
   ExactDistance distance(mesh);
   EXPECT_EQ(distance.source().name, "sphere");
@@ -719,7 +705,7 @@ TEST(ExactDistance, SourceSizeAndMove) {
   EXPECT_EQ(distance.source().box.min(), Vector3(-1, -1, -1));
   EXPECT_EQ(distance.source().box.max(), Vector3(1, 1, 1));
   EXPECT_GT(distance.bytes(), mesh.triangles.size() * 9 * sizeof(double));
-  mesh = {};  // nothing of it is referred to
+  mesh = {};  // the distance must not reference it
   const ExactDistance moved = std::move(distance);
   EXPECT_EQ(moved(Vector3(3, 0, 0)), 2);
   const DistanceFunction function(moved);
@@ -737,7 +723,7 @@ void expectError(const TriangleMesh& mesh, const std::string& part) {
   }
 }
 
-TEST(ExactDistance, RefusesWhatIsNoMesh) {
+TEST(ExactDistance, RefusesInvalidMeshes) {
   TriangleMesh mesh = sphere(1);
   mesh.triangles.clear();
   expectError(mesh, "no faces");
@@ -751,7 +737,7 @@ TEST(ExactDistance, RefusesWhatIsNoMesh) {
   }
 }
 
-// --- meshes of the folder: ten thousand points each against all triangles
+// --- Mesh files: ten thousand points each, compared with brute force
 
 class ExactDistanceOfMeshes : public testing::TestWithParam<const char*> {};
 

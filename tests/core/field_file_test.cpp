@@ -61,8 +61,8 @@ TEST(FieldFile, RoundTripKeepsEveryByteAndValue) {
     EXPECT_EQ(again.metadata().source.fingerprint, 0x123456789abcdef0u);
     EXPECT_EQ(again.metadata().totalError, field.metadata().totalError);
     EXPECT_EQ(again.metadata().roundingRms, field.metadata().roundingRms);
-    EXPECT_EQ(again.metadata().maxDepth, 5u);
-    EXPECT_EQ(again.metadata().band, 0.4);
+    EXPECT_EQ(again.metadata().settings.maxDepth, 5);
+    EXPECT_EQ(again.metadata().settings.band, 0.4);
     EXPECT_TRUE(again.domain().isApprox(field.domain(), 0));
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> uniform(-1.5, 1.5);
@@ -218,13 +218,13 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   FieldData data = small().data();
   data.blend = 0.125;
   data.bounds.assign(data.nodes.size(), CellBound{0.25f, 1.5f});
-  data.metadata.estimator = Estimator::residual;
-  data.metadata.criterion = Criterion::optimal;
-  data.metadata.nearnessKind = NearnessKind::exponential;
-  data.metadata.maxError = 0.01;
+  data.metadata.settings.estimator = Estimator::residual;
+  data.metadata.settings.criterion = Criterion::optimal;
+  data.metadata.settings.nearnessKind = NearnessKind::exponential;
+  data.metadata.settings.maxError = 0.01;
   data.metadata.measuredError = 0.0075;
-  data.metadata.enriched = true;
-  data.metadata.continuityWeight = 3;
+  data.metadata.settings.enrich = true;
+  data.metadata.settings.continuityWeight = 3;
   data.metadata.source.insideTest = InsideTest::shell;
   data.metadata.source.thickness = 0.125;
   save(Field(data), file);
@@ -235,13 +235,13 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
   EXPECT_EQ(again.data().bounds.back().slope, 1.5f);
   EXPECT_EQ(again.metadata().source.insideTest, InsideTest::shell);
   EXPECT_EQ(again.metadata().source.thickness, 0.125);
-  EXPECT_EQ(again.metadata().estimator, Estimator::residual);
-  EXPECT_EQ(again.metadata().criterion, Criterion::optimal);
-  EXPECT_EQ(again.metadata().nearnessKind, NearnessKind::exponential);
-  EXPECT_EQ(again.metadata().maxError, 0.01);
+  EXPECT_EQ(again.metadata().settings.estimator, Estimator::residual);
+  EXPECT_EQ(again.metadata().settings.criterion, Criterion::optimal);
+  EXPECT_EQ(again.metadata().settings.nearnessKind, NearnessKind::exponential);
+  EXPECT_EQ(again.metadata().settings.maxError, 0.01);
   EXPECT_EQ(again.metadata().measuredError, 0.0075);
-  EXPECT_TRUE(again.metadata().enriched);
-  EXPECT_EQ(again.metadata().continuityWeight, 3);
+  EXPECT_TRUE(again.metadata().settings.enrich);
+  EXPECT_EQ(again.metadata().settings.continuityWeight, 3);
 }
 
 /// Blends, bounds and ways to steer that are none, with a right checksum.

@@ -32,7 +32,7 @@ Vector3 randomPoint(std::mt19937_64& random, double half) {
   return {x, y, uniform(random)};
 }
 
-/// Two base cells along x, the second split once; every leaf holds the constant of its place.
+/// Makes two base cells along x. The first one holds 100; the second is split once, and child n holds n.
 FieldData steps() {
   FieldData data;
   data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
@@ -50,15 +50,15 @@ FieldData steps() {
 TEST(Field, CellsAreHalfOpen) {
   const Field field(steps());
   EXPECT_EQ(field.value({0.9999, 0.5, 0.5}), 100);
-  EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // the face belongs to the upper cell
-  EXPECT_EQ(field.value({1.5, 0.2, 0.2}), 1);  // child x
-  EXPECT_EQ(field.value({1.2, 0.5, 0.2}), 2);  // child y
-  EXPECT_EQ(field.value({1.2, 0.2, 0.5}), 4);  // child z
-  EXPECT_EQ(field.value({2, 1, 1}), 7);        // the domain itself is closed
+  EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // The face belongs to the upper cell.
+  EXPECT_EQ(field.value({1.5, 0.2, 0.2}), 1);  // lies in child x
+  EXPECT_EQ(field.value({1.2, 0.5, 0.2}), 2);  // lies in child y
+  EXPECT_EQ(field.value({1.2, 0.2, 0.5}), 4);  // lies in child z
+  EXPECT_EQ(field.value({2, 1, 1}), 7);        // The domain itself is closed.
   EXPECT_EQ(field.value({1.49, 0.49, 0.49}), 0);
 }
 
-TEST(Field, CellLookup) {
+TEST(Field, FindsTheCellOfAPoint) {
   const Field field(steps());
   const Cell cell = field.cellAt({1.7, 0.1, 0.8});
   EXPECT_EQ(cell.id, 2u + 5u);
@@ -98,7 +98,7 @@ TEST(Field, StatisticsAddUp) {
   EXPECT_EQ(coefficients, s.coefficients);
   EXPECT_EQ(s.nodes, 216 + (s.leaves - 216) / 7 * 8);
   EXPECT_GT(s.bytes, s.nodes * 8 + s.coefficients * 4);
-  EXPECT_LE(s.bytes, (s.nodes * 8 + s.coefficients * 4) * 17 / 16) << "with the directory";
+  EXPECT_LE(s.bytes, (s.nodes * 8 + s.coefficients * 4) * 17 / 16) << "with the lookup grid";
 }
 
 TEST(Field, GradientMatchesCentralDifferencesWithinCells) {
@@ -145,7 +145,7 @@ TEST(Field, ContinuesOutsideWithMatchingGradient) {
     }
   }
   EXPECT_GT(outside, 3000);
-  // continuous across the border
+  // The field is continuous across the domain's boundary.
   for (int n = 0; n < 200; ++n) {
     Vector3 x = randomPoint(random, 1.0);
     x[n % 3] = 1.1;
@@ -154,7 +154,7 @@ TEST(Field, ContinuesOutsideWithMatchingGradient) {
   }
 }
 
-TEST(Field, NotANumberAndInfinityAreAnswered) {
+TEST(Field, EvaluatesAtInfinityAndNan) {
   const Field& field = torusField();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
@@ -166,7 +166,7 @@ TEST(Field, NotANumberAndInfinityAreAnswered) {
   EXPECT_TRUE(field.valueAndGradient({std::nextafter(field.domain().max().x(), 9), 0, 0}).gradient.allFinite());
 }
 
-/// The lookup grid is a short cut to where the descent from the base cells leads: on faces and corners of cells, on and
+/// The lookup grid leads to the same leaf as the descent from the base cells: on faces and corners of cells, on and
 /// beyond the domain's boundary, at depths above and below its own, for grids of any shape.
 TEST(Field, QueriesEndInTheCellThatHoldsThePoint) {
   const auto phi = [](const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; };
@@ -175,20 +175,21 @@ TEST(Field, QueriesEndInTheCellThatHoldsThePoint) {
                                       BuildOptions{.targetError = 1e-3, .grid = {7, 1, 1}}}) {
     const Field field = build(phi, domain, options);
     std::mt19937_64 random(8);
-    std::uniform_int_distribution<int> place(-4, 68);
+    std::uniform_int_distribution<int> eighth(-4, 68);
     std::uniform_real_distribution<double> coordinate(-1.6, 1.6);
     for (int n = 0; n < 20000; ++n) {
       Vector3 x(coordinate(random), coordinate(random), coordinate(random));
-      for (int axis = 0; axis < 3; ++axis)  // often on faces
+      for (int axis = 0; axis < 3; ++axis)  // Half of the coordinates lie on faces.
         if (random() % 2 == 0)
-          x[axis] = domain.min()[axis] + domain.sizes()[axis] * (place(random) / (8.0 * field.grid()[axis]));
+          x[axis] = domain.min()[axis] + domain.sizes()[axis] * (eighth(random) / (8.0 * field.grid()[axis]));
       const Cell cell = field.cellAt(x);
       const Vector3 inside = x.cwiseMax(domain.min()).cwiseMin(domain.max());
       const Vector3 local = 2 * (inside - cell.box.min()).cwiseQuotient(cell.box.sizes()) - Vector3::Ones();
       const std::uint64_t bits = field.data().nodes[cell.id];
       const double expected = std::visit(
           [&](const auto& c) {
-            return evaluate(c.data() + node::offset(bits), node::degree(bits), {local.x(), local.y(), local.z()});
+            return query::evaluate(c.data() + node::offset(bits), node::degree(bits),
+                                   {local.x(), local.y(), local.z()});
           },
           field.data().coefficients);
       ASSERT_NEAR(field.value(x), expected + (x - inside).norm(), 1e-12) << x.transpose();
@@ -213,7 +214,8 @@ TEST(Field, BatchesAndThreadsGiveTheSameBits) {
   }
 }
 
-/// Cells of depths 0 to 5 and degrees 0 to 6, at random; the last one's coefficients end the array.
+/// Makes random cells of depths 0 to 5 and degrees 0 to 6. The coefficients of the last leaf end the array, so that
+/// reading beyond them is an error.
 template <typename T>
 Field mixedField() {
   std::mt19937_64 random(5);
@@ -239,12 +241,12 @@ Field mixedField() {
   return Field(std::move(data));
 }
 
-/// Inside, on faces and edges of cells, on the domain's border, outside, and no numbers.
+/// Returns points inside, on faces and edges of cells, on the domain's boundary and outside; some are infinite or NaN.
 std::vector<Vector3> trickyPoints(const Field& field, std::size_t count) {
   const double infinity = std::numeric_limits<double>::infinity();
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> inside(0, 1);
-  std::uniform_int_distribution<int> place(0, 32);
+  std::uniform_int_distribution<int> fraction(0, 32);
   std::vector<Vector3> points(count);
   for (Vector3& x : points)
     for (int axis = 0; axis < 3; ++axis) {
@@ -262,7 +264,7 @@ std::vector<Vector3> trickyPoints(const Field& field, std::size_t count) {
         case 1:
         case 2:
         case 3:
-          x[axis] = lower + (upper - lower) * (place(random) / (32.0 * field.grid()[axis]));
+          x[axis] = lower + (upper - lower) * (fraction(random) / (32.0 * field.grid()[axis]));
           break;
         default:
           x[axis] = lower + (upper - lower) * inside(random);
@@ -275,7 +277,7 @@ bool sameBits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) || (std::isnan(a) && std::isnan(b));
 }
 
-void expectBatchesAsSingleQueries(const Field& field, std::span<const Vector3> points) {
+void expectBatchesEqualSingleQueries(const Field& field, std::span<const Vector3> points) {
   std::vector<double> values(points.size());
   std::vector<ValueAndGradient> both(points.size());
   field.values(points, values);
@@ -289,7 +291,7 @@ void expectBatchesAsSingleQueries(const Field& field, std::span<const Vector3> p
   }
 }
 
-/// Every instruction set that this processor has, down to none at all.
+/// The test runs on every instruction set that the processor has, down to scalar code.
 TEST(Field, BatchesGiveTheSameBitsOnEveryInstructionSet) {
   for (const Field& field : {mixedField<double>(), mixedField<float>()}) {
     const FieldStatistics found = statistics(field);
@@ -300,16 +302,16 @@ TEST(Field, BatchesGiveTheSameBitsOnEveryInstructionSet) {
       SCOPED_TRACE(hwy::TargetName(target));
       hwy::SetSupportedTargetsForTest(target);
       hwy::GetChosenTarget().Update(target);
-      expectBatchesAsSingleQueries(field, points);
+      expectBatchesEqualSingleQueries(field, points);
       for (std::size_t count = 0; count < 300; count += count < 12 ? 1 : 29)
-        expectBatchesAsSingleQueries(field, std::span(points).subspan(count, count));
+        expectBatchesEqualSingleQueries(field, std::span(points).subspan(count, count));
     }
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-TEST(Field, RefusesArraysThatAreNoField) {
+TEST(Field, RefusesInvalidArrays) {
   const auto refuses = [](auto&& spoil) {
     FieldData data = steps();
     spoil(data);
@@ -318,17 +320,19 @@ TEST(Field, RefusesArraysThatAreNoField) {
   EXPECT_NO_THROW(Field{steps()});
   refuses([](FieldData& d) { d.domain.setEmpty(); });
   refuses([](FieldData& d) { d.domain.max().x() = std::numeric_limits<double>::infinity(); });
-  refuses([](FieldData& d) { d.domain = Box(Vector3::Constant(-1e308), Vector3::Constant(1e308)); });  // size overflows
+  refuses([](FieldData& d) {
+    d.domain = Box(Vector3::Constant(-1e308), Vector3::Constant(1e308));
+  });  // The size overflows.
   refuses([](FieldData& d) { d.grid = {0, 1, 1}; });
   refuses([](FieldData& d) { d.nodes.back() |= std::uint64_t{30} << 40; });
   refuses([](FieldData& d) { d.nodes.front() |= std::uint64_t{1} << (node::isLeaf(d.nodes.front()) ? 62 : 32); });
   refuses([](FieldData& d) { d.grid = {0xffffffff, 0xffffffff, 0xffffffff}; });
   refuses([](FieldData& d) { d.nodes.pop_back(); });
-  refuses([](FieldData& d) { d.nodes[0] = node::internal(2); });  // children of two nodes
-  refuses([](FieldData& d) { d.nodes[1] = node::internal(1); });  // its own child
-  refuses([](FieldData& d) { d.nodes[1] = node::internal(3); });  // not the start of a group
-  refuses([](FieldData& d) { d.nodes[1] = node::leaf(0, 0); });   // orphans
-  refuses([](FieldData& d) { d.nodes[2] = node::leaf(0, 9); });   // coefficient beyond the end
+  refuses([](FieldData& d) { d.nodes[0] = node::internal(2); });  // Two nodes share their children.
+  refuses([](FieldData& d) { d.nodes[1] = node::internal(1); });  // The node is its own child.
+  refuses([](FieldData& d) { d.nodes[1] = node::internal(3); });  // The first child does not start a group.
+  refuses([](FieldData& d) { d.nodes[1] = node::leaf(0, 0); });   // The group of children has no parent.
+  refuses([](FieldData& d) { d.nodes[2] = node::leaf(0, 9); });   // The coefficient lies beyond the end.
   refuses([](FieldData& d) { d.nodes[2] = node::leaf(31, 0); });
   refuses([](FieldData& d) { std::get<0>(d.coefficients)[3] = std::nan(""); });
 }

@@ -1,4 +1,4 @@
-// Distances to the hull: walls within bodies that overlap are no surface.
+// Tests of distances to the outer hull, to which inner walls of overlapping bodies do not belong.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,8 +37,8 @@ TriangleMesh twoBalls() {
   return joined(ball, moved(ball, {1, 0, 0}));
 }
 
-/// Within the union of two unit balls, a unit apart along x: to the nearer of the caps that are outside, or to the
-/// circle in which the balls meet.
+/// Returns the depth of x within the union of two unit balls whose centers are 1 apart along x: the distance to the
+/// nearer outer cap, or to the circle in which the spheres intersect.
 double depthInTwoBalls(const Vector3& x) {
   const double across = std::hypot(x.y(), x.z());
   double depth = std::hypot(x.x() - 0.5, across - std::sqrt(0.75));
@@ -50,96 +50,98 @@ double depthInTwoBalls(const Vector3& x) {
   return depth;
 }
 
-TEST(Hull, OfTwoBallsIsTheirUnions) {
+TEST(OuterHull, OfTwoBallsIsTheSurfaceOfTheirUnion) {
   const TriangleMesh mesh = twoBalls();
-  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
   EXPECT_EQ(hull.source().insideTest, InsideTest::outerHull);
-  EXPECT_EQ(hull.source().fingerprint, plain.source().fingerprint);
+  EXPECT_EQ(hull.source().fingerprint, withoutHull.source().fingerprint);
   EXPECT_EQ(hull.source().faces, mesh.triangles.size());
   std::size_t inside = 0, deeper = 0;
   for (const Vector3& x : placesIn(boundingBox(mesh), 4000, 3)) {
-    const double found = hull(x), before = plain(x);
+    const double found = hull(x), before = withoutHull(x);
     ASSERT_EQ(found < 0, before < 0);
     if (found >= 0) {
       EXPECT_NEAR(found, before, 1e-12);
       continue;
     }
     ++inside;
-    EXPECT_NEAR(-found, depthInTwoBalls(x), 0.01);  // chords of the mesh, and what is left of walls
+    EXPECT_NEAR(-found, depthInTwoBalls(x),
+                0.01);  // tolerance for the chords of the mesh and for remains of inner walls
     if (found < before - 0.05) ++deeper;
   }
   EXPECT_GT(inside, 1000u);
   EXPECT_GT(deeper, 300u);
   EXPECT_NEAR(hull(Vector3(0.5, 0, 0)), -std::sqrt(0.75), 0.01);
-  EXPECT_NEAR(plain(Vector3(0.5, 0, 0)), -0.5, 0.01) << "else this tells nothing";
+  EXPECT_NEAR(withoutHull(Vector3(0.5, 0, 0)), -0.5, 0.01) << "the test has no power";
 }
 
-TEST(Hull, OfAMeshWithoutWallsIsTheMesh) {
+TEST(OuterHull, OfAMeshWithoutInnerWallsIsTheMesh) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
-  const ExactDistance hull(mesh, kHull), plain(mesh);
-  for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_EQ(hull(x), plain(x));
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh);
+  for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_EQ(hull(x), withoutHull(x));
 }
 
-/// A wall in one plane with another is cut along the other's sides.
-TEST(Hull, LeavesOutTheWallBetweenBodiesThatTouch) {
+/// Of two coplanar walls the larger one is subdivided along the edges of the smaller one.
+TEST(OuterHull, OmitsTheWallBetweenTouchingBodies) {
   const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
-  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
-  EXPECT_EQ(plain(Vector3(1, 0, 0)), 0);
-  EXPECT_NEAR(hull(Vector3(1, 0, 0)), -0.5, 0.02) << "to the smaller one's sides";
-  EXPECT_NEAR(hull(Vector3(1, 0.7, 0)), 0, 1e-12) << "beside it the wall is outside";
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
+  EXPECT_EQ(withoutHull(Vector3(1, 0, 0)), 0);
+  EXPECT_NEAR(hull(Vector3(1, 0, 0)), -0.5, 0.02) << "the distance is that to the side walls of the smaller box";
+  EXPECT_NEAR(hull(Vector3(1, 0.7, 0)), 0, 1e-12) << "beside the smaller box the wall is outside";
   EXPECT_NEAR(hull(Vector3(1, 0.52, 0)), 0, 1e-12);
   EXPECT_NEAR(hull(Vector3(1.1, 0, 0)), -0.5, 0.02);
   EXPECT_EQ(checkSign(mesh, hull, 4000).wrong, 0u);
 }
 
-TEST(Hull, LeavesOutWallsThatBodiesHaveInCommon) {
+TEST(OuterHull, OmitsSharedWalls) {
   TriangleMesh mesh;
   for (int i = 0; i < 8; ++i) mesh = joined(mesh, moved(boxOfTwo(), 2 * Vector3(i & 1, i >> 1 & 1, i >> 2)));
   mesh = cleaned(mesh).mesh;
-  const ExactDistance hull(mesh, kHull), plain(mesh), whole(moved(boxOfTwo(), {1, 1, 1}, 2));
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh), whole(moved(boxOfTwo(), {1, 1, 1}, 2));
   for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_NEAR(hull(x), whole(x), 1e-12);
-  EXPECT_EQ(plain(Vector3(1, 0.5, 0.2)), 0) << "else this tells nothing";
+  EXPECT_EQ(withoutHull(Vector3(1, 0.5, 0.2)), 0) << "the test has no power";
 }
 
-/// Where three walls meet, or one ends on another, pieces of them are cut to the last: all around is inside.
-TEST(Hull, LeavesNothingOfWallsThatMeet) {
+/// Where three walls meet, or one ends on another, the smallest pieces remain intersected but are surrounded by inside.
+TEST(OuterHull, OmitsInnerWallsWhereTheyMeet) {
   const TriangleMesh mesh = joined(joined(boxBetween({0, 0, 0}, {1, 2, 2}), boxBetween({1, 0, 0}, {2, 2, 2})),
                                    boxBetween({0, 0, 2}, {2, 2, 4}));
-  const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(boxBetween({0, 0, 0}, {2, 2, 4})), plain(mesh, kWinding);
-  EXPECT_EQ(plain(Vector3(1, 1, 2)), 0) << "else this tells nothing";
+  const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(boxBetween({0, 0, 0}, {2, 2, 4})),
+      withoutHull(mesh, kWinding);
+  EXPECT_EQ(withoutHull(Vector3(1, 1, 2)), 0) << "the test has no power";
   for (const Vector3& x : placesIn(boundingBox(mesh), 1000, 3)) EXPECT_NEAR(hull(x), whole(x), 0.02);
   EXPECT_NEAR(hull(Vector3(1, 1, 2)), -1, 0.02);
 }
 
-/// What only touches a triangle's sides cuts nothing of it, however its neighbours are cut.
-TEST(Hull, OfBodiesThatTouchIsExact) {
+/// A triangle that touches only the boundary of another does not subdivide it, however the neighbours are subdivided.
+TEST(OuterHull, OfTouchingBodiesIsExact) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   for (const bool rotated : {false, true}) {
     TriangleMesh mesh, box = boxBetween({0, 0, 0}, {4, 4, 4});
     for (int i = 0; i < 64; ++i) {
       const Vector3 low(i % 4, i / 4 % 4, i / 16);
-      const bool mirrored = (i + i / 4 + i / 16) % 2 != 0;  // cut along the other diagonals
+      const bool mirrored = (i + i / 4 + i / 16) % 2 != 0;  // faces are divided along the other diagonals
       TriangleMesh cube = boxBetween({0, 0, 0}, {1, 1, 1});
       if (mirrored)
         for (Vector3& x : cube.vertices) x.x() = 1 - x.x();
-      mesh = joined(mesh, moved(mirrored ? support::turned(cube) : cube, low));
+      mesh = joined(mesh, moved(mirrored ? support::reversed(cube) : cube, low));
     }
     if (rotated)
       for (TriangleMesh* m : {&mesh, &box})
         for (Vector3& x : m->vertices) x = turn * x;
-    const ExactDistance hull(mesh, kHull), whole(box), plain(mesh, kWinding);
-    double most = 0, films = 0;
+    const ExactDistance hull(mesh, kHull), whole(box), withoutHull(mesh, kWinding);
+    double most = 0, innerWalls = 0;
     for (const Vector3& x : placesIn(boundingBox(mesh), 1000, 3)) {
       most = std::max(most, std::abs(hull(x) - whole(x)));
-      films = std::max(films, plain(x) - whole(x));
+      innerWalls = std::max(innerWalls, withoutHull(x) - whole(x));
     }
     EXPECT_LT(most, 1e-9) << rotated;
-    EXPECT_GT(films, 1) << "else this tells nothing";
+    EXPECT_GT(innerWalls, 1) << "the test has no power";
   }
 }
 
-/// Between plates and in sharp wedges outside is nearer to a piece than the piece is long.
-TEST(Hull, OutsideIsAsWithAllTriangles) {
+/// Between plates and in sharp wedges the outside is nearer to a piece than the piece is long.
+TEST(OuterHull, OutsideDistancesAreThoseToAllTriangles) {
   const TriangleMesh plates =
       joined(joined(boxBetween({0, 0, 0}, {1000, 1000, 100}), boxBetween({0, 0, 100.2}, {1000, 1000, 200})),
              boxBetween({450, 450, -10}, {550, 550, 210}));
@@ -148,60 +150,60 @@ TEST(Hull, OutsideIsAsWithAllTriangles) {
   for (Vector3& x : wedge.vertices) x = turn * x;
   wedge = joined(boxBetween({-50, -50, -1}, {50, 50, 1}), wedge);
   for (const TriangleMesh& mesh : {plates, wedge}) {
-    const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
-    std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000, 5);
-    for (int n = 0; n < 500; ++n) places.emplace_back(549.9 + 0.005 * n, 500 + 0.01 * n, 100.1);
-    for (int n = 0; n < 500; ++n) places.emplace_back(5 + 0.02 * n, -25 + 0.1 * n, 1.01 + 0.002 * n);
-    std::vector<double> together(places.size());
-    hull(places, together);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const double before = plain(places[i]);
+    const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
+    std::vector<Vector3> points = placesIn(boundingBox(mesh), 2000, 5);
+    for (int n = 0; n < 500; ++n) points.emplace_back(549.9 + 0.005 * n, 500 + 0.01 * n, 100.1);
+    for (int n = 0; n < 500; ++n) points.emplace_back(5 + 0.02 * n, -25 + 0.1 * n, 1.01 + 0.002 * n);
+    std::vector<double> batched(points.size());
+    hull(points, batched);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double before = withoutHull(points[i]);
       if (before > 0)
-        ASSERT_NEAR(together[i], before, 1e-9) << places[i].transpose();
+        ASSERT_NEAR(batched[i], before, 1e-9) << points[i].transpose();
       else
-        ASSERT_LE(together[i], 0) << places[i].transpose();
+        ASSERT_LE(batched[i], 0) << points[i].transpose();
     }
   }
 }
 
-TEST(Hull, KeepsOneTriangleThatIsPartlyOutside) {
-  // the long faces of the bar pass through the box
+TEST(OuterHull, KeepsTrianglesThatArePartlyOutside) {
+  // The long faces of the bar pass through the box.
   const TriangleMesh bar = shapes::mesh("box,width=6,height=0.5,depth=0.5");
   const ExactDistance hull(joined(boxOfTwo(), bar), kHull);
-  EXPECT_NEAR(hull(Vector3(0, 0, 0)), -1, 0.02) << "0.25 to the bar's own sides, which are within";
+  EXPECT_NEAR(hull(Vector3(0, 0, 0)), -1, 0.02) << "the faces of the bar are 0.25 away, but within the box";
   EXPECT_NEAR(hull(Vector3(2.5, 0, 0)), -0.25, 1e-12);
   EXPECT_NEAR(hull(Vector3(2, 0.25, 0)), 0, 1e-12);
-  EXPECT_NEAR(hull(Vector3(-1, 0, 0)), -0.25, 0.02) << "where the bar leaves the box";
+  EXPECT_NEAR(hull(Vector3(-1, 0, 0)), -0.25, 0.02) << "the bar leaves the box here";
 }
 
-TEST(Hull, OfOpenBodiesHasTheSameSign) {
+TEST(OuterHull, OfOpenBodiesHasTheSignOfTheWindingNumber) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(support::openAbove(ball, 0.8), moved(ball, {0.7, 0, 0}));
-  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
-  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 2000, 3);
-  std::vector<double> together(places.size());
-  hull(places, together);
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
+  const std::vector<Vector3> points = placesIn(boundingBox(mesh), 2000, 3);
+  std::vector<double> batched(points.size());
+  hull(points, batched);
   std::size_t deeper = 0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const double before = plain(places[i]);
-    EXPECT_EQ(together[i], hull(places[i]));
-    EXPECT_EQ(together[i] < 0, before < 0);
-    EXPECT_GT(std::abs(together[i]), std::abs(before) - 1e-12);
-    if (std::abs(together[i]) > std::abs(before) + 0.05) ++deeper;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double before = withoutHull(points[i]);
+    EXPECT_EQ(batched[i], hull(points[i]));
+    EXPECT_EQ(batched[i] < 0, before < 0);
+    EXPECT_GT(std::abs(batched[i]), std::abs(before) - 1e-12);
+    if (std::abs(batched[i]) > std::abs(before) + 0.05) ++deeper;
   }
   EXPECT_GT(deeper, 50u);
 }
 
-/// Where a hole's patch crosses a face that no other meets, part of that face is outside.
-TEST(Hull, KeepsFacesThatLeaveByAHole) {
+/// A face that no other intersects can cross the surface that closes a hole: part of it is outside.
+TEST(OuterHull, KeepsFacesThatPassThroughAHole) {
   const TriangleMesh blade = moved(shapes::mesh("box,width=0.4,height=0.4,depth=2.85"), {0, 0, 0.475});
   const TriangleMesh mesh = joined(support::openBox(), blade);
-  const ExactDistance hull(mesh, kHull), plain(mesh, kWinding);
+  const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
   EXPECT_NEAR(hull(Vector3(0.21, 0, 1.4)), 0.01, 1e-12);
   EXPECT_NEAR(hull(Vector3(0.19, 0, 1.4)), -0.01, 1e-12);
   std::size_t outside = 0, deeper = 0;
   for (const Vector3& x : placesIn(boundingBox(mesh), 4000, 3)) {
-    const double before = plain(x), found = hull(x);
+    const double before = withoutHull(x), found = hull(x);
     outside += before > 0;
     if (before > 0)
       EXPECT_NEAR(found, before, 1e-9) << x.transpose();
@@ -212,7 +214,7 @@ TEST(Hull, KeepsFacesThatLeaveByAHole) {
   EXPECT_GT(deeper, 200u);
 }
 
-TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
+TEST(OuterHull, ClosestPointsLieOnTheirTriangles) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull);
   for (const Vector3& x : placesIn(boundingBox(mesh), 300, 3)) {
@@ -224,21 +226,21 @@ TEST(Hull, ClosestPointsAreOnTheTriangleTheyName) {
   }
 }
 
-TEST(Hull, PiecesAreThatSmallAlongTheSeamOnly) {
+TEST(OuterHull, SubdividesAlongTheIntersectionOnly) {
   const TriangleMesh mesh = twoBalls();
   const TriangleMesh surface = ExactDistance(mesh, kHull).surface();
   EXPECT_LT(surface.triangles.size(), 4 * mesh.triangles.size());
-  const double area = 2 * (2 * std::numbers::pi * 1.5);  // of the two caps, each 1.5 high
+  const double area = 2 * (2 * std::numbers::pi * 1.5);  // area of two caps of height 1.5
   EXPECT_NEAR(surfaceArea(surface), area, 0.02 * area);
   EXPECT_GT(surfaceArea(mesh), 1.3 * area);
-  EXPECT_NEAR(surfaceArea(ExactDistance(mesh).surface()), surfaceArea(mesh), 1e-9) << "all, unless of a hull";
+  EXPECT_NEAR(surfaceArea(ExactDistance(mesh).surface()), surfaceArea(mesh), 1e-9)
+      << "without a hull all triangles remain";
 }
 
-/// Wherever it is cancelled: a hull of a mesh with holes asks thousands of times, before, while and after faces are
-/// cut.
-TEST(Hull, ReportsProgressAndCanBeCancelled) {
+/// The hull of a mesh with holes asks for cancellation thousands of times: before, during and after the subdivision.
+TEST(OuterHull, ReportsProgressAndCanBeCancelled) {
   TriangleMesh mesh = twoBalls();
-  mesh.triangles.pop_back();  // so that pieces are cut further
+  mesh.triangles.pop_back();  // a hole, beside which pieces are refined
   std::map<std::string, double, std::less<>> tasks;
   std::atomic<int> asked = 0;
   const Progress telling{.report =
@@ -249,8 +251,8 @@ TEST(Hull, ReportsProgressAndCanBeCancelled) {
                              },
                          .cancelled = [&] { return ++asked < 0; }};
   const ExactDistance whole(mesh, kHull, telling);
-  EXPECT_THAT(tasks, testing::Contains(testing::Pair("looking where faces meet", testing::Gt(0.9))));
-  EXPECT_THAT(tasks, testing::Contains(testing::Pair("leaving out walls within, pieces of 1/512", 1)));
+  EXPECT_THAT(tasks, testing::Contains(testing::Pair("finding self-intersections", testing::Gt(0.9))));
+  EXPECT_THAT(tasks, testing::Contains(testing::Pair("removing inner walls, pieces of 1/512", 1)));
   for (const double part : {0.0, 0.3, 0.6, 0.9}) {
     std::atomic<int> left = int(part * asked);
     EXPECT_THROW(ExactDistance(mesh, kHull, {{}, [&] { return --left < 0; }}), Cancelled) << part;

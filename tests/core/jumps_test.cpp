@@ -19,7 +19,7 @@
 namespace hpsdf {
 namespace {
 
-/// Base cells in a row along x, one unit apart; the last one may be divided once.
+/// Makes a row of unit base cells along x. With `children`, one more base cell is added that is split once.
 FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<std::vector<double>>& children = {}) {
   FieldData data;
   data.grid = {static_cast<std::uint32_t>(cells.size() + !children.empty()), 1, 1};
@@ -40,10 +40,10 @@ FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<s
   return data;
 }
 
-// Degree 1: 1, w, v, u in local coordinates, which are 2·(world − cell) − 1 in a unit cell.
+// Coefficients of degree 1 multiply 1, w, v, u, local coordinates that are 2·(world − cell) − 1 in a unit cell.
 
-TEST(Jumps, EqualCellsWithKnownJumps) {
-  // f = 1 + w against f = 3 + 2v: the jump is 2 + 2v − w
+TEST(Jumps, MeasuresKnownJumpsBetweenEqualCells) {
+  // The leaves hold 1 + w and 3 + 2v, so that the jump is 2 + 2v − w.
   const Jumps jumps = findJumps(Field(row({{1, 1, 0, 0}, {3, 0, 2, 0}})));
   ASSERT_EQ(jumps.interfaces.size(), 1u);
   const Interface& face = jumps.interfaces[0];
@@ -55,7 +55,7 @@ TEST(Jumps, EqualCellsWithKnownJumps) {
   EXPECT_NEAR(face.value.max, 5, 1e-14);
   EXPECT_TRUE(face.worst.isApprox(Vector3(1, 1, 0), 1e-14)) << face.worst.transpose();
   EXPECT_TRUE(face.center.isApprox(Vector3(1, 0.5, 0.5), 1e-14));
-  // world gradients (0, 0, 2) and (0, 4, 0)
+  // The world gradients are (0, 0, 2) and (0, 4, 0).
   EXPECT_NEAR(face.gradient.rms, std::sqrt(20.0), 1e-14);
   EXPECT_NEAR(face.gradient.max, std::sqrt(20.0), 1e-14);
   EXPECT_EQ(jumps.hanging, 0u);
@@ -63,10 +63,10 @@ TEST(Jumps, EqualCellsWithKnownJumps) {
   EXPECT_NEAR(jumps.value.rms, face.value.rms, 1e-15);
 }
 
-TEST(Jumps, CurvedPolynomialsOfUnequalDegree) {
-  // L2(v) against 0 of degree 0: ∫ L2²/2 = 1/5, greatest at the edges; gradient (0, 2·3v, 0)
+TEST(Jumps, MeasuresCurvedPolynomialsOfUnequalDegree) {
+  // The leaves hold L2(v) and 0. ∫ L2²/2 = 1/5; the jump is greatest at the edges; the gradient is (0, 2·3v, 0).
   std::vector<double> quadratic(10, 0.0);
-  quadratic[5] = 1;  // 000 001 002 010 011 020
+  quadratic[5] = 1;  // the coefficients are 000 001 002 010 011 020 …
   const Jumps jumps = findJumps(Field(row({quadratic, {0}})));
   ASSERT_EQ(jumps.interfaces.size(), 1u);
   EXPECT_EQ(jumps.interfaces[0].degrees, (std::array<std::uint8_t, 2>{2, 0}));
@@ -76,8 +76,8 @@ TEST(Jumps, CurvedPolynomialsOfUnequalDegree) {
   EXPECT_NEAR(jumps.gradient.max, 6, 1e-13);
 }
 
-TEST(Jumps, HangingFacesWithKnownJumps) {
-  // left 10 + u + v: 11 + v on the face; right the constants 0 to 7
+TEST(Jumps, MeasuresKnownJumpsOnHangingFaces) {
+  // The left leaf holds 10 + u + v, which is 11 + v on the face; the right ones hold the constants 0 to 7.
   std::vector<std::vector<double>> children;
   for (double child = 0; child < 8; ++child) children.push_back({child});
   const Jumps jumps = findJumps(Field(row({{10, 0, 1, 1}}, children)));
@@ -109,26 +109,27 @@ TEST(Jumps, HangingFacesWithKnownJumps) {
   EXPECT_EQ(inner, 12);
 }
 
-/// Slow and plain: every pair of leaves whose boxes share a piece of a plane, by a rule of much higher order.
-struct PlainJump {
+/// The jumps between all pairs of leaves whose boxes share a rectangle, by a rule of much higher order. Slow and
+/// simple.
+struct ReferenceJump {
   Jump value, gradient;
 };
-std::map<std::array<std::uint32_t, 2>, PlainJump> plainJumps(const Field& field) {
+std::map<std::array<std::uint32_t, 2>, ReferenceJump> referenceJumps(const Field& field) {
   std::vector<Cell> cells;
   field.forEachCell([&](const Cell& cell) { cells.push_back(cell); });
-  const QuadratureRule rule = gaussLegendre(24);
+  const basis::QuadratureRule rule = basis::gaussLegendre(24);
   const auto at = [&](const Cell& cell, const Vector3& x) {
     const Vector3 half = cell.box.sizes() / 2, u = (x - cell.box.center()).cwiseQuotient(half);
     return std::visit(
         [&](const auto& c) {
-          ValueAndGradient result = evaluateWithGradient(c.data() + node::offset(field.data().nodes[cell.id]),
-                                                         cell.degree, {u.x(), u.y(), u.z()});
+          ValueAndGradient result = query::evaluateWithGradient(c.data() + node::offset(field.data().nodes[cell.id]),
+                                                                cell.degree, {u.x(), u.y(), u.z()});
           result.gradient = result.gradient.cwiseQuotient(half);
           return result;
         },
         field.data().coefficients);
   };
-  std::map<std::array<std::uint32_t, 2>, PlainJump> found;
+  std::map<std::array<std::uint32_t, 2>, ReferenceJump> found;
   for (const Cell& below : cells)
     for (const Cell& above : cells)
       for (int axis = 0; axis < 3; ++axis) {
@@ -137,15 +138,16 @@ std::map<std::array<std::uint32_t, 2>, PlainJump> plainJumps(const Field& field)
         lo[axis] = hi[axis] = above.box.min()[axis];
         const int b = (axis + 1) % 3, c = (axis + 2) % 3;
         if (hi[b] - lo[b] < 1e-9 || hi[c] - lo[c] < 1e-9) continue;
-        PlainJump& jump = found[{below.id, above.id}];
+        ReferenceJump& jump = found[{below.id, above.id}];
         for (std::size_t i = 0; i < rule.points.size(); ++i)
           for (std::size_t j = 0; j < rule.points.size(); ++j) {
             Vector3 x = lo;
             x[b] += (hi[b] - lo[b]) * (rule.points[i] + 1) / 2;
             x[c] += (hi[c] - lo[c]) * (rule.points[j] + 1) / 2;
-            const ValueAndGradient one = at(below, x), other = at(above, x);
+            const ValueAndGradient lower = at(below, x), upper = at(above, x);
             const double weight = rule.weights[i] * rule.weights[j] / 4;
-            const double value = std::abs(one.value - other.value), gradient = (one.gradient - other.gradient).norm();
+            const double value = std::abs(lower.value - upper.value),
+                         gradient = (lower.gradient - upper.gradient).norm();
             jump.value.rms += weight * value * value;
             jump.gradient.rms += weight * gradient * gradient;
             jump.value.max = std::max(jump.value.max, value);
@@ -157,7 +159,7 @@ std::map<std::array<std::uint32_t, 2>, PlainJump> plainJumps(const Field& field)
   return found;
 }
 
-TEST(Jumps, EveryInterfaceOfARudeFieldOnceAndRight) {
+TEST(Jumps, MeasuresEveryInterfaceOfARandomFieldOnce) {
   for (const bool single : {false, true}) {
     RandomFieldOptions options;
     options.domain = Box(Vector3(-1, 2, -3), Vector3(2, 4, 1));
@@ -168,12 +170,12 @@ TEST(Jumps, EveryInterfaceOfARudeFieldOnceAndRight) {
     options.single = single;
     const Field field = randomField(7, options);
     const Jumps jumps = findJumps(field);
-    const auto plain = plainJumps(field);
+    const auto reference = referenceJumps(field);
     ASSERT_GT(jumps.hanging, 20u);
-    ASSERT_EQ(jumps.interfaces.size(), plain.size());
+    ASSERT_EQ(jumps.interfaces.size(), reference.size());
     for (const Interface& face : jumps.interfaces) {
-      ASSERT_TRUE(plain.contains(face.cells));
-      const PlainJump& expected = plain.at(face.cells);
+      ASSERT_TRUE(reference.contains(face.cells));
+      const ReferenceJump& expected = reference.at(face.cells);
       EXPECT_NEAR(face.value.rms, expected.value.rms, 1e-12);
       EXPECT_NEAR(face.gradient.rms, expected.gradient.rms, 1e-11);
       EXPECT_GE(face.value.max, 0.9 * expected.value.max) << "sampled as densely as the degree asks";
@@ -183,8 +185,8 @@ TEST(Jumps, EveryInterfaceOfARudeFieldOnceAndRight) {
   }
 }
 
-TEST(Jumps, ASmoothFieldHasNone) {
-  // one linear function, written down in each cell's coordinates: 1 + x + 2y + 3z
+TEST(Jumps, AreZeroInASmoothField) {
+  // All cells hold the function 1 + x + 2y + 3z in their local coordinates.
   std::vector<std::vector<double>> cells, children;
   for (int n = 0; n < 2; ++n) cells.push_back({1 + n + 0.5 + 1 + 1.5, 1.5, 1, 0.5});
   for (int n = 0; n < 8; ++n)
@@ -212,7 +214,7 @@ TEST(Jumps, ThreadsDoNotChangeTheResult) {
   EXPECT_TRUE(same(one.value.rms, two.value.rms));
 }
 
-TEST(Jumps, WorstFirstPerCellAndAsAHistogram) {
+TEST(Jumps, AreSortedAssignedToCellsAndCounted) {
   const Field field = randomField(9, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
   for (const JumpKind kind : {JumpKind::value, JumpKind::gradient}) {
@@ -233,7 +235,8 @@ TEST(Jumps, WorstFirstPerCellAndAsAHistogram) {
   EXPECT_EQ(worstInterfaces(jumps, JumpKind::value, 1u << 30).size(), jumps.interfaces.size());
 }
 
-/// Each leaf a number of its own, far from the origin, in a grid whose faces have no exact coordinates there.
+/// Makes leaves that hold different constants, far from the origin, so that the faces' coordinates are not
+/// representable.
 Field steppedField() {
   const Vector3 corner(1e4, -3e4, 1 / 3.0);
   FieldData data =
@@ -247,7 +250,7 @@ Field steppedField() {
   return Field(std::move(data));
 }
 
-TEST(FaceSteps, LieBetweenTheTwoLeavesOfEveryFace) {
+TEST(FaceSteps, EqualTheJumpBetweenTheTwoLeaves) {
   const Field field = steppedField();
   const Jumps jumps = findJumps(field);
   ASSERT_GT(jumps.hanging, 100u);
@@ -259,7 +262,7 @@ TEST(FaceSteps, LieBetweenTheTwoLeavesOfEveryFace) {
   }
 }
 
-TEST(FaceSteps, AreGreatestOverRandomPoints) {
+TEST(FaceSteps, ApproachTheGreatestJumpFromRandomPoints) {
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
   const FaceSteps steps = stepsAcrossFaces(field, jumps.interfaces, 50'000);
@@ -278,7 +281,7 @@ TEST(FaceSteps, AreGreatestOverRandomPoints) {
   EXPECT_NE(one.value, stepsAcrossFaces(field, jumps.interfaces, 9'999, 8).value);
 }
 
-TEST(FaceSteps, OfOneCellAndCancelled) {
+TEST(FaceSteps, AreZeroWithoutFacesAndCanBeCancelled) {
   EXPECT_EQ(stepsAcrossFaces(Field(row({{1}})), {}, 100).points, 0u);
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);

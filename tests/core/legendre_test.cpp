@@ -10,7 +10,7 @@ namespace {
 TEST(Legendre, ValuesMatchTheStandardLibrary) {
   double values[31];
   for (const double t : {-1.0, -0.73, -0.2, 0.0, 0.31, 0.999, 1.0}) {
-    legendreValues(t, 30, values);
+    basis::legendreValues(t, 30, values);
     for (unsigned i = 0; i <= 30; ++i) EXPECT_NEAR(values[i], std::legendre(i, t), 1e-13) << i << " at " << t;
   }
 }
@@ -19,18 +19,18 @@ TEST(Legendre, DerivativesMatchCentralDifferencesAndTheEnds) {
   double values[31], derivatives[31], above[31], below[31];
   const double step = 1e-6;
   for (const double t : {-0.9, -0.35, 0.0, 0.2, 0.8}) {
-    legendreValuesAndDerivatives(t, 30, values, derivatives);
-    legendreValues(t + step, 30, above);
-    legendreValues(t - step, 30, below);
+    basis::legendreValuesAndDerivatives(t, 30, values, derivatives);
+    basis::legendreValues(t + step, 30, above);
+    basis::legendreValues(t - step, 30, below);
     for (int i = 0; i <= 30; ++i) EXPECT_NEAR(derivatives[i], (above[i] - below[i]) / (2 * step), 1e-6) << i;
   }
-  legendreValuesAndDerivatives(1, 30, values, derivatives);
+  basis::legendreValuesAndDerivatives(1, 30, values, derivatives);
   for (int i = 0; i <= 30; ++i) EXPECT_DOUBLE_EQ(derivatives[i], i * (i + 1) / 2.0);  // L_i'(1)
 }
 
 TEST(GaussLegendre, IntegratesUpToItsDegreeAndNoFurther) {
   for (int n = 1; n <= 121; ++n) {
-    const QuadratureRule rule = gaussLegendre(n);
+    const basis::QuadratureRule rule = basis::gaussLegendre(n);
     ASSERT_EQ(rule.points.size(), std::size_t(n));
     const auto integral = [&](int power) {
       double sum = 0;
@@ -38,7 +38,7 @@ TEST(GaussLegendre, IntegratesUpToItsDegreeAndNoFurther) {
       return sum;
     };
     EXPECT_NEAR(integral(0), 2, 1e-13) << n;
-    const int highest = 2 * n - 2;  // the highest even power within degree 2n-1
+    const int highest = 2 * n - 2;  // This is the highest even power within degree 2n-1.
     EXPECT_NEAR(integral(highest), 2.0 / (highest + 1), 1e-13) << n;
     if (n <= 8) {
       EXPECT_GT(std::abs(integral(2 * n) - 2.0 / (2 * n + 1)), 1e-9) << n;

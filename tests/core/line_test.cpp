@@ -23,8 +23,8 @@ std::vector<std::uint32_t> cellsOf(const std::vector<Piece>& pieces) {
   return cells;
 }
 
-/// What holds of any segment: pieces from 0 to 1 without gaps, each in the leaf that holds its middle, none twice.
-void expectCut(const Field& field, const Vector3& from, const Vector3& to) {
+/// Expects pieces from 0 to 1 without gaps, each in the leaf that holds its middle, and no leaf twice.
+void expectValidPieces(const Field& field, const Vector3& from, const Vector3& to) {
   const std::vector<Piece> pieces = piecesAlong(field, from, to);
   ASSERT_FALSE(pieces.empty());
   EXPECT_EQ(pieces.front().tEnter, 0);
@@ -42,7 +42,7 @@ void expectCut(const Field& field, const Vector3& from, const Vector3& to) {
       EXPECT_FALSE(field.domain().contains(middle));
       continue;
     }
-    EXPECT_TRUE(seen.insert(piece.cell->id).second) << "twice";
+    EXPECT_TRUE(seen.insert(piece.cell->id).second) << "the leaf occurs twice";
     EXPECT_EQ(piece.cell->id, field.cellAt(middle).id) << "piece " << n << " of " << pieces.size();
     const double rounding = 1e-12 * field.domain().sizes().norm();
     for (const double t : {piece.tEnter, piece.tLeave})
@@ -58,7 +58,7 @@ RandomFieldOptions oblong() {
   return options;
 }
 
-TEST(Line, IsCutAtTheLeavesThatItPasses) {
+TEST(Line, IsCutAtTheFacesThatItCrosses) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-0.3, 1.3);
   for (const unsigned seed : {1u, 2u, 3u}) {
@@ -69,17 +69,17 @@ TEST(Line, IsCutAtTheLeavesThatItPasses) {
     };
     for (int n = 0; n < 500; ++n) {
       const Vector3 from = point(), to = point();
-      expectCut(field, from, to);
+      expectValidPieces(field, from, to);
       auto back = cellsOf(piecesAlong(field, to, from));
       std::ranges::reverse(back);
       EXPECT_EQ(cellsOf(piecesAlong(field, from, to)), back);
-      expectCut(field, from, from + 1e-3 * (to - from));
-      expectCut(field, from, Vector3(to.x(), from.y(), from.z()));
+      expectValidPieces(field, from, from + 1e-3 * (to - from));
+      expectValidPieces(field, from, Vector3(to.x(), from.y(), from.z()));
     }
   }
 }
 
-/// All leaves of one depth, one unit wide.
+/// Makes n³ base cells, one unit wide, that hold their number.
 Field lattice(std::uint32_t n) {
   FieldData data;
   data.domain = Box(Vector3::Zero(), Vector3::Constant(n));
@@ -93,7 +93,7 @@ Field lattice(std::uint32_t n) {
   return Field(std::move(data));
 }
 
-TEST(Line, ThroughCornersAndEdgesGoesToTheOtherSideAtOnce) {
+TEST(Line, ContinuesInTheOppositeCellAtCornersAndEdges) {
   const Field field = lattice(5);
   const auto cell = [](std::uint32_t x, std::uint32_t y, std::uint32_t z) { return x + 5 * (y + 5 * z); };
   using Cells = std::vector<std::uint32_t>;
@@ -109,7 +109,7 @@ TEST(Line, ThroughCornersAndEdgesGoesToTheOtherSideAtOnce) {
   EXPECT_EQ(cellsOf(piecesAlong(field, Vector3::Constant(5), Vector3::Zero())), diagonal);
   EXPECT_EQ(cellsOf(piecesAlong(field, Vector3::Constant(5.7), Vector3::Constant(-0.1))), diagonal)
       << "rounded differently along no axis";
-  // through corners, at places that no double holds
+  // These segments pass through a corner at a t that is not representable.
   for (int n = 1; n < 200; ++n) {
     const Vector3 direction(1 / 3.0 * n, 1 / 7.0 * n, -1 / 11.0 * n), corner(2, 3, 2);
     const auto pieces = piecesAlong(field, corner - direction, corner + 1.7 * direction);
@@ -120,7 +120,7 @@ TEST(Line, ThroughCornersAndEdgesGoesToTheOtherSideAtOnce) {
   }
 }
 
-TEST(Line, AlongFacesAndEdgesRunsThroughTheCellsOfGreaterCoordinates) {
+TEST(Line, RunsThroughCellsOfGreaterCoordinatesAlongFacesAndEdges) {
   const Field field = lattice(3);
   using Cells = std::vector<std::uint32_t>;
   EXPECT_EQ(cellsOf(piecesAlong(field, {0, 1, 0.5}, {3, 1, 0.5})), (Cells{3, 4, 5}));
@@ -136,7 +136,7 @@ TEST(Line, AlongFacesAndEdgesRunsThroughTheCellsOfGreaterCoordinates) {
   EXPECT_EQ(pieces[1].tLeave, 2 / 3.0);
 }
 
-TEST(Line, OutsideOfTheDomainThereIsNoCell) {
+TEST(Line, HasNoCellOutsideTheDomain) {
   const Field field = lattice(3);
   const auto through = piecesAlong(field, {-1, 0.5, 0.5}, {5, 0.5, 0.5});
   ASSERT_EQ(through.size(), 5u);
@@ -151,19 +151,19 @@ TEST(Line, OutsideOfTheDomainThereIsNoCell) {
   }
 }
 
-TEST(Line, DeepCellsAreFoundFromFarAway) {
+TEST(Line, FindsDeepCellsFromFarAway) {
   RandomFieldOptions options;
   options.maxDepth = 16;
   options.refinement = 0;
   options.deepAt = Vector3(0.3, 0.3, 0.3);
   const Field field = randomField(5, options);
-  expectCut(field, *options.deepAt - 1e-4 * Vector3(1, 2, 3), *options.deepAt + 1e-4 * Vector3(3, 2, 1));
+  expectValidPieces(field, *options.deepAt - 1e-4 * Vector3(1, 2, 3), *options.deepAt + 1e-4 * Vector3(3, 2, 1));
   const auto pieces =
       piecesAlong(field, *options.deepAt - 30 * Vector3(3, 2, 1), *options.deepAt + 7 * Vector3(3, 2, 1));
   EXPECT_TRUE(std::ranges::any_of(pieces, [](const Piece& piece) { return piece.cell && piece.cell->depth == 16; }));
 }
 
-TEST(Line, SamplesAreTheLeafsOwnAndStepAtBorders) {
+TEST(Line, SamplesLimitsFromBothLeavesAtFaces) {
   for (const bool single : {false, true}) {
     RandomFieldOptions options = oblong();
     options.single = single;
@@ -181,9 +181,9 @@ TEST(Line, SamplesAreTheLeafsOwnAndStepAtBorders) {
         EXPECT_GE(sample.t, line.samples[i - 1].t);
       }
       if (sample.t == piece.tEnter || sample.t == piece.tLeave) {
-        // just inside, the field itself answers
-        const double aside = (sample.t == piece.tEnter ? 1 : -1) * 1e-9;
-        const auto near = field.valueAndGradient(pointAt(from, to, sample.t + aside));
+        // The limit equals the field a little inside the piece.
+        const double inwards = (sample.t == piece.tEnter ? 1 : -1) * 1e-9;
+        const auto near = field.valueAndGradient(pointAt(from, to, sample.t + inwards));
         EXPECT_NEAR(sample.value, near.value, 1e-6);
         EXPECT_LT((sample.gradient - near.gradient).norm(), 1e-5);
       } else {
@@ -199,19 +199,19 @@ TEST(Line, SamplesAreTheLeafsOwnAndStepAtBorders) {
   }
 }
 
-TEST(Line, KnownJumpsAreFound) {
+TEST(Line, FindsKnownJumps) {
   const Line line = sampleLine(lattice(4), {-1, 0.5, 0.5}, {7, 0.5, 0.5}, 9);
   const auto jumps = jumpsAlong(line);
-  ASSERT_EQ(jumps.size(), 3u) << "none at the walls of the domain";
+  ASSERT_EQ(jumps.size(), 3u) << "no jump at the domain's boundary";
   for (std::size_t n = 0; n < 3; ++n) {
     EXPECT_EQ(jumps[n].t, double(n + 2) / 8);
     EXPECT_EQ(jumps[n].value, 1);
   }
-  // samples that fall on borders give way to the limits
+  // The limits replace samples that lie on faces.
   EXPECT_EQ(line.samples.size(), 2u * 6 + 2);
 }
 
-TEST(Line, OutsideTheFieldsContinuationIsSampled) {
+TEST(Line, SamplesTheContinuationOutsideTheDomain) {
   const Field field = randomField(3);
   const Line line = sampleLine(field, {0.2, 0.1, 2}, {0.2, 0.1, 0.9}, 12);
   ASSERT_FALSE(line.pieces.front().cell);
@@ -223,7 +223,7 @@ TEST(Line, OutsideTheFieldsContinuationIsSampled) {
   }
 }
 
-TEST(Line, WithoutLengthOrNotFiniteIsRefused) {
+TEST(Line, RefusesEqualAndInfiniteEnds) {
   const Field field = lattice(2);
   const double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(piecesAlong(field, {1, 1, 1}, {1, 1, 1}), Error);

@@ -1,4 +1,4 @@
-// What control groups allow, by files as Linux has them.
+// The memory limits of control groups, read from files with the layout of Linux.
 #include "util/machine_memory.h"
 
 #include <gtest/gtest.h>
@@ -19,20 +19,20 @@ class ControlGroups : public testing::Test {
     std::filesystem::create_directories(file.parent_path());
     std::ofstream(file) << text;
   }
-  double allowed() const { return memoryOfControlGroups(root_.path()); }
+  double allowed() const { return detail::memoryOfControlGroups(root_.path()); }
 
   support::TemporaryDirectory root_;
 };
 
-TEST_F(ControlGroups, LimitNothingWhereThereAreNone) {
+TEST_F(ControlGroups, LimitNothingWhereThereIsNoGroup) {
   EXPECT_EQ(allowed(), HUGE_VAL);
   write("proc/self/cgroup", "0::/\n");
-  EXPECT_EQ(allowed(), HUGE_VAL) << "no controller of memory";
+  EXPECT_EQ(allowed(), HUGE_VAL) << "the group has no memory controller";
   write("proc/self/cgroup", "no group\n\n4:memory\n");
   EXPECT_EQ(allowed(), HUGE_VAL);
 }
 
-TEST_F(ControlGroups, OfVersion2LimitWhatIsBelowThem) {
+TEST_F(ControlGroups, OfVersion2LimitTheGroupsBelowThem) {
   write("proc/self/cgroup", "0::/user.slice/job 7\n");
   write("sys/fs/cgroup/user.slice/job 7/memory.max", "max\n");
   EXPECT_EQ(allowed(), HUGE_VAL);
@@ -41,10 +41,10 @@ TEST_F(ControlGroups, OfVersion2LimitWhatIsBelowThem) {
   write("sys/fs/cgroup/user.slice/job 7/memory.max", "2000000000\n");
   EXPECT_EQ(allowed(), 2e9);
   write("sys/fs/cgroup/user.slice/job 8/memory.max", "1000000000\n");
-  EXPECT_EQ(allowed(), 2e9) << "another's";
+  EXPECT_EQ(allowed(), 2e9) << "the limit of another group does not count";
 }
 
-TEST_F(ControlGroups, OfVersion1LimitToo) {
+TEST_F(ControlGroups, OfVersion1LimitTheirController) {
   write("proc/self/cgroup", "5:cpu,cpuacct:/few\n4:hugetlb,memory:/job\n1:name=memory:/few\n0::/\n");
   write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n");
   write("sys/fs/cgroup/memory/few/memory.limit_in_bytes", "1000\n");
@@ -52,7 +52,7 @@ TEST_F(ControlGroups, OfVersion1LimitToo) {
   EXPECT_EQ(allowed(), 4e9);
 }
 
-/// The group's own folder is out of sight; what is seen as the topmost is it.
+/// Within a container the group's own folder is invisible, and the topmost visible folder is the container's.
 TEST_F(ControlGroups, OfAContainerAreSeenFromWithin) {
   write("sys/fs/cgroup/memory.max", "500000000\n");
   for (const char* group : {"/", "/docker/0123", "/../other"}) {
@@ -61,10 +61,10 @@ TEST_F(ControlGroups, OfAContainerAreSeenFromWithin) {
   }
 }
 
-TEST(MachineMemory, IsSome) {
-  EXPECT_GT(machineMemory(), 0);
-  EXPECT_LT(machineMemory(), HUGE_VAL);
-  EXPECT_LE(machineMemory(), memoryOfControlGroups());
+TEST(MachineMemory, IsFiniteAndWithinTheGroupsLimit) {
+  EXPECT_GT(detail::machineMemory(), 0);
+  EXPECT_LT(detail::machineMemory(), HUGE_VAL);
+  EXPECT_LE(detail::machineMemory(), detail::memoryOfControlGroups());
 }
 
 }  // namespace

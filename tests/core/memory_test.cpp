@@ -8,7 +8,7 @@
 namespace hpsdf {
 namespace {
 
-TEST(Memory, BytesAreToldInTheUnitThatSuits) {
+TEST(Memory, BytesAreWrittenInASuitableUnit) {
   EXPECT_EQ(bytesText(0), "0 bytes");
   EXPECT_EQ(bytesText(999), "999 bytes");
   EXPECT_EQ(bytesText(1e3), "1.00 kB");
@@ -16,12 +16,13 @@ TEST(Memory, BytesAreToldInTheUnitThatSuits) {
   EXPECT_EQ(bytesText(2.345e12), "2345.00 GB");
 }
 
-TEST(Memory, MoreThanTheMachineHasIsRefused) {
+TEST(Memory, RequestsBeyondTheMachineAreRefused) {
   EXPECT_NO_THROW(requireMemory("a little", allowedMemory(), "take less"));
   try {
     requireMemory("a cloth", 1.01 * allowedMemory(), "take fewer nodes");
     FAIL();
   } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::limit);
     EXPECT_THAT(error.what(), testing::StartsWith("a cloth would take some "));
     EXPECT_THAT(error.what(), testing::EndsWith(": take fewer nodes"));
   }

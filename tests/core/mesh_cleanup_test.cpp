@@ -19,7 +19,7 @@ namespace hpsdf {
 namespace {
 
 using support::joined;
-using support::turned;
+using support::reversed;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -39,7 +39,7 @@ TriangleMesh cube(double halfSize = 1, const Vector3& center = Vector3::Zero()) 
   return mesh;
 }
 
-/// Every triangle with three vertices of its own, as in an STL file.
+/// The mesh with three separate vertices for each triangle, as in an STL file.
 TriangleMesh separated(const TriangleMesh& mesh) {
   TriangleMesh soup;
   for (const Triangle& t : mesh.triangles) {
@@ -67,11 +67,11 @@ TEST(MeshCleanup, LeavesACleanMeshAsItIs) {
   EXPECT_EQ(clean.name, "cube");
   EXPECT_EQ(report.vertices, 8u);
   EXPECT_EQ(report.faces, 12u);
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
   EXPECT_EQ(report.weldedVertices + report.unreferencedVertices + report.degenerateFaces + report.flippedFaces +
                 report.duplicateFaces,
             0u);
-  EXPECT_FALSE(report.turned);
+  EXPECT_FALSE(report.reversed);
   EXPECT_TRUE(report.closed());
   EXPECT_DOUBLE_EQ(report.volume, 8);
   EXPECT_DOUBLE_EQ(report.area, 24);
@@ -100,17 +100,18 @@ TEST(MeshCleanup, WeldsNegativeZeroWithZeroAndNothingElse) {
   for (const Vector3& v : cleaned(mesh).mesh.vertices)
     for (const double x : v) EXPECT_FALSE(std::signbit(x));
 
-  mesh.vertices[0].x() = std::numeric_limits<double>::denorm_min();  // nearly equal is not equal
+  mesh.vertices[0].x() =
+      std::numeric_limits<double>::denorm_min();  // Vertex 0 is now nearly but not exactly equal to others.
   EXPECT_EQ(cleaned(mesh).report.vertices, 5u);
 }
 
 TEST(MeshCleanup, DropsFacesWithEqualCornersAndUnusedVertices) {
   TriangleMesh mesh = tetrahedron();
-  mesh.vertices.insert(mesh.vertices.begin(), {7, 7, 7});  // used by nothing
+  mesh.vertices.insert(mesh.vertices.begin(), {7, 7, 7});  // No triangle uses this vertex.
   for (Triangle& t : mesh.triangles)
     for (std::uint32_t& v : t) ++v;
-  mesh.vertices.push_back({1, 0, 0});  // welded with vertex 2
-  mesh.vertices.push_back({9, 9, 9});  // used by a collapsed face only
+  mesh.vertices.push_back({1, 0, 0});  // This vertex is welded with vertex 2.
+  mesh.vertices.push_back({9, 9, 9});  // Only a collapsed triangle uses this vertex.
   mesh.triangles.push_back({1, 2, 5});
   mesh.triangles.push_back({6, 6, 1});
   const auto [clean, report] = cleaned(mesh);
@@ -122,11 +123,11 @@ TEST(MeshCleanup, DropsFacesWithEqualCornersAndUnusedVertices) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, DropsFacesOnOneLine) {
+TEST(MeshCleanup, DropsCollinearFaces) {
   TriangleMesh mesh = cube();
-  mesh.vertices.push_back({-1, -1, 0.3});  // on the edge from 0 to 4, which has two faces already
+  mesh.vertices.push_back({-1, -1, 0.3});  // The vertex lies on edge 0-4, which has two triangles already.
   mesh.triangles.push_back({0, 4, 8});
-  // a line that no coordinate plane holds; its middle is the rounded middle
+  // The second collinear triangle lies in no coordinate plane, and its middle corner is rounded.
   mesh = joined(mesh, {{{5, 0, 0}, {5.1, 0.7, 0.3}, {5 + (5.1 - 5) / 2, 0.35, 0.15}}, {{0, 1, 2}}, ""});
   const auto [clean, report] = cleaned(mesh);
   EXPECT_EQ(report.degenerateFaces, 2u);
@@ -144,9 +145,9 @@ TEST(MeshCleanup, KeepsThinTrianglesThatHaveAnArea) {
   EXPECT_EQ(cleaned(mesh).report.degenerateFaces, 0u);
 }
 
-TEST(MeshCleanup, FlipsAFaceOnOneLineThatHoldsItsNeighboursTogether) {
-  // A corner on the cube's edge 0-4: the faces of x = -1 use it, those of y = -1 do not, and a face on one line fills
-  // the slit. Dropping that face would open the mesh.
+TEST(MeshCleanup, FlipsACollinearFaceThatConnectsItsNeighbours) {
+  // Vertex 8 lies on the cube's edge 0-4. The triangles of x = -1 use it, those of y = -1 do not, and a collinear
+  // triangle connects the two sides. Dropping that triangle would open the mesh.
   TriangleMesh mesh = cube();
   mesh.vertices.push_back({-1, -1, 0.3});
   mesh.triangles[0] = {0, 8, 6};
@@ -167,16 +168,16 @@ TEST(MeshCleanup, FlipsAFaceOnOneLineThatHoldsItsNeighboursTogether) {
   }
 }
 
-TEST(MeshCleanup, FlipsChainsOfFacesOnOneLine) {
+TEST(MeshCleanup, FlipsChainsOfCollinearFaces) {
   TriangleMesh mesh = cube();
-  mesh.vertices.push_back({-1, -1, -0.5});  // 8
-  mesh.vertices.push_back({-1, -1, 0});     // 9
-  mesh.vertices.push_back({-1, -1, 0.5});   // 10
+  mesh.vertices.push_back({-1, -1, -0.5});  // vertex 8
+  mesh.vertices.push_back({-1, -1, 0});     // vertex 9
+  mesh.vertices.push_back({-1, -1, 0.5});   // vertex 10
   mesh.triangles[0] = {0, 8, 6};
   mesh.triangles.push_back({8, 9, 6});
   mesh.triangles.push_back({9, 10, 6});
   mesh.triangles.push_back({10, 4, 6});
-  mesh.triangles.push_back({0, 9, 8});  // waits for the next but one
+  mesh.triangles.push_back({0, 9, 8});  // This triangle can be flipped only after the last one.
   mesh.triangles.push_back({9, 4, 10});
   mesh.triangles.push_back({0, 4, 9});
   ASSERT_TRUE(inspect(mesh).closed());
@@ -187,17 +188,17 @@ TEST(MeshCleanup, FlipsChainsOfFacesOnOneLine) {
   EXPECT_DOUBLE_EQ(report.area, 24);
 }
 
-TEST(MeshCleanup, DropsFacesOverTheSameCornersWhicheverWayTheyLook) {
+TEST(MeshCleanup, DropsFacesWithTheSameCornersInAnyOrientation) {
   TriangleMesh mesh = tetrahedron();
-  mesh.triangles.push_back({2, 1, 0});  // as the first, rotated
-  mesh.triangles.push_back({1, 0, 3});  // as the second, turned
+  mesh.triangles.push_back({2, 1, 0});  // the first triangle with rotated corners
+  mesh.triangles.push_back({1, 0, 3});  // the second triangle, reversed
   const auto [clean, report] = cleaned(mesh);
   EXPECT_EQ(clean.triangles, tetrahedron().triangles);
   EXPECT_EQ(report.duplicateFaces, 2u);
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, KeepsBothFacesOfAWallBetweenBodiesThatTouch) {
+TEST(MeshCleanup, KeepsBothFacesOfASharedWall) {
   TriangleMesh cubes = joined(cube(), cube(1, {2, 0, 0}));
   for (const Vector3& center : {Vector3(0, 2, 0), Vector3(2, 2, 0), Vector3(0, 0, 2)})
     cubes = joined(cubes, cube(1, center));
@@ -213,13 +214,13 @@ TEST(MeshCleanup, KeepsBothFacesOfAWallBetweenBodiesThatTouch) {
   EXPECT_EQ(twice.duplicateFaces, 5 * 12u);
 }
 
-TEST(MeshCleanup, KeepsAllFacesThatBodiesWithinEachOtherShare) {
+TEST(MeshCleanup, KeepsAllFacesThatNestedBodiesShare) {
   const TriangleMesh low = support::boxBetween({0, 0, 0}, {1, 1, 1}), high = support::boxBetween({0, 0, 0}, {1, 1, 2});
   const auto [clean, report] = cleaned(joined(low, high));
-  EXPECT_EQ(clean.triangles.size(), 24u) << "the bottom of both";
+  EXPECT_EQ(clean.triangles.size(), 24u) << "both bodies keep their bottom";
   EXPECT_EQ(report.duplicateFaces, 0u);
   EXPECT_EQ(report.unbalancedEdges, 0u);
-  EXPECT_EQ(cleaned(joined(joined(low, high), low)).report.unbalancedEdges, 0u) << "one of them twice";
+  EXPECT_EQ(cleaned(joined(joined(low, high), low)).report.unbalancedEdges, 0u) << "one body occurs twice";
   for (int axis = 0; axis < 3; ++axis) {
     TriangleMesh side = low;
     std::erase_if(side.triangles, [&](const Triangle& t) {
@@ -227,7 +228,7 @@ TEST(MeshCleanup, KeepsAllFacesThatBodiesWithinEachOtherShare) {
     });
     ASSERT_EQ(side.triangles.size(), 2u);
     const MeshReport once = cleaned(joined(joined(low, high), side)).report;
-    EXPECT_EQ(once.unbalancedEdges, 0u) << "and a side of one " << axis;
+    EXPECT_EQ(once.unbalancedEdges, 0u) << "one body has a side twice " << axis;
     EXPECT_EQ(once.duplicateFaces, 2u) << axis;
   }
   for (std::size_t n = 0; n < 24; ++n) {
@@ -238,33 +239,33 @@ TEST(MeshCleanup, KeepsAllFacesThatBodiesWithinEachOtherShare) {
   }
 }
 
-TEST(MeshCleanup, OfASurfaceGivenWithBothSidesTheFirstStays) {
-  for (const TriangleMesh& one : {cube(), turned(cube())}) {
-    const auto [clean, report] = cleaned(joined(one, turned(one)));
+TEST(MeshCleanup, KeepsTheFirstSideOfASurfaceModelledWithBothSides) {
+  for (const TriangleMesh& one : {cube(), reversed(cube())}) {
+    const auto [clean, report] = cleaned(joined(one, reversed(one)));
     EXPECT_EQ(clean.triangles, cube().triangles);
     EXPECT_EQ(report.duplicateFaces, 12u);
     EXPECT_TRUE(report.closed());
   }
-  // a lid with both sides, without which the edges around it have no other face
+  // The lid is modelled with both sides, and the edges around it would be boundary edges without it.
   TriangleMesh lid = cube(), box = cube();
   lid.triangles.erase(lid.triangles.begin(), lid.triangles.begin() + 10);
   box.triangles.resize(10);
-  const auto [closed, report] = cleaned(joined(joined(box, lid), turned(lid)));
+  const auto [closed, report] = cleaned(joined(joined(box, lid), reversed(lid)));
   EXPECT_EQ(closed.triangles, cube().triangles);
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, OneOfTwoBodiesThatTouchMayBeGivenTwice) {
+TEST(MeshCleanup, DropsTheDuplicateOfOneOfTwoTouchingBodies) {
   const TriangleMesh both = joined(cube(), cube(1, {2, 0, 0}));
   EXPECT_EQ(cleaned(joined(both, cube())).mesh.triangles, cleaned(both).mesh.triangles);
 }
 
-TEST(MeshCleanup, OfUnequalNumbersEitherWayMostWin) {
-  EXPECT_EQ(cleaned(joined(joined(turned(cube()), cube()), cube())).mesh.triangles, cube().triangles);
-  EXPECT_FALSE(cleaned(joined(joined(turned(cube()), cube()), cube())).report.turned);
+TEST(MeshCleanup, KeepsTheMoreFrequentOrientation) {
+  EXPECT_EQ(cleaned(joined(joined(reversed(cube()), cube()), cube())).mesh.triangles, cube().triangles);
+  EXPECT_FALSE(cleaned(joined(joined(reversed(cube()), cube()), cube())).report.reversed);
 }
 
-TEST(MeshCleanup, SizeDoesNotMatter) {
+TEST(MeshCleanup, DoesNotDependOnTheSize) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(0.9, 1.1);
   for (const double size : {1e-30, 1e-6, 1.0, 1e6, 1e30}) {
@@ -278,48 +279,48 @@ TEST(MeshCleanup, SizeDoesNotMatter) {
   }
 }
 
-TEST(MeshCleanup, TurnsTheWholeMeshWhenItsVolumeIsNegative) {
-  const auto [clean, report] = cleaned(turned(cube()));
-  EXPECT_TRUE(report.turned);
+TEST(MeshCleanup, ReversesTheWholeMeshWhenItsVolumeIsNegative) {
+  const auto [clean, report] = cleaned(reversed(cube()));
+  EXPECT_TRUE(report.reversed);
   EXPECT_EQ(clean.triangles, cube().triangles);
   EXPECT_DOUBLE_EQ(report.volume, 8);
   EXPECT_DOUBLE_EQ(signedVolume(clean), 8);
 }
 
-TEST(MeshCleanup, KeepsACavityAndTurnsItOnlyWithTheWhole) {
-  const TriangleMesh hollow = joined(cube(1), turned(cube(0.5)));
+TEST(MeshCleanup, ReversesACavityOnlyWithTheWholeMesh) {
+  const TriangleMesh hollow = joined(cube(1), reversed(cube(0.5)));
   const auto [clean, report] = cleaned(hollow);
-  EXPECT_FALSE(report.turned);
+  EXPECT_FALSE(report.reversed);
   EXPECT_EQ(clean.triangles, hollow.triangles);
-  EXPECT_EQ(report.parts, 2u);
+  EXPECT_EQ(report.components, 2u);
   EXPECT_DOUBLE_EQ(report.volume, 7);
 
-  const auto [again, mended] = cleaned(turned(hollow));
-  EXPECT_TRUE(mended.turned);
+  const auto [again, mended] = cleaned(reversed(hollow));
+  EXPECT_TRUE(mended.reversed);
   EXPECT_EQ(again.triangles, hollow.triangles);
   EXPECT_DOUBLE_EQ(mended.volume, 7);
 }
 
-TEST(MeshCleanup, TurnsAnOpenMeshOnlyWhenItsVolumeIsClear) {
+TEST(MeshCleanup, ReversesAnOpenMeshOnlyWhenItsVolumeTellsItsOrientation) {
   TriangleMesh lidless = cube();
   lidless.triangles.resize(10);
-  EXPECT_FALSE(cleaned(lidless).report.turned);
-  EXPECT_TRUE(cleaned(turned(lidless)).report.turned);
+  EXPECT_FALSE(cleaned(lidless).report.reversed);
+  EXPECT_TRUE(cleaned(reversed(lidless)).report.reversed);
 
-  // two triangles, slightly folded either way: the sign of their volume means nothing
+  // Two triangles with a slight fold have a volume whose sign means nothing.
   for (const double fold : {-1e-3, 1e-3}) {
     const TriangleMesh sheet = {{{0, 0, 0}, {1, 0, 0}, {1, 1, fold}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, ""};
-    EXPECT_FALSE(cleaned(sheet).report.turned);
-    EXPECT_FALSE(cleaned(turned(sheet)).report.turned);
+    EXPECT_FALSE(cleaned(sheet).report.reversed);
+    EXPECT_FALSE(cleaned(reversed(sheet)).report.reversed);
   }
 }
 
-TEST(MeshCleanup, VolumeFarFromTheOrigin) {
+TEST(MeshCleanup, ReversesAMeshFarFromTheOrigin) {
   EXPECT_NEAR(cleaned(cube(1, {1e8, -1e8, 1e8})).report.volume, 8, 1e-12);
-  EXPECT_TRUE(cleaned(turned(cube(1, {1e8, -1e8, 1e8}))).report.turned);
+  EXPECT_TRUE(cleaned(reversed(cube(1, {1e8, -1e8, 1e8}))).report.reversed);
 }
 
-TEST(MeshCleanup, RefusesWhatIsNoSurface) {
+TEST(MeshCleanup, RefusesMeshesThatAreNoSurface) {
   TriangleMesh mesh = tetrahedron();
   mesh.triangles[2][1] = 4;
   EXPECT_THAT(errorOf(mesh), AllOf(HasSubstr("tetrahedron: face 3 refers to vertex 5"), HasSubstr("only 4")));
@@ -334,12 +335,12 @@ TEST(MeshCleanup, RefusesWhatIsNoSurface) {
               AllOf(HasSubstr("line: no face with an area (2 faces are degenerate)"), Not(HasSubstr("\n"))));
 }
 
-TEST(MeshReport, CountsEdgesByHand) {
+TEST(MeshReport, CountsEdgesOfEachKind) {
   TriangleMesh open = tetrahedron();
   open.triangles.pop_back();
   MeshReport report = inspect(open);
   EXPECT_EQ(report.boundaryEdges, 3u);
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
   EXPECT_FALSE(report.closed());
 
   TriangleMesh flipped = tetrahedron();
@@ -355,32 +356,32 @@ TEST(MeshReport, CountsEdgesByHand) {
   EXPECT_EQ(report.nonManifoldEdges, 1u);
   EXPECT_EQ(report.boundaryEdges, 6u);
   EXPECT_EQ(report.inconsistentEdges, 0u);
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
 }
 
-TEST(MeshReport, PartsShareEdgesNotJustCorners) {
+TEST(MeshReport, ComponentsShareEdgesNotOnlyCorners) {
   TriangleMesh two = joined(tetrahedron(), cube(1, {5, 0, 0}));
-  EXPECT_EQ(inspect(two).parts, 2u);
+  EXPECT_EQ(inspect(two).components, 2u);
   EXPECT_EQ(inspect(two).vertices, 12u);
 
-  // two tetrahedra that meet in one corner
+  // The second tetrahedron shares one corner with the first.
   TriangleMesh other = tetrahedron();
   for (Vector3& v : other.vertices) v = -v;
-  const MeshReport report = cleaned(joined(tetrahedron(), turned(other))).report;
+  const MeshReport report = cleaned(joined(tetrahedron(), reversed(other))).report;
   EXPECT_EQ(report.vertices, 7u);
-  EXPECT_EQ(report.parts, 2u);
+  EXPECT_EQ(report.components, 2u);
   EXPECT_TRUE(report.closed());
 }
 
 TEST(MeshReport, AnEmptyMeshIsNotClosed) {
   const MeshReport report = inspect({});
   EXPECT_EQ(report.faces, 0u);
-  EXPECT_EQ(report.parts, 0u);
+  EXPECT_EQ(report.components, 0u);
   EXPECT_TRUE(report.box.isEmpty());
   EXPECT_FALSE(report.closed());
 }
 
-TEST(TriangleMesh, BoxIsThatOfTheTriangles) {
+TEST(TriangleMesh, BoxSurroundsTheTrianglesOnly) {
   TriangleMesh mesh = tetrahedron();
   mesh.vertices.push_back({100, 100, 100});
   EXPECT_EQ(boundingBox(mesh).max(), Vector3(1, 1, 1));
@@ -388,14 +389,14 @@ TEST(TriangleMesh, BoxIsThatOfTheTriangles) {
   EXPECT_TRUE(boundingBox({{{1, 2, 3}}, {}, ""}).isEmpty());
 }
 
-TEST(TriangleMesh, VolumeAndArea) {
+TEST(TriangleMesh, HasTheVolumeAndAreaOfASolid) {
   EXPECT_DOUBLE_EQ(signedVolume(tetrahedron()), 1.0 / 6);
-  EXPECT_DOUBLE_EQ(signedVolume(turned(tetrahedron())), -1.0 / 6);
+  EXPECT_DOUBLE_EQ(signedVolume(reversed(tetrahedron())), -1.0 / 6);
   EXPECT_DOUBLE_EQ(surfaceArea(tetrahedron()), 1.5 + std::sqrt(3.0) / 2);
 }
 
 TEST(TriangleMesh, FingerprintIsStable) {
-  // XXH3 over counts, vertices and triangles written out by hand as little-endian bytes
+  // The expected value is XXH3 of counts, vertices and triangles as little-endian bytes, computed independently.
   EXPECT_EQ(fingerprint({}), 0xd0a66a65c7528968u);
   EXPECT_EQ(fingerprint(tetrahedron()), 0x83695951d65216dau);
   TriangleMesh mesh = tetrahedron();
@@ -405,7 +406,7 @@ TEST(TriangleMesh, FingerprintIsStable) {
   EXPECT_EQ(fingerprint(mesh), fingerprint(tetrahedron()));
   mesh.vertices[0].x() = std::numeric_limits<double>::denorm_min();
   EXPECT_NE(fingerprint(mesh), fingerprint(tetrahedron()));
-  EXPECT_NE(fingerprint(turned(tetrahedron())), fingerprint(tetrahedron()));
+  EXPECT_NE(fingerprint(reversed(tetrahedron())), fingerprint(tetrahedron()));
 }
 
 TEST(TriangleMesh, NormalizedSpansExactlyTwo) {

@@ -1,4 +1,4 @@
-// What a solid's surface would not have, where it is, and what turning faces mends.
+// Tests of the defects of meshes, and of their repair by reversing faces.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ using support::boxOfTwo;
 using support::joined;
 using support::moved;
 using support::openBox;
-using support::turned;
+using support::reversed;
 using testing::ElementsAre;
 
 MeshDefects defectsOf(const TriangleMesh& mesh) { return findDefects(mesh, findCrossings(mesh)); }
@@ -39,7 +39,7 @@ TriangleMesh ball(const Vector3& center = Vector3::Zero(), double radius = 1) {
   return moved(shapes::mesh("builtin:sphere,subdivisions=3"), center, radius);
 }
 
-/// A strip with half a twist, of so many pieces, around z.
+/// A Möbius strip around z of this many quadrilaterals.
 TriangleMesh moebiusStrip(int pieces) {
   TriangleMesh mesh;
   for (int i = 0; i < pieces; ++i) {
@@ -50,7 +50,7 @@ TriangleMesh moebiusStrip(int pieces) {
     }
   }
   const auto corner = [&](int i, int side) {
-    return std::uint32_t(i < pieces ? 2 * i + side : 1 - side);  // the end meets the beginning upside down
+    return std::uint32_t(i < pieces ? 2 * i + side : 1 - side);  // the end joins the beginning upside down
   };
   for (int i = 0; i < pieces; ++i) {
     mesh.triangles.push_back({corner(i, 0), corner(i + 1, 0), corner(i + 1, 1)});
@@ -59,7 +59,7 @@ TriangleMesh moebiusStrip(int pieces) {
   return mesh;
 }
 
-TEST(MeshDefects, AClosedSurfaceHasNone) {
+TEST(MeshDefects, DoNotExistInClosedSurfaces) {
   for (const TriangleMesh& mesh : {boxOfTwo(), joined(ball(), ball({3, 0, 0}))}) {
     const MeshDefects defects = defectsOf(mesh);
     EXPECT_TRUE(defects.found.empty());
@@ -67,7 +67,7 @@ TEST(MeshDefects, AClosedSurfaceHasNone) {
   }
 }
 
-TEST(MeshDefects, RimsAreTold) {
+TEST(MeshDefects, ReportBoundaryEdges) {
   const MeshDefects defects = defectsOf(openBox());
   EXPECT_THAT(defects.counts, ElementsAre(4, 0, 0, 0, 0));
   for (const Defect& defect : defects.found) {
@@ -79,7 +79,7 @@ TEST(MeshDefects, RimsAreTold) {
   }
 }
 
-TEST(MeshDefects, AFaceThatLooksTheWrongWayHasThreeEdges) {
+TEST(MeshDefects, ReportThreeInconsistentEdgesOfAReversedFace) {
   TriangleMesh mesh = boxOfTwo();
   std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);
   const MeshDefects defects = defectsOf(mesh);
@@ -88,7 +88,7 @@ TEST(MeshDefects, AFaceThatLooksTheWrongWayHasThreeEdges) {
   for (const Defect& defect : defects.found) EXPECT_TRUE(defect.faces[0] == 5 || defect.faces[1] == 5);
 }
 
-TEST(MeshDefects, BodiesThatTouchInAnEdgeOrACorner) {
+TEST(MeshDefects, ReportWhereBodiesTouchAtAnEdgeOrACorner) {
   const MeshDefects edge = defectsOf(cleaned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))).mesh);
   EXPECT_THAT(edge.counts, ElementsAre(0, 1, 0, 0, 0));
   EXPECT_EQ((edge.found[0].ends[0] + edge.found[0].ends[1]) / 2, Vector3(1, 1, 0));
@@ -97,79 +97,79 @@ TEST(MeshDefects, BodiesThatTouchInAnEdgeOrACorner) {
   EXPECT_EQ(corner.found[0].ends[0], Vector3(1, 1, 1));
 }
 
-TEST(MeshDefects, CrossingsAreOfOnePartOrOfTwo) {
+TEST(MeshDefects, CountCrossingsWithinOneComponent) {
   const MeshDefects two = defectsOf(joined(ball(), ball({1, 0, 0})));
   EXPECT_GT(two.count(DefectKind::crossing), 10u);
   EXPECT_EQ(two.count(DefectKind::crossing), two.found.size());
-  EXPECT_EQ(two.crossingsWithinParts, 0u);
+  EXPECT_EQ(two.crossingsWithinComponents, 0u);
   TriangleMesh spike = ball();
-  spike.vertices[0] *= -1.5;  // through the other side
+  spike.vertices[0] *= -1.5;  // a spike through the opposite side
   const MeshDefects one = defectsOf(spike);
   EXPECT_GT(one.count(DefectKind::crossing), 0u);
-  EXPECT_EQ(one.crossingsWithinParts, one.count(DefectKind::crossing));
+  EXPECT_EQ(one.crossingsWithinComponents, one.count(DefectKind::crossing));
 }
 
-TEST(MeshDefects, AMoebiusStripIsOneSided) {
+TEST(MeshDefects, ReportThatAMoebiusStripIsNotOrientable) {
   const MeshDefects defects = defectsOf(moebiusStrip(24));
   EXPECT_FALSE(defects.orientable);
   EXPECT_EQ(defects.count(DefectKind::boundaryEdge), 48u);
-  const RepairedMesh mended = repaired(cleaned(moebiusStrip(24)));
-  EXPECT_EQ(mended.leftEdges, 1u) << "it stays as it is";
-  EXPECT_EQ(mended.turnedFaces, 0u);
-  EXPECT_EQ(mended.imported.report.inconsistentEdges, 1u);
+  const RepairedMesh result = repaired(cleaned(moebiusStrip(24)));
+  EXPECT_EQ(result.imported.report.inconsistentEdges, 1u) << "the strip stays unchanged";
+  EXPECT_EQ(result.reversedFaces, 0u);
+  EXPECT_EQ(result.imported.report.inconsistentEdges, 1u);
 }
 
-TEST(MeshRepair, FacesTurnTheWayOfMost) {
+TEST(MeshRepair, ReversesFacesThatDisagreeWithTheirPatch) {
   TriangleMesh mesh = ball();
   for (std::size_t f = 0; f < mesh.triangles.size(); f += 3) std::swap(mesh.triangles[f][0], mesh.triangles[f][1]);
   const std::size_t wrong = (mesh.triangles.size() + 2) / 3;
-  const RepairedMesh mended = repaired(cleaned(mesh));
-  EXPECT_EQ(mended.turnedFaces, wrong);
-  EXPECT_EQ(mended.turnedPatches, 0u);
-  EXPECT_EQ(mended.leftEdges, 0u);
-  EXPECT_TRUE(mended.imported.report.closed());
-  EXPECT_DOUBLE_EQ(mended.imported.report.volume, signedVolume(ball()));
+  const RepairedMesh result = repaired(cleaned(mesh));
+  EXPECT_EQ(result.reversedFaces, wrong);
+  EXPECT_EQ(result.reversedPatches, 0u);
+  EXPECT_EQ(result.imported.report.inconsistentEdges, 0u);
+  EXPECT_TRUE(result.imported.report.closed());
+  EXPECT_DOUBLE_EQ(result.imported.report.volume, signedVolume(ball()));
 }
 
-TEST(MeshRepair, PartsThatLookInwardsTurn) {
-  const RepairedMesh mended = repaired(cleaned(joined(ball({0, 0, 0}, 2), turned(ball({5, 0, 0})))));
-  EXPECT_EQ(mended.turnedPatches, 1u);
-  EXPECT_EQ(mended.turnedFaces, 0u);
-  EXPECT_NEAR(mended.imported.report.volume, 9 * signedVolume(ball()), 1e-9);
+TEST(MeshRepair, ReversesInwardBodies) {
+  const RepairedMesh result = repaired(cleaned(joined(ball({0, 0, 0}, 2), support::reversed(ball({5, 0, 0})))));
+  EXPECT_EQ(result.reversedPatches, 1u);
+  EXPECT_EQ(result.reversedFaces, 0u);
+  EXPECT_NEAR(result.imported.report.volume, 9 * signedVolume(ball()), 1e-9);
 }
 
-TEST(MeshRepair, CavitiesStay) {
-  const TriangleMesh hollow = joined(ball({0, 0, 0}, 3), turned(ball({0, 0, 0}, 2)));
+TEST(MeshRepair, KeepsCavities) {
+  const TriangleMesh hollow = joined(ball({0, 0, 0}, 3), support::reversed(ball({0, 0, 0}, 2)));
   const RepairedMesh same = repaired(cleaned(hollow));
-  EXPECT_EQ(same.turnedPatches, 0u);
+  EXPECT_EQ(same.reversedPatches, 0u);
   EXPECT_EQ(same.imported.mesh.triangles, hollow.triangles);
-  const RepairedMesh nested = repaired(cleaned(joined(hollow, turned(ball()))));
-  EXPECT_EQ(nested.turnedPatches, 1u) << "what lies in a cavity is a body again";
+  const RepairedMesh nested = repaired(cleaned(joined(hollow, support::reversed(ball()))));
+  EXPECT_EQ(nested.reversedPatches, 1u) << "a body in a cavity is oriented outward";
   EXPECT_NEAR(nested.imported.report.volume, (27 - 8 + 1) * signedVolume(ball()), 1e-9);
 }
 
 void expectUnchanged(const TriangleMesh& mesh, const char* what) {
-  const RepairedMesh mended = repaired(cleaned(mesh));
-  EXPECT_EQ(mended.turnedPatches, 0u) << what;
-  EXPECT_EQ(mended.turnedFaces, 0u) << what;
-  EXPECT_EQ(mended.imported.mesh.triangles, cleaned(mesh).mesh.triangles) << what;
+  const RepairedMesh result = repaired(cleaned(mesh));
+  EXPECT_EQ(result.reversedPatches, 0u) << what;
+  EXPECT_EQ(result.reversedFaces, 0u) << what;
+  EXPECT_EQ(result.imported.mesh.triangles, cleaned(mesh).mesh.triangles) << what;
 }
 
-TEST(MeshRepair, CavitiesThatTouchStay) {
+TEST(MeshRepair, KeepsCavitiesThatTouch) {
   const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2), one = boxBetween({-1, -1, -1}, {0, 0, 1});
   const TriangleMesh inAnEdge = joined(one, boxBetween({0, 0, -1}, {1, 1, 1}));
-  expectUnchanged(joined(outer, turned(inAnEdge)), "in an edge");
+  expectUnchanged(joined(outer, support::reversed(inAnEdge)), "the cavities touch along an edge");
   const TriangleMesh inAWall = joined(one, boxBetween({0, -1, -1}, {1, 0, 1}));
-  expectUnchanged(joined(outer, turned(inAWall)), "in a wall");
+  expectUnchanged(joined(outer, support::reversed(inAWall)), "the cavities share a wall");
   for (const TriangleMesh& pair : {inAnEdge, inAWall}) {
-    const RepairedMesh outside = repaired(cleaned(joined(outer, moved(turned(pair), {4, 0, 0}))));
-    EXPECT_GT(outside.turnedPatches, 1u);
+    const RepairedMesh outside = repaired(cleaned(joined(outer, moved(support::reversed(pair), {4, 0, 0}))));
+    EXPECT_GT(outside.reversedPatches, 1u);
     EXPECT_EQ(outside.imported.mesh.triangles, cleaned(joined(outer, moved(pair, {4, 0, 0}))).mesh.triangles);
   }
 }
 
-/// Its side at x = high is cut along the other diagonal.
-TriangleMesh boxCutOtherwise(const Vector3& low, const Vector3& high) {
+/// A box whose side at x = high is divided along the other diagonal than those of `boxBetween`.
+TriangleMesh boxWithOtherDiagonal(const Vector3& low, const Vector3& high) {
   TriangleMesh mesh = boxBetween(low, high);
   std::vector<std::array<std::uint32_t, 3>*> side;
   for (auto& triangle : mesh.triangles)
@@ -183,27 +183,29 @@ TriangleMesh boxCutOtherwise(const Vector3& low, const Vector3& high) {
   return mesh;
 }
 
-TEST(MeshRepair, BodiesThatShareAWallCutOtherwiseAreTurnedEachByItself) {
-  const TriangleMesh left = boxCutOtherwise({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {3, 1, 1});
+TEST(MeshRepair, ReversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
+  const TriangleMesh left = boxWithOtherDiagonal({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {3, 1, 1});
   ASSERT_NEAR(signedVolume(left), 4, 1e-12);
+  // The third box makes most faces of the mesh face outward.
   const auto welded = [](const TriangleMesh& one, const TriangleMesh& other) {
-    return cleaned(joined(joined(one, other), boxBetween({5, 0, 0}, {9, 4, 4})));  // so that most looks outwards
+    return cleaned(joined(joined(one, other), boxBetween({5, 0, 0}, {9, 4, 4})));  // keeps the total volume positive
   };
   ASSERT_EQ(inspect(welded(left, right).mesh).nonManifoldEdges, 4u);
-  for (const bool leftTurned : {false, true})
-    for (const bool rightTurned : {false, true}) {
-      const RepairedMesh mended =
-          repaired(welded(leftTurned ? turned(left) : left, rightTurned ? turned(right) : right));
-      EXPECT_EQ(mended.turnedPatches, 2u * leftTurned + 2u * rightTurned);
+  for (const bool leftReversed : {false, true})
+    for (const bool rightReversed : {false, true}) {
+      const RepairedMesh result = repaired(
+          welded(leftReversed ? support::reversed(left) : left, rightReversed ? support::reversed(right) : right));
+      EXPECT_EQ(result.reversedPatches, 2u * leftReversed + 2u * rightReversed);
       for (const Vector3& x : {Vector3(-0.1, 0.3, 0.2), Vector3(0.1, 0.3, 0.2), Vector3(2, 0, 0)})
-        EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 1, 1e-9) << leftTurned << rightTurned << x.transpose();
+        EXPECT_NEAR(windingNumber(result.imported.mesh, x), 1, 1e-9) << leftReversed << rightReversed << x.transpose();
       for (const Vector3& x : {Vector3(-0.1, 1.1, 0.2), Vector3(3.1, 0.3, 0.2)})
-        EXPECT_NEAR(windingNumber(mended.imported.mesh, x), 0, 1e-9) << leftTurned << rightTurned << x.transpose();
+        EXPECT_NEAR(windingNumber(result.imported.mesh, x), 0, 1e-9) << leftReversed << rightReversed << x.transpose();
     }
 }
 
-/// Some of the cubes of a cube, all ways of turning them, beside a body that looks outwards.
-TEST(MeshRepair, CubesThatTouchAreTurnedEachByItself) {
+/// Some of the eight cubes of a larger cube, in all combinations of orientations, beside a body that is oriented
+/// outward.
+TEST(MeshRepair, ReversesTouchingCubesIndependently) {
   const auto lowest = [](int at) { return Vector3(at & 1, at >> 1 & 1, at >> 2); };
   for (const std::vector<int>& all :
        {std::vector{0, 1}, std::vector{0, 3}, std::vector{0, 1, 2}, std::vector{0, 4, 2}, std::vector{0, 1, 6}})
@@ -211,47 +213,49 @@ TEST(MeshRepair, CubesThatTouchAreTurnedEachByItself) {
       TriangleMesh mesh = boxBetween({5, 0, 0}, {9, 4, 4});
       for (std::size_t i = 0; i < all.size(); ++i) {
         const TriangleMesh cube = boxBetween(lowest(all[i]), lowest(all[i]) + Vector3(1, 1, 1));
-        mesh = joined(mesh, inwards >> i & 1 ? turned(cube) : cube);
+        mesh = joined(mesh, inwards >> i & 1 ? reversed(cube) : cube);
       }
-      const RepairedMesh mended = repaired(cleaned(mesh));
+      const RepairedMesh result = repaired(cleaned(mesh));
       for (const int at : all)
-        EXPECT_NEAR(windingNumber(mended.imported.mesh, lowest(at) + Vector3(0.5, 0.4, 0.3)), 1, 1e-9)
+        EXPECT_NEAR(windingNumber(result.imported.mesh, lowest(at) + Vector3(0.5, 0.4, 0.3)), 1, 1e-9)
             << all.size() << " " << inwards << " " << at;
     }
 }
 
-TEST(MeshRepair, CavitiesWithAHoleStay) {
+TEST(MeshRepair, KeepsCavitiesWithAHole) {
   const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2);
   TriangleMesh lacking = boxOfTwo();
-  for (std::size_t lack = 0; lack < 2; ++lack) {  // a triangle, a side
+  for (std::size_t lack = 0; lack < 2; ++lack) {  // a missing triangle, then a missing side
     lacking.triangles.pop_back();
-    expectUnchanged(joined(outer, turned(lacking)), "within a box");
+    expectUnchanged(joined(outer, support::reversed(lacking)), "an open cavity within a box");
   }
-  expectUnchanged(joined(moved(openBox(), {0, 0, -2}, 2), turned(moved(openBox(), {0, 0, -1.5}, 1.5))),
-                  "the inner wall of a cup, up to its rim");
+  expectUnchanged(joined(moved(openBox(), {0, 0, -2}, 2), support::reversed(moved(openBox(), {0, 0, -1.5}, 1.5))),
+                  "the inner wall of a cup");
 }
 
-TEST(MeshRepair, CavitiesThatReachIntoEachOtherStay) {
-  const TriangleMesh hollow = joined(joined(moved(boxOfTwo(), {0, 0, 0}, 5), turned(moved(boxOfTwo(), {0, 0, 0}, 2))),
-                                     turned(moved(boxOfTwo(), {2.5, 2.5, 2.5}, 2)));
-  const RepairedMesh mended = repaired(cleaned(hollow));
-  EXPECT_EQ(mended.turnedPatches, 0u);
-  EXPECT_EQ(mended.imported.mesh.triangles, cleaned(hollow).mesh.triangles);
+TEST(MeshRepair, KeepsCavitiesThatOverlapEachOther) {
+  const TriangleMesh hollow =
+      joined(joined(moved(boxOfTwo(), {0, 0, 0}, 5), support::reversed(moved(boxOfTwo(), {0, 0, 0}, 2))),
+             support::reversed(moved(boxOfTwo(), {2.5, 2.5, 2.5}, 2)));
+  const RepairedMesh result = repaired(cleaned(hollow));
+  EXPECT_EQ(result.reversedPatches, 0u);
+  EXPECT_EQ(result.imported.mesh.triangles, cleaned(hollow).mesh.triangles);
 }
 
-TEST(MeshRepair, PocketsThatEndInASideStay) {
+TEST(MeshRepair, KeepsPocketsThatEndInASide) {
   const TriangleMesh block = boxBetween({0, 0, 0}, {10, 10, 10});
-  expectUnchanged(joined(block, turned(boxBetween({1, 1, 9.5}, {9, 9, 10}))), "most of it in the side");
+  expectUnchanged(joined(block, support::reversed(boxBetween({1, 1, 9.5}, {9, 9, 10}))),
+                  "most of the pocket's area lies in the side");
 }
 
-TEST(MeshRepair, AShellThatLooksInwardsKeepsItsCavity) {
-  const TriangleMesh shell = joined(ball({0, 0, 0}, 2), turned(ball())), beside = ball({20, 0, 0}, 9);
-  const RepairedMesh mended = repaired(cleaned(joined(beside, turned(shell))));
-  EXPECT_EQ(mended.turnedPatches, 2u);
-  EXPECT_EQ(mended.imported.mesh.triangles, joined(beside, shell).triangles);
+TEST(MeshRepair, ReversesBothSurfacesOfAnInwardHollowBody) {
+  const TriangleMesh shell = joined(ball({0, 0, 0}, 2), support::reversed(ball())), beside = ball({20, 0, 0}, 9);
+  const RepairedMesh result = repaired(cleaned(joined(beside, support::reversed(shell))));
+  EXPECT_EQ(result.reversedPatches, 2u);
+  EXPECT_EQ(result.imported.mesh.triangles, joined(beside, shell).triangles);
 }
 
-TEST(MeshRepair, ABodyAmongBodiesIsNoCavityOfThem) {
+TEST(MeshRepair, ReversesABodyAmongTouchingBodies) {
   TriangleMesh cubes;
   std::size_t middle = 0;
   for (int i = 0; i < 27; ++i) {
@@ -259,9 +263,9 @@ TEST(MeshRepair, ABodyAmongBodiesIsNoCavityOfThem) {
     if (i == 13) middle = cubes.triangles.size();
     cubes = joined(cubes, boxBetween(low, low + Vector3(1, 1, 1)));
   }
-  // all cut otherwise than their neighbours, for the middle one alone touches the six
+  // The middle cube touches six others, and its faces are divided along other diagonals than theirs.
   TriangleMesh inner = boxBetween({1, 1, 1}, {2, 2, 2});
-  for (Vector3& x : inner.vertices) x.x() = 3 - x.x();  // mirrored, and so inwards
+  for (Vector3& x : inner.vertices) x.x() = 3 - x.x();  // mirroring orients it inward
   std::copy(inner.triangles.begin(), inner.triangles.end(),
             cubes.triangles.begin() + static_cast<std::ptrdiff_t>(middle));
   for (auto t = cubes.triangles.begin() + static_cast<std::ptrdiff_t>(middle), end = t + 12; t != end; ++t)
@@ -272,35 +276,37 @@ TEST(MeshRepair, ABodyAmongBodiesIsNoCavityOfThem) {
   EXPECT_NEAR(windingNumber(repaired(cleaned(cubes)).imported.mesh, center), 1, 1e-9);
 }
 
-TEST(MeshRepair, WhatReachesOutOfAnotherIsNoCavity) {
+TEST(MeshRepair, ReversesBodiesThatProtrudeFromAnother) {
   const TriangleMesh outer = boxOfTwo(), through = boxBetween({0, -0.9, -0.9}, {1.6, 0.9, 0.9});
   for (std::size_t largest = 0; largest < through.triangles.size(); ++largest) {
-    TriangleMesh given = through;
-    std::ranges::rotate(given.triangles, given.triangles.begin() + static_cast<std::ptrdiff_t>(largest));
-    const RepairedMesh mended = repaired(cleaned(joined(outer, turned(given))));
-    EXPECT_EQ(mended.turnedPatches, 1u) << largest;
-    EXPECT_EQ(mended.imported.mesh.triangles, joined(outer, given).triangles) << largest;
+    TriangleMesh body = through;
+    std::ranges::rotate(body.triangles, body.triangles.begin() + static_cast<std::ptrdiff_t>(largest));
+    const RepairedMesh result = repaired(cleaned(joined(outer, support::reversed(body))));
+    EXPECT_EQ(result.reversedPatches, 1u) << largest;
+    EXPECT_EQ(result.imported.mesh.triangles, joined(outer, body).triangles) << largest;
   }
-  expectUnchanged(joined(outer, turned(boxBetween({-0.9, -0.9, -0.9}, {1.1, 0.9, 0.9}))), "but for a tenth within");
+  expectUnchanged(joined(outer, support::reversed(boxBetween({-0.9, -0.9, -0.9}, {1.1, 0.9, 0.9}))),
+                  "nine tenths of the body lie within");
 }
 
-TEST(MeshRepair, OneSidedSurfacesStayWhateverTheirVolume) {
+TEST(MeshRepair, KeepsOneSidedSurfacesWhateverTheirVolume) {
   const TriangleMesh box = boxBetween({-9, -9, -9}, {-5, -5, -5}), strip = moebiusStrip(24);
   const MeshReport report = inspect(strip);
-  ASSERT_GT(std::abs(report.volume), 0.01 * report.box.volume()) << "plain, were there two sides";
-  for (const TriangleMesh& given : {strip, turned(strip)}) {
-    const RepairedMesh mended = repaired(cleaned(joined(box, given)));
-    EXPECT_EQ(mended.turnedPatches, 0u);
-    EXPECT_EQ(mended.imported.mesh.triangles, joined(box, given).triangles);
+  ASSERT_GT(std::abs(report.volume), 0.01 * report.box.volume())
+      << "the volume of a two-sided surface would be reliable";
+  for (const TriangleMesh& body : {strip, support::reversed(strip)}) {
+    const RepairedMesh result = repaired(cleaned(joined(box, body)));
+    EXPECT_EQ(result.reversedPatches, 0u);
+    EXPECT_EQ(result.imported.mesh.triangles, joined(box, body).triangles);
   }
 }
 
-TEST(MeshRepair, OpenBodiesTurnAndKeepTheirHole) {
+TEST(MeshRepair, ReversesOpenBodies) {
   const TriangleMesh open = support::openAbove(ball(), 0.7);
-  const RepairedMesh mended = repaired(cleaned(joined(ball({5, 0, 0}, 2), turned(open))));
-  EXPECT_EQ(mended.turnedPatches, 1u);
-  EXPECT_GT(mended.imported.report.boundaryEdges, 10u);
-  EXPECT_EQ(repaired(mended.imported).turnedPatches, 0u);
+  const RepairedMesh result = repaired(cleaned(joined(ball({5, 0, 0}, 2), support::reversed(open))));
+  EXPECT_EQ(result.reversedPatches, 1u);
+  EXPECT_GT(result.imported.report.boundaryEdges, 10u);
+  EXPECT_EQ(repaired(result.imported).reversedPatches, 0u);
 }
 
 Vector3 middleOf(const TriangleMesh& mesh, std::size_t face) {
@@ -308,19 +314,19 @@ Vector3 middleOf(const TriangleMesh& mesh, std::size_t face) {
   return (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
 }
 
-TEST(MeshRepair, KeepsWhatCleaningDid) {
+TEST(MeshRepair, KeepsTheReportOfCleaning) {
   TriangleMesh mesh = boxOfTwo();
   mesh.triangles.push_back(mesh.triangles[3]);
   mesh.triangles.push_back({0, 0, 1});
-  const RepairedMesh mended = repaired(cleaned(turned(mesh)));
-  EXPECT_EQ(mended.imported.report.duplicateFaces, 1u);
-  EXPECT_EQ(mended.imported.report.degenerateFaces, 1u);
-  EXPECT_EQ(mended.imported.report.duplicatePosition, middleOf(mesh, 3));
-  EXPECT_EQ(mended.imported.report.degeneratePosition, middleOf(mesh, 13));
-  EXPECT_TRUE(mended.imported.report.turned);
+  const RepairedMesh result = repaired(cleaned(support::reversed(mesh)));
+  EXPECT_EQ(result.imported.report.duplicateFaces, 1u);
+  EXPECT_EQ(result.imported.report.degenerateFaces, 1u);
+  EXPECT_EQ(result.imported.report.duplicatePosition, middleOf(mesh, 3));
+  EXPECT_EQ(result.imported.report.degeneratePosition, middleOf(mesh, 13));
+  EXPECT_TRUE(result.imported.report.reversed);
 }
 
-TEST(MeshExport, ComesBackAsItWas) {
+TEST(MeshExport, IsReadBackUnchanged) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = moved(boxOfTwo(), {0.125, -3, 1e-3});
   for (const char* name : {"box.obj", "box.PLY"}) {
@@ -331,12 +337,12 @@ TEST(MeshExport, ComesBackAsItWas) {
     EXPECT_TRUE(again.report.closed());
     EXPECT_EQ(again.report.box.min().y(), -4) << name;
     EXPECT_NEAR(again.report.box.max().z(), 1 + 1e-3, 1e-7) << name;
-    EXPECT_NEAR(again.report.volume, 8, 1e-6);  // the reader's floats
+    EXPECT_NEAR(again.report.volume, 8, 1e-6);  // assimp reads floats
   }
 }
 
-/// assimp takes the byte of a line feed there for part of the header.
-TEST(MeshExport, WhateverByteThePlysDataBeginWith) {
+/// assimp mistakes a line feed at the beginning of the data for a part of the header.
+TEST(MeshExport, IsReadBackWhateverByteThePlyDataBeginWith) {
   const support::TemporaryDirectory folder;
   const std::filesystem::path file = folder.path() / "box.ply";
   for (std::uint64_t byte = 0; byte < 256; ++byte) {
@@ -350,12 +356,12 @@ TEST(MeshExport, WhateverByteThePlysDataBeginWith) {
     std::getline(stream, line);
     EXPECT_EQ(line, byte == '\n' ? "format ascii 1.0" : "format binary_little_endian 1.0") << byte;
     const ImportedMesh again = importMesh(file);
-    EXPECT_EQ(again.mesh.vertices, boxOfTwo().vertices) << byte << " is lost in the reader's floats";
+    EXPECT_EQ(again.mesh.vertices, boxOfTwo().vertices) << byte << " is lost in the floats that assimp reads";
     EXPECT_EQ(again.mesh.triangles, mesh.triangles) << byte;
   }
 }
 
-TEST(MeshExport, WritesDoublesToTheLastDigit) {
+TEST(MeshExport, WritesDoublesExactly) {
   const support::TemporaryDirectory folder;
   TriangleMesh mesh = boxOfTwo();
   mesh.vertices[0].x() = -1.0000000000000002;

@@ -34,7 +34,7 @@ using ::testing::StartsWith;
 
 static_assert(std::endian::native == std::endian::little, "the binary files below are written as they lie in memory");
 
-/// Bytes of a binary file, number by number.
+/// The bytes of a binary file, to which numbers are appended.
 struct Bytes {
   std::string data;
   template <typename T>
@@ -48,7 +48,8 @@ struct Bytes {
   }
 };
 
-// A tetrahedron unlike itself in any other position: sides 1, 2, 3 along x, y, z, the right-angled corner at (5, 6, 7).
+// A tetrahedron with edges 1, 2, 3 along x, y, z from its right-angled corner at (5, 6, 7). No rotation or reflection
+// maps it to itself.
 constexpr float kCorners[4][3] = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, 10}};
 constexpr std::uint16_t kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
 
@@ -83,7 +84,7 @@ class MeshImport : public ::testing::Test {
     EXPECT_EQ(report.vertices, 4u);
     EXPECT_EQ(report.faces, 4u);
     EXPECT_TRUE(report.closed());
-    EXPECT_FALSE(report.turned);
+    EXPECT_FALSE(report.reversed);
     EXPECT_NEAR(report.volume, 1, 1e-12);
     EXPECT_EQ(report.box.min(), Vector3(5, 6, 7));
     EXPECT_EQ(report.box.max(), Vector3(6, 8, 10));
@@ -102,7 +103,7 @@ TEST_F(MeshImport, Obj) {
                     "t.obj");
 }
 
-TEST_F(MeshImport, ExtensionsInAnyCase) {
+TEST_F(MeshImport, TakesExtensionsInAnyCase) {
   expectTetrahedron(import("T.OBJ", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
                     "T.OBJ");
 }
@@ -208,7 +209,7 @@ Bytes gltfBuffer() {
   return buffer;
 }
 
-/// A glTF scene that shows the tetrahedron by the given nodes.
+/// A glTF scene whose nodes, in JSON, refer to the tetrahedron.
 std::string gltfScene(const std::string& nodes, const std::string& roots, const std::string& uri = "", int mode = 4) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + roots + R"(]}],"nodes":[)" + nodes +
          R"(],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"mode":)" + std::to_string(mode) +
@@ -241,13 +242,13 @@ TEST_F(MeshImport, Glb) {
 
 TEST_F(MeshImport, NodeTransformsAreAppliedAndInstancesRepeated) {
   write("t.bin", gltfBuffer().data);
-  // the parent doubles and shifts; its child turns a quarter about z: (x, y, z) → (-y, x, z)
+  // The parent scales by 2 and translates; its child rotates by 90° about z: (x, y, z) → (-y, x, z).
   const auto [mesh, report] =
       import("t.gltf", gltfScene(R"({"mesh":0},{"children":[2],"scale":[2,2,2],"translation":[100,0,0]},
                              {"mesh":0,"rotation":[0,0,0.70710678118,0.70710678118]})",
                                  "0,1", "t.bin"));
   EXPECT_EQ(report.vertices, 8u);
-  EXPECT_EQ(report.parts, 2u);
+  EXPECT_EQ(report.components, 2u);
   EXPECT_TRUE(report.closed());
   EXPECT_NEAR(report.volume, 1 + 8, 1e-4);
   EXPECT_TRUE(report.box.min().isApprox(Vector3(5, 6, 7)));
@@ -257,9 +258,9 @@ TEST_F(MeshImport, NodeTransformsAreAppliedAndInstancesRepeated) {
 TEST_F(MeshImport, MirroringNodesKeepFacesOutward) {
   write("t.bin", gltfBuffer().data);
   const auto [mesh, report] = import("t.gltf", gltfScene(R"({"mesh":0},{"mesh":0,"scale":[-2,1,1]})", "0,1", "t.bin"));
-  EXPECT_FALSE(report.turned);
+  EXPECT_FALSE(report.reversed);
   EXPECT_TRUE(report.closed());
-  EXPECT_NEAR(report.volume, 1 + 2, 1e-12);  // 1 - 2 where the mirrored one is left inside out
+  EXPECT_NEAR(report.volume, 1 + 2, 1e-12);  // A reflected instance that stays reversed would contribute -2.
   EXPECT_EQ(report.box.min(), Vector3(-12, 6, 7));
 }
 
@@ -268,14 +269,14 @@ TEST_F(MeshImport, AllMeshesOfASceneAreJoinedAndWelded) {
                                      "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
                                      "o b\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 5 6 7\n");
   EXPECT_EQ(report.vertices, 4u);
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
   EXPECT_TRUE(report.closed());
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Polygons
 
-// A prism over an L: the first corner of each cap does not see the whole cap.
+// A prism over an L, whose caps are not star-shaped about their first corner.
 const std::string kPrismCorners =
     "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1\nv 0 0 1\n";
 const std::string kPrismSides = "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n";
@@ -286,11 +287,11 @@ TEST_F(MeshImport, ConcavePolygons) {
   EXPECT_EQ(report.faces, 4u + 4 + 12);
   EXPECT_TRUE(report.closed());
   EXPECT_DOUBLE_EQ(report.volume, 3);
-  EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);  // more where a triangle reaches outside the L
+  EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);  // Triangles outside the L would add to the area.
 }
 
 TEST_F(MeshImport, PolygonsWithCornersOnAStraightSideStayClosed) {
-  // The caps have two corners more along the side from 6 to 1, as do the two faces there.
+  // The caps and the two faces at the side from 6 to 1 have two more corners on that side.
   const auto [mesh, report] =
       import("l.obj", kPrismCorners + "v 1 0 0\nv 1 0 1\nv 1.5 0 0\nv 1.5 0 1\n" + kPrismSides +
                           "f 6 13 14 12\nf 13 15 16 14\nf 15 1 7 16\nf 7 8 9 10 11 12 14 16\nf 6 5 4 3 2 1 15 13\n");
@@ -330,7 +331,7 @@ std::string tetrahedronObj(double size, double offset) {
   return text.str();
 }
 
-TEST_F(MeshImport, CoordinatesAreKeptAsFarApartAsIsSaid) {
+TEST_F(MeshImport, CoordinateSpacingBoundsTheRounding) {
   std::mt19937 random(7);
   for (const double at : {1.0, 1000.0, 1e6, 3e20, 1e38, 2e-38, 1e-41}) {
     std::uniform_real_distribution<double> near(at, 1.5 * at);
@@ -350,12 +351,12 @@ TEST_F(MeshImport, CoordinatesAreKeptAsFarApartAsIsSaid) {
       for (const Vector3& v : mesh.vertices) nearest = std::min(nearest, (v.array() - x).abs().minCoeff());
       lost = std::max(lost, nearest);
     }
-    EXPECT_LE(lost, 2 * spacing) << at;  // assimp multiplies by powers of ten in float, too
+    EXPECT_LE(lost, 2 * spacing) << at;  // assimp also multiplies by powers of ten in float.
     EXPECT_GT(lost, spacing / 8) << at;
   }
 }
 
-TEST_F(MeshImport, NothingIsLostOfFilesThatHoldFloats) {
+TEST_F(MeshImport, FilesThatHoldFloatsLoseNothing) {
   const auto spacing = [&](const std::string& name, const std::string& content) {
     const fs::path file = write(name, content);
     return coordinateSpacing(file, importMesh(file).mesh);
@@ -373,7 +374,7 @@ TEST_F(MeshImport, NothingIsLostOfFilesThatHoldFloats) {
   EXPECT_EQ(coordinateSpacing("builtin:box", loadMesh("builtin:box")), 0);
 }
 
-TEST_F(MeshImport, OfAnySizeThatFloatsHold) {
+TEST_F(MeshImport, TakesAnySizeInTheRangeOfFloat) {
   for (const double size : {1e-40, 1e-20, 1e-6, 1e6, 1e20, 3e37}) {
     const auto [mesh, report] = import("t.obj", tetrahedronObj(size, 0));
     EXPECT_TRUE(report.closed()) << size;
@@ -389,13 +390,13 @@ TEST_F(MeshImport, OfAnySizeThatFloatsHold) {
                     HasSubstr("coordinates reach 1e+09, where the reader keeps them 64 apart")));
   EXPECT_THAT(errorOf("t.off", "OFF\n1 2 0\n0.1 0.2 0.3\n3 0 0 0\n3 0 0 0\n"),
               AllOf(HasSubstr("no face with an area (2 faces are degenerate)"), Not(HasSubstr("the reader keeps"))))
-      << "no other place would help";
+      << "a translation would not help";
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// What is refused
+// Refused files
 
-TEST_F(MeshImport, FilesThatAreNoFiles) {
+TEST_F(MeshImport, RefusesPathsThatAreNoRegularFiles) {
   EXPECT_EQ(errorOf(directory_ / "mesh.obj"), (directory_ / "mesh.obj").string() + ": no such file; check the path");
   fs::create_directory(directory_ / "folder.obj");
   EXPECT_THAT(errorOf(directory_ / "folder.obj"), HasSubstr("folder.obj: a directory, not a file"));
@@ -405,7 +406,7 @@ TEST_F(MeshImport, FilesThatAreNoFiles) {
   EXPECT_THAT(errorOf(fs::path()), HasSubstr("the mesh file's name is empty"));
 }
 
-TEST_F(MeshImport, UnreadableFile) {
+TEST_F(MeshImport, RefusesUnreadableFiles) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may read every file";
   const fs::path file = write("secret.obj", "v 0 0 0\n");
   fs::permissions(file, fs::perms::none);
@@ -419,7 +420,7 @@ TEST_F(MeshImport, UnknownFormatsNameTheKnownOnes) {
         AllOf(HasSubstr("/" + name + ": "), HasSubstr("ends in one of .obj, .ply, .stl, .off, .3ds, .gltf, .glb")));
 }
 
-TEST_F(MeshImport, ContentThatIsNoMesh) {
+TEST_F(MeshImport, RefusesContentThatIsNoMesh) {
   for (const std::string extension : {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"})
     for (const std::string& content :
          {std::string("Dear diary,\nnothing happened.\n"), std::string(1, '\0'), std::string(1000, '\xff')}) {
@@ -428,7 +429,7 @@ TEST_F(MeshImport, ContentThatIsNoMesh) {
     }
 }
 
-TEST_F(MeshImport, TruncatedFiles) {
+TEST_F(MeshImport, RefusesTruncatedFiles) {
   Bytes stl{std::string(80, ' ')};
   stl.add(std::uint32_t{1000}).add(0.0f);
   EXPECT_THAT(errorOf("cut.stl", stl.data), HasSubstr("/cut.stl: cannot be read as a mesh"));
@@ -451,7 +452,7 @@ TEST_F(MeshImport, TruncatedFiles) {
   EXPECT_THAT(errorOf("alone.gltf", gltfScene(R"({"mesh":0})", "0", "missing.bin")), HasSubstr("/alone.gltf: "));
 }
 
-TEST_F(MeshImport, NoFaces) {
+TEST_F(MeshImport, RefusesFilesWithoutFaces) {
   EXPECT_THAT(errorOf("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), HasSubstr("/points.obj: "));
   EXPECT_THAT(errorOf("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), HasSubstr("/lines.obj: no faces"));
   write("t.bin", gltfBuffer().data);
@@ -462,26 +463,27 @@ TEST_F(MeshImport, NoFaces) {
               HasSubstr("/flat.obj: no face with an area (2 faces are degenerate)"));
 }
 
-TEST_F(MeshImport, FlattenedByItsNode) {
+TEST_F(MeshImport, RefusesAMeshThatItsNodeFlattens) {
   write("t.bin", gltfBuffer().data);
   EXPECT_THAT(errorOf("t.gltf", gltfScene(R"({"mesh":0,"scale":[1,0,0]})", "0", "t.bin")),
               HasSubstr("/t.gltf: no face with an area (4 faces are degenerate)"));
 }
 
-TEST_F(MeshImport, IndicesOutOfRangeWhereTheyShow) {
+TEST_F(MeshImport, RefusesIndicesOutOfRange) {
   EXPECT_THAT(errorOf("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), HasSubstr("/far.obj: "));
 }
 
-// What assimp 5.2 makes of such indices elsewhere, where nothing can be seen of it any more.
-TEST_F(MeshImport, IndicesOutOfRangeThatAssimpMends) {
+// assimp 5.2 corrects indices out of range in some formats, so that the importer cannot detect them.
+TEST_F(MeshImport, TakesIndicesThatAssimpCorrects) {
   Bytes buffer = gltfBuffer();
   buffer.data[buffer.data.size() - 2] = 9;
   write("t.bin", buffer.data);
-  EXPECT_EQ(import("far.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")).report.boundaryEdges, 3u);  // leaves it out
+  EXPECT_EQ(import("far.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")).report.boundaryEdges,
+            3u);  // assimp drops the face.
   EXPECT_EQ(import("far.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 77\n").report.faces, 1u);
 }
 
-TEST_F(MeshImport, NonFiniteCoordinates) {
+TEST_F(MeshImport, RefusesNonFiniteCoordinates) {
   for (const std::string bad : {"nan", "inf", "-inf"}) {
     EXPECT_THAT(errorOf("bad.obj", "v 0 0 0\nv 1 0 " + bad + "\nv 0 1 0\nf 1 2 3\n"),
                 HasSubstr("/bad.obj: vertex 2 has a coordinate that is not a finite number"));
@@ -494,7 +496,7 @@ TEST_F(MeshImport, NonFiniteCoordinates) {
   }
 }
 
-TEST_F(MeshImport, IsSilent) {
+TEST_F(MeshImport, PrintsNothing) {
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   errorOf("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\nfoo\n");
@@ -511,7 +513,7 @@ TEST_F(MeshImport, LoadMeshTakesFilesAndShapes) {
   EXPECT_EQ(loadMesh(file.string()).triangles.size(), 4u);
   EXPECT_EQ(loadMesh("builtin:box,width=3").name, "builtin:box,width=3");
   EXPECT_THROW(loadMesh("builtin:bax,width=3"), Error);
-  EXPECT_THROW(loadMesh("box"), Error);  // a file of that name is meant, and there is none
+  EXPECT_THROW(loadMesh("box"), Error);  // The name stands for a file, which does not exist.
   try {
     loadMesh("analytic:torus,major=1");
     FAIL();
@@ -524,12 +526,12 @@ TEST_F(MeshImport, LoadMeshTakesFilesAndShapes) {
 // Triangulation
 
 struct TriangulationArea {
-  double sum = 0;    ///< of areas signed by the polygon's orientation
-  double least = 0;  ///< smallest of them
+  double sum = 0;    ///< sum of the triangles' areas, signed by the polygon's orientation
+  double least = 0;  ///< least signed area of a triangle
 };
 
 TriangulationArea areaOf(const std::vector<Vector3>& polygon, const Vector3& normal) {
-  const auto triangles = triangulate(polygon);
+  const auto triangles = mesh::triangulate(polygon);
   EXPECT_EQ(triangles.size(), polygon.size() - 2);
   TriangulationArea area{0, std::numeric_limits<double>::infinity()};
   for (const auto& [a, b, c] : triangles) {
@@ -540,7 +542,7 @@ TriangulationArea areaOf(const std::vector<Vector3>& polygon, const Vector3& nor
   return area;
 }
 
-TEST(Triangulate, ConcavePolygonsInAnyPlane) {
+TEST(Triangulate, TriangulatesConcavePolygonsInAnyPlane) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int trial = 0; trial < 300; ++trial) {
@@ -566,7 +568,7 @@ TEST(Triangulate, ConcavePolygonsInAnyPlane) {
 }
 
 TEST(Triangulate, CornersOnStraightSidesGetTrianglesWithAnArea) {
-  // A square with nine corners more on each side, in thirds of a unit: not straight once rounded to float.
+  // Each side of the square has nine more corners at thirds of a unit, which float rounds away from the straight side.
   std::vector<Vector3> polygon;
   const Vector3 corners[4] = {{0, 0, 0}, {1, 0.3, 0}, {0.7, 1.3, 0}, {-0.3, 1, 0}};
   for (int side = 0; side < 4; ++side)
@@ -578,7 +580,7 @@ TEST(Triangulate, CornersOnStraightSidesGetTrianglesWithAnArea) {
   EXPECT_GT(area.least, 1e-3);
 }
 
-TEST(Triangulate, ACombIsNotFilled) {
+TEST(Triangulate, DoesNotFillTheGapsOfAComb) {
   std::vector<Vector3> polygon;
   for (int tooth = 0; tooth < 20; ++tooth)
     for (const double y : {5.0, 1.0}) {
@@ -592,8 +594,9 @@ TEST(Triangulate, ACombIsNotFilled) {
   EXPECT_GT(area.least, 0);
 }
 
-/// Twice around and back, a thousandth of the radius beside: all pairs of its corners would take minutes.
-TEST(Triangulate, ASpiralOfManyCorners) {
+/// The spiral winds around twice and returns at a distance of a thousandth of its radius. An algorithm that tests all
+/// pairs of its corners would take minutes.
+TEST(Triangulate, TriangulatesASpiralOfManyCornersQuickly) {
   constexpr int kAlong = 50000;
   std::vector<Vector3> polygon;
   const auto add = [&](int i, double radius) {
@@ -612,7 +615,7 @@ TEST(Triangulate, ASpiralOfManyCorners) {
   EXPECT_GT(area.least, 0);
 }
 
-TEST(Triangulate, APolygonWithASlitToItsHole) {
+TEST(Triangulate, TriangulatesAPolygonWithASlitToItsHole) {
   const std::vector<Vector3> polygon = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0},
                                         {1, 1, 0}, {1, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}};
   const auto area = areaOf(polygon, Vector3::UnitZ());
@@ -620,7 +623,7 @@ TEST(Triangulate, APolygonWithASlitToItsHole) {
   EXPECT_GE(area.least, 0);
 }
 
-TEST(Triangulate, HopelessPolygonsStillGetTheirTriangles) {
+TEST(Triangulate, YieldsTrianglesForDegeneratePolygons) {
   areaOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {1.5, 0, 0}}, Vector3::UnitZ());
   areaOf(std::vector<Vector3>(6, Vector3::Zero()), Vector3::UnitZ());
   areaOf({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}, {1, 3, 0}}, Vector3::UnitZ());
@@ -629,7 +632,8 @@ TEST(Triangulate, HopelessPolygonsStillGetTheirTriangles) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Real meshes
 
-/// A mesh of the test folder, with what is known of it independently: counts after welding, before faces are dropped.
+/// A mesh of the test folder with its counts after welding and before faces are dropped. The counts are known
+/// independently of this reader.
 struct KnownMesh {
   std::string file;
   std::size_t vertices, faces;
@@ -649,13 +653,13 @@ TEST_P(KnownMeshes, HaveTheKnownCounts) {
   EXPECT_EQ(report.vertices, known.vertices);
   EXPECT_EQ(report.faces + report.degenerateFaces + report.duplicateFaces, known.faces);
   EXPECT_EQ(report.closed(), known.closed);
-  EXPECT_EQ(report.parts, known.parts);
+  EXPECT_EQ(report.components, known.parts);
   EXPECT_EQ(report.boundaryEdges, known.boundaryEdges);
   EXPECT_EQ(report.nonManifoldEdges, known.nonManifoldEdges);
   EXPECT_EQ(report.degenerateFaces, known.degenerateFaces);
   EXPECT_EQ(report.flippedFaces, known.flippedFaces);
   EXPECT_EQ(report.duplicateFaces, known.duplicateFaces);
-  EXPECT_EQ(report.turned, known.turned);
+  EXPECT_EQ(report.reversed, known.turned);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -674,8 +678,8 @@ INSTANTIATE_TEST_SUITE_P(
                       KnownMesh{"broken/self_intersectA.obj", 8582, 17160, true, 1, 0, 0, 0, 0, 0, false},
                       KnownMesh{"broken/Generic_Twin_7081_left.obj", 9874, 19704, true, 12, 0, 0, 0, 0, 0, false}));
 
-// Where faces are dropped, edges and vertices that only they used go or open. The teapot has three parts when those
-// that touch in a corner count as one.
+// Dropping faces removes vertices and opens edges. The teapot has three components when components that touch in a
+// corner count as one.
 INSTANTIATE_TEST_SUITE_P(
     Broken, KnownMeshes,
     ::testing::Values(KnownMesh{"broken/bun_zipper.ply", 34834, 69451, false, 1, 223, 0, 0, 0, 0, false},

@@ -20,13 +20,13 @@ std::vector<double> randomCoefficients(int degree, unsigned seed) {
   return c;
 }
 
-/// The polynomial at points of a part of the cell: `lower` is that part's corner, `size` its edge.
+/// Values of the polynomial at points of the box with lower corner `lower` and edge `size` within the cell [-1, 1]³.
 std::vector<double> sampled(const std::vector<double>& c, int degree, const std::vector<Vector3>& points,
                             const Vector3& lower = {-1, -1, -1}, double size = 2) {
   std::vector<double> samples;
   for (const Vector3& point : points) {
     const Vector3 x = lower + (point + Vector3::Ones()) * (size / 2);
-    samples.push_back(evaluate(c.data(), degree, {x.x(), x.y(), x.z()}));
+    samples.push_back(query::evaluate(c.data(), degree, {x.x(), x.y(), x.z()}));
   }
   return samples;
 }
@@ -39,23 +39,24 @@ void expectNear(const std::vector<double>& a, const std::vector<double>& b, doub
 TEST(Projection, ReproducesEveryPolynomialOfItsDegree) {
   for (const int degree : {1, 2, 3, 5, 9, 17, 30}) {
     const auto c = randomCoefficients(degree, 7);
-    const auto project = productProjection(gaussLegendre(degree + 1), degree);
+    const auto project = basis::productProjection(basis::gaussLegendre(degree + 1), degree);
     expectNear((*project)(sampled(c, degree, project->points())), c, 1e-11);
   }
   for (int degree = 1; degree <= 6; ++degree) {
     const auto c = randomCoefficients(degree, 8);
-    const auto project = plainProjection(*compactCubature(2 * degree), degree);
+    const auto project = basis::matrixProjection(*basis::compactCubature(2 * degree), degree);
     expectNear((*project)(sampled(c, degree, project->points())), c, 1e-13);
   }
 }
 
-TEST(Projection, LowerDegreesDoNotFeelHigherOnes) {
+TEST(Projection, LowerCoefficientsDoNotDependOnHigherOnes) {
   const auto c = randomCoefficients(5, 3);
   for (const auto& project :
-       {productProjection(gaussLegendre(6), 3), plainProjection(*compactCubature(8), 3)}) {  // exact for 5 + 3
+       {basis::productProjection(basis::gaussLegendre(6), 3),
+        basis::matrixProjection(*basis::compactCubature(8), 3)}) {  // Both rules are exact for degree 5 + 3.
     const auto fitted = (*project)(sampled(c, 5, project->points()));
-    forEachCoefficient(3, [&](int i, int j, int k, int index) {
-      forEachCoefficient(5, [&](int a, int b, int d, int other) {
+    basis::forEachCoefficient(3, [&](int i, int j, int k, int index) {
+      basis::forEachCoefficient(5, [&](int a, int b, int d, int other) {
         if (a == i && b == j && d == k) {
           EXPECT_NEAR(fitted[index], c[other], 1e-13);
         }
@@ -64,38 +65,40 @@ TEST(Projection, LowerDegreesDoNotFeelHigherOnes) {
   }
 }
 
-TEST(Projection, MeanSquareIsParseval) {
+TEST(Projection, MeanSquareSatisfiesParsevalsIdentity) {
   const auto c = randomCoefficients(4, 11);
   double parseval = 0;
-  forEachCoefficient(4,
-                     [&](int i, int j, int k, int index) { parseval += c[index] * c[index] * squaredNorm(i, j, k); });
-  for (const auto& project : {productProjection(gaussLegendre(5), 4), plainProjection(*compactCubature(8), 4)})
+  basis::forEachCoefficient(
+      4, [&](int i, int j, int k, int index) { parseval += c[index] * c[index] * basis::squaredNorm(i, j, k); });
+  for (const auto& project :
+       {basis::productProjection(basis::gaussLegendre(5), 4), basis::matrixProjection(*basis::compactCubature(8), 4)})
     EXPECT_NEAR(project->meanSquare(sampled(c, 4, project->points())), parseval, 1e-13);
 }
 
-TEST(Projection, ChildrenJoinedAreTheParent) {
+TEST(Projection, JoinedChildrenAreTheParent) {
   for (const int degree : {0, 1, 2, 5, 31}) {
     const auto c = randomCoefficients(std::min(degree, kMaxDegree), 13);
-    const auto project = productProjection(gaussLegendre(degree + 1), degree);
+    const auto project = basis::productProjection(basis::gaussLegendre(degree + 1), degree);
     std::array<std::vector<double>, 8> children;
     for (int child = 0; child < 8; ++child) {
       const Vector3 lower(child & 1, child >> 1 & 1, child >> 2);
       children[child] =
           (*project)(sampled(c, std::min(degree, kMaxDegree), project->points(), lower - Vector3::Ones(), 1));
     }
-    auto expected = c;  // of degree 31 without its top shell
-    if (degree > kMaxDegree) expected = appendTopDegree(c, std::vector<double>(coefficientCount(degree), 0.0), degree);
-    expectNear(joined(children, degree), expected, 1e-10);
+    auto expected = c;  // The coefficients of degree 31 have an empty top degree.
+    if (degree > kMaxDegree)
+      expected = basis::appendTopDegree(c, std::vector<double>(coefficientCount(degree), 0.0), degree);
+    expectNear(basis::joined(children, degree), expected, 1e-10);
   }
 }
 
-/// A function with a kink: nothing is exact, so that what is joined must be what the samples together give.
-TEST(Projection, ChildrenJoinedAreTheirSamplesTogether) {
+/// No rule integrates a function with a kink exactly, so that the result must equal the projection of all samples.
+TEST(Projection, JoinedChildrenAreTheProjectionOfAllSamples) {
   const auto kink = [](const Vector3& x) { return std::abs(x.x() + 0.3 * x.y() - 0.2) + x.z() * x.x(); };
   constexpr int kDegree = 4;
-  const auto project = plainProjection(*compactCubature(9), kDegree);
+  const auto project = basis::matrixProjection(*basis::compactCubature(9), kDegree);
   std::array<std::vector<double>, 8> children;
-  std::vector<double> together(coefficientCount(kDegree), 0.0);
+  std::vector<double> ofAllSamples(coefficientCount(kDegree), 0.0);
   for (int child = 0; child < 8; ++child) {
     const Vector3 centre((child & 1) - 0.5, (child >> 1 & 1) - 0.5, (child >> 2) - 0.5);
     std::vector<double> samples;
@@ -103,54 +106,55 @@ TEST(Projection, ChildrenJoinedAreTheirSamplesTogether) {
       const Vector3 x = centre + project->points()[q] / 2;
       samples.push_back(kink(x));
       double u[kDegree + 1], v[kDegree + 1], w[kDegree + 1];
-      legendreValues(x.x(), kDegree, u);
-      legendreValues(x.y(), kDegree, v);
-      legendreValues(x.z(), kDegree, w);
-      const double weight = compactCubature(9)->weights[q] / 64;
-      forEachCoefficient(kDegree, [&](int i, int j, int k, int index) {
-        together[index] += weight * samples.back() * u[i] * v[j] * w[k] / squaredNorm(i, j, k);
+      basis::legendreValues(x.x(), kDegree, u);
+      basis::legendreValues(x.y(), kDegree, v);
+      basis::legendreValues(x.z(), kDegree, w);
+      const double weight = basis::compactCubature(9)->weights[q] / 64;
+      basis::forEachCoefficient(kDegree, [&](int i, int j, int k, int index) {
+        ofAllSamples[index] += weight * samples.back() * u[i] * v[j] * w[k] / basis::squaredNorm(i, j, k);
       });
     }
     children[child] = (*project)(samples);
   }
-  expectNear(joined(children, kDegree), together, 1e-14);
+  expectNear(basis::joined(children, kDegree), ofAllSamples, 1e-14);
 }
 
-TEST(Projection, TopDegreeErrorIsTheNormOfTheLastShell) {
+TEST(Projection, TopDegreeErrorIsTheNormOfTheTopDegreeTerms) {
   const auto c = randomCoefficients(6, 5);
   double shell = 0;
-  forEachCoefficient(6, [&](int i, int j, int k, int index) {
-    if (i + j + k == 6) shell += c[index] * c[index] * squaredNorm(i, j, k);
+  basis::forEachCoefficient(6, [&](int i, int j, int k, int index) {
+    if (i + j + k == 6) shell += c[index] * c[index] * basis::squaredNorm(i, j, k);
   });
-  EXPECT_NEAR(topDegreeError(c.data(), 6, 2.5), 2.5 * shell, 1e-14);
+  EXPECT_NEAR(basis::topDegreeError(c.data(), 6, 2.5), 2.5 * shell, 1e-14);
 }
 
 TEST(Projection, AppendingKeepsTheLowerCoefficients) {
   const auto lower = randomCoefficients(3, 1);
   const auto raised = randomCoefficients(4, 2);
-  const auto both = appendTopDegree(lower, raised, 4);
+  const auto both = basis::appendTopDegree(lower, raised, 4);
   std::size_t next = 0;
-  forEachCoefficient(4, [&](int i, int j, int k, int index) {
+  basis::forEachCoefficient(4, [&](int i, int j, int k, int index) {
     EXPECT_EQ(both[index], i + j + k == 4 ? raised[index] : lower[next++]);
   });
 }
 
 TEST(Projection, DroppingTheTopKeepsTheRest) {
   const auto c = randomCoefficients(5, 4);
-  expectNear(appendTopDegree(truncated(c, 5, 4), c, 5), c, 0);
+  expectNear(basis::appendTopDegree(basis::truncated(c, 5, 4), c, 5), c, 0);
 }
 
 TEST(Evaluate, GradientMatchesCentralDifferences) {
   for (const int degree : {1, 2, 4, 12}) {
     const auto c = randomCoefficients(degree, 9);
     const std::array<double, 3> at = {0.3, -0.55, 0.81};
-    const auto result = evaluateWithGradient(c.data(), degree, at);
-    EXPECT_DOUBLE_EQ(result.value, evaluate(c.data(), degree, at));
+    const auto result = query::evaluateWithGradient(c.data(), degree, at);
+    EXPECT_DOUBLE_EQ(result.value, query::evaluate(c.data(), degree, at));
     for (int axis = 0; axis < 3; ++axis) {
       auto above = at, below = at;
       above[axis] += 1e-6;
       below[axis] -= 1e-6;
-      const double difference = (evaluate(c.data(), degree, above) - evaluate(c.data(), degree, below)) / 2e-6;
+      const double difference =
+          (query::evaluate(c.data(), degree, above) - query::evaluate(c.data(), degree, below)) / 2e-6;
       EXPECT_NEAR(result.gradient[axis], difference, 1e-6 * (1 + std::abs(difference)));
     }
   }

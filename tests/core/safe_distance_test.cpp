@@ -1,4 +1,3 @@
-// What is certain about a field's error: bounds, and what goes by them.
 #include "hpsdf/safe_distance.h"
 
 #include <gtest/gtest.h>
@@ -20,35 +19,35 @@ namespace {
 
 using Phi = std::function<double(const Vector3&)>;
 
-/// With a kink between them.
+/// Two spheres, whose distance has a kink between them.
 double spheres(const Vector3& x) {
   return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
 }
 double box(const Vector3& x) { return shapes::boxDistance(x, {0.7, 0.4, 0.9}); }
 Box cube() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
 
-struct Held {
+struct BoundCheck {
   int violations = 0;
-  double medianBound = 0, medianWorst = 0;  ///< over leaves
+  double medianBound = 0, medianWorst = 0;  ///< medians over leaves
 };
 
-/// A lattice of 5³ places of every leaf, its corners among them, and uniform points.
-Held held(const Field& field, const Phi& phi) {
-  Held held;
+/// Checks the bounds at 5³ points of every leaf, its corners among them.
+BoundCheck checkBounds(const Field& field, const Phi& phi) {
+  BoundCheck check;
   std::vector<double> bounds, worst;
   field.forEachCell([&](const Cell& cell) {
     const CellBound bound = field.data().bounds[cell.id];
     double greatest = 0;
     for (int n = 0; n < 125; ++n) {
       const Vector3 share(n % 5 / 4.0, n / 5 % 5 / 4.0, n / 25 / 4.0);
-      // off the faces, where rounding decides on the cell
+      // On the faces themselves, rounding would decide about the cell.
       const Vector3 inner = Vector3::Constant(1e-9) + share * (1 - 2e-9);
       const Vector3 x = cell.box.min() + inner.cwiseProduct(cell.box.sizes());
       const auto [value, gradient] = field.valueAndGradient(x);
       greatest = std::max(greatest, std::abs(value - phi(x)));
-      held.violations += gradient.norm() > bound.slope;
+      check.violations += gradient.norm() > bound.slope;
     }
-    held.violations += greatest > bound.error;
+    check.violations += greatest > bound.error;
     bounds.push_back(bound.error);
     worst.push_back(greatest);
   });
@@ -56,51 +55,51 @@ Held held(const Field& field, const Phi& phi) {
     std::ranges::nth_element(numbers, numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2));
     return numbers[numbers.size() / 2];
   };
-  held.medianBound = median(bounds);
-  held.medianWorst = median(worst);
-  return held;
+  check.medianBound = median(bounds);
+  check.medianWorst = median(worst);
+  return check;
 }
 
-TEST(SafeDistance, BoundsHoldAndAreNotFarOff) {
+TEST(SafeDistance, BoundsHoldAndAreTight) {
   const ExactDistance gear(shapes::mesh("gear"));
   for (const Phi& phi : {Phi(spheres), Phi(box)})
     for (const double target : {1e-5, 1e-7}) {
       const Field field = build(phi, cube(), {.targetError = target, .bounds = true});
-      EXPECT_EQ(held(field, phi).violations, 0);
+      EXPECT_EQ(checkBounds(field, phi).violations, 0);
     }
   const Field field = build(gear, domainAround(gear.source().box), {.targetError = 1e-5, .bounds = true});
-  const Held found = held(field, [&](const Vector3& x) { return gear(x); });
+  const BoundCheck found = checkBounds(field, [&](const Vector3& x) { return gear(x); });
   EXPECT_EQ(found.violations, 0);
   EXPECT_LT(found.medianBound, 20 * found.medianWorst);
 }
 
-TEST(SafeDistance, TheCheckFindsBoundsThatAreTooLow) {
+TEST(SafeDistance, CheckFindsBoundsThatAreTooLow) {
   FieldData data = build(spheres, cube(), {.targetError = 1e-5, .bounds = true}).data();
   for (CellBound& bound : data.bounds) bound.error /= 100;
-  EXPECT_GT(held(Field(data), spheres).violations, 100);
+  EXPECT_GT(checkBounds(Field(data), spheres).violations, 100);
   data = build(spheres, cube(), {.targetError = 1e-5, .bounds = true}).data();
   for (CellBound& bound : data.bounds) bound.slope *= 0.9f;
-  EXPECT_GT(held(Field(data), spheres).violations, 100);
+  EXPECT_GT(checkBounds(Field(data), spheres).violations, 100);
 }
 
 TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
   const Field weak = build(spheres, cube(), {.targetError = 1e-5, .continuityWeight = 0.5, .bounds = true});
-  EXPECT_EQ(held(weak, spheres).violations, 0);
+  EXPECT_EQ(checkBounds(weak, spheres).violations, 0);
   for (const double blend : {0.04, 0.25}) {
     const Field exact =
         build(spheres, cube(), {.targetError = 1e-5, .grid = {16, 16, 16}, .blend = blend, .bounds = true});
-    const Held found = held(exact, spheres);
+    const BoundCheck found = checkBounds(exact, spheres);
     EXPECT_EQ(found.violations, 0);
-    EXPECT_LT(found.medianBound, 3.5 * held(withBounds(blended(exact, 0), spheres), spheres).medianBound);
+    EXPECT_LT(found.medianBound, 3.5 * checkBounds(withBounds(blended(exact, 0), spheres), spheres).medianBound);
   }
-  EXPECT_TRUE(blended(weak).data().bounds.empty()) << "they are not those of the blended field";
+  EXPECT_TRUE(blended(weak).data().bounds.empty()) << "the bounds do not hold for the blended field";
 }
 
 TEST(SafeDistance, BoundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
-  const BuildOptions plain{.targetError = 1e-6};
-  BuildOptions bounded = plain;
+  const BuildOptions unbounded{.targetError = 1e-6};
+  BuildOptions bounded = unbounded;
   bounded.bounds = true;
-  const Field before = build(spheres, cube(), plain), after = build(spheres, cube(), bounded);
+  const Field before = build(spheres, cube(), unbounded), after = build(spheres, cube(), bounded);
   EXPECT_LT(double(after.metadata().exactEvaluations), 1.5 * double(before.metadata().exactEvaluations));
   EXPECT_EQ(before.data().nodes, after.data().nodes);
   const auto same = [&](const Field& other) {
@@ -115,7 +114,7 @@ TEST(SafeDistance, BoundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
   EXPECT_FALSE(same(withBounds(before, box))) << "another surface has other bounds";
 }
 
-TEST(SafeDistance, NoBallOfSafeDistanceHoldsTheSurface) {
+TEST(SafeDistance, NeverExceedsTheDistanceToTheSurface) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> coordinate(-1.5, 1.5);
@@ -137,12 +136,12 @@ TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
   int touches = 0, leaves = 0;
   for (int n = 0; n < 2000; ++n) {
     const Vector3 origin = 2.5 * direction();
-    const Vector3 along = (0.6 * direction() - origin).normalized();
-    const SafeTrace trace = safeTrace(field, origin, along, 1e-3);
-    for (int step = 0; step <= 200; ++step) ASSERT_GT(spheres(origin + step / 200.0 * trace.length * along), 0) << n;
+    const Vector3 towards = (0.6 * direction() - origin).normalized();
+    const SafeTrace trace = safeTrace(field, origin, towards, 1e-3);
+    for (int step = 0; step <= 200; ++step) ASSERT_GT(spheres(origin + step / 200.0 * trace.length * towards), 0) << n;
     (trace.mayTouch ? touches : leaves) += 1;
     if (trace.mayTouch) {
-      EXPECT_LT(spheres(origin + trace.length * along), 0.1) << "it stops near the surface";
+      EXPECT_LT(spheres(origin + trace.length * towards), 0.1) << "it stops near the surface";
     }
   }
   EXPECT_GT(touches, 100);
@@ -150,7 +149,7 @@ TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
   EXPECT_FALSE(safeTrace(field, {3, 3, 3}, {1, 0, 0}, 1e-3).mayTouch) << "past the domain";
 }
 
-/// There a step may be lost in the length so far, and a point may be off by more than the slack.
+/// Far away, rounding may swallow a step, and the error of a point may exceed the slack.
 TEST(SafeDistance, RaysFromFarAwayEnd) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   const auto from = [&](double far) { return safeTrace(field, {far, 0.5, 0.5}, {-1, 0, 0}, 1e-3); };
@@ -160,7 +159,7 @@ TEST(SafeDistance, RaysFromFarAwayEnd) {
   EXPECT_LT(from(8e15).steps, 10);
 }
 
-/// The leaf that counts is the one that answers, and the same is said of it however it is found.
+/// The bound is that of the leaf that holds the point, with and without blending.
 TEST(SafeDistance, IsTheValueLessTheBound) {
   for (const double blend : {0.0, 0.1}) {
     const Field field =
@@ -175,7 +174,7 @@ TEST(SafeDistance, IsTheValueLessTheBound) {
   }
 }
 
-TEST(SafeDistance, WithoutBoundsNothingIsSafe) {
+TEST(SafeDistance, RefusesFieldsWithoutBoundsAndBadArguments) {
   const Field field = build(spheres, cube(), {.targetError = 1e-4});
   EXPECT_FALSE(boundAt(field, {0, 0, 0}));
   EXPECT_THROW(safeDistance(field, {0, 0, 0}), Error);

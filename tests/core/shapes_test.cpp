@@ -40,9 +40,9 @@ std::vector<std::string> shapeNames() {
   return names;
 }
 
-/// Root mean square over the surface, faces weighted by area, of the distance to the smooth shape.
+/// Root mean square of the distance to the smooth shape over the surface of the mesh.
 double surfaceDeviation(const TriangleMesh& mesh, const DistanceFunction& smooth) {
-  constexpr int kSteps = 8;  // centroids of 64 parts of each face
+  constexpr int kSteps = 8;  // Each triangle is sampled at the centroids of 64 parts.
   std::vector<Vector3> points;
   double sum = 0, total = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -63,7 +63,7 @@ double surfaceDeviation(const TriangleMesh& mesh, const DistanceFunction& smooth
   return std::sqrt(sum / total);
 }
 
-TEST(Shapes, CatalogueListsThemInOrder) {
+TEST(Shapes, CatalogueListsShapesInOrder) {
   EXPECT_THAT(shapeNames(),
               ::testing::ElementsAre("sphere", "torus", "box", "gear", "helix-bowl", "marble-run", "structured-bowl"));
   for (const auto& shape : shapes::catalogue()) {
@@ -76,14 +76,14 @@ TEST(Shapes, CatalogueListsThemInOrder) {
   }
 }
 
-TEST(Shapes, DefaultsAreClosedOutwardCleanAndAboutTwoLong) {
+TEST(Shapes, DefaultsAreClosedOutwardCleanAndAboutTwoUnitsLong) {
   for (const std::string& name : shapeNames()) {
     const TriangleMesh mesh = shapes::mesh(name);
     EXPECT_EQ(mesh.name, "builtin:" + name);
     const auto [clean, report] = cleaned(mesh);
     EXPECT_TRUE(report.closed()) << name;
-    EXPECT_FALSE(report.turned) << name;
-    EXPECT_EQ(report.parts, 1u) << name;
+    EXPECT_FALSE(report.reversed) << name;
+    EXPECT_EQ(report.components, 1u) << name;
     EXPECT_EQ(report.faces, mesh.triangles.size()) << name;
     EXPECT_EQ(report.vertices, mesh.vertices.size()) << name;
     EXPECT_EQ(report.flippedFaces, 0u) << name;
@@ -111,12 +111,13 @@ TEST(Shapes, CurvedMeshesFollowTheSmoothSurface) {
   for (const std::string name : {"sphere", "torus"}) {
     const double deviation = surfaceDeviation(shapes::mesh(name), shapes::analytic(name));
     EXPECT_LT(deviation / 2, 5e-5) << name;
-    EXPECT_GT(deviation / 2, 1e-7) << name;  // a mesh is not the smooth surface: the measure does measure
+    EXPECT_GT(deviation / 2, 1e-7)
+        << name;  // A mesh differs from the smooth surface, so that the deviation cannot be 0.
     RecordProperty(name + "_rms", std::to_string(deviation));
   }
 }
 
-TEST(Shapes, Box) {
+TEST(Shapes, BoxHasTwelveTrianglesAndItsSize) {
   const TriangleMesh mesh = shapes::mesh("box,width=4,height=0.5,depth=3");
   const MeshReport report = inspect(mesh);
   EXPECT_EQ(report.faces, 12u);
@@ -126,13 +127,14 @@ TEST(Shapes, Box) {
   EXPECT_EQ(report.box.min(), Vector3(-2, -0.25, -1.5));
 }
 
-TEST(Shapes, GearHasItsMeasuresAndOneHole) {
+TEST(Shapes, GearHasItsSizeAndOneHole) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=20,radius=3,tooth-depth=0.4,hole=1,thickness=0.8,segments=2");
   const MeshReport report = inspect(mesh);
   EXPECT_TRUE(report.closed());
-  EXPECT_EQ(report.parts, 1u);
+  EXPECT_EQ(report.components, 1u);
   const auto edges = static_cast<double>(report.faces) * 1.5;
-  EXPECT_EQ(static_cast<double>(report.vertices) - edges + static_cast<double>(report.faces), 0);  // Euler: genus 1
+  EXPECT_EQ(static_cast<double>(report.vertices) - edges + static_cast<double>(report.faces),
+            0);  // The Euler characteristic of genus 1 is 0.
   EXPECT_EQ(report.box.max(), Vector3(3, 3, 0.4));
   double nearest = 1e9;
   for (const Vector3& v : mesh.vertices) {
@@ -141,13 +143,13 @@ TEST(Shapes, GearHasItsMeasuresAndOneHole) {
     EXPECT_TRUE(std::abs(r - 1) < 1e-14 || std::abs(r - 2.6) < 1e-14 || std::abs(r - 3) < 1e-14) << r;
   }
   EXPECT_NEAR(nearest, 1, 1e-14);
-  // between gears without teeth of the inner and of the outer radius
+  // The volume lies between those of the rings with the inner and the outer radius.
   EXPECT_GT(report.volume, 0.8 * kPi * (2.6 * 2.6 - 1) * 0.95);
   EXPECT_LT(report.volume, 0.8 * kPi * (9 - 1));
 }
 
-/// Top and bottom never fold back over themselves.
-TEST(Shapes, GearCapsAllLookOutward) {
+/// Top and bottom must not fold over themselves.
+TEST(Shapes, GearCapsFaceOutward) {
   for (const std::string spec :
        {"gear", "gear,teeth=3,segments=1,tooth-depth=0.6,hole=0.39", "gear,teeth=3,hole=0.779"}) {
     const TriangleMesh mesh = shapes::mesh(spec);
@@ -163,7 +165,7 @@ TEST(Shapes, GearCapsAllLookOutward) {
   }
 }
 
-/// Where a vertical line through (x, y) crosses the mesh, from below.
+/// The z coordinates at which the vertical line through (x, y) intersects the mesh, ascending.
 std::vector<double> crossings(const TriangleMesh& mesh, double x, double y) {
   std::vector<double> heights;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -183,12 +185,12 @@ TEST(Shapes, BowlsAreOneWallOpenTowardsPositiveZ) {
   for (const std::string name : {"helix-bowl", "structured-bowl"}) {
     const TriangleMesh mesh = shapes::mesh(name);
     const Box box = boundingBox(mesh);
-    EXPECT_EQ(mesh.triangles.size(), 37'632u) << name;  // 16 cells (cells + 1)
+    EXPECT_EQ(mesh.triangles.size(), 37'632u) << name;  // A bowl has 16 cells (cells + 1) triangles.
     double thinnest = 1e9, thickest = 0;
     for (const double x : {0.013, 0.21, 0.47, 0.63})
       for (const double y : {0.007, -0.18, 0.33, -0.52}) {
         const std::vector<double> wall = crossings(mesh, x, y);
-        ASSERT_EQ(wall.size(), 2u) << name << " at " << x << ", " << y;  // and nothing above it
+        ASSERT_EQ(wall.size(), 2u) << name << " at " << x << ", " << y;  // The line intersects the wall only.
         EXPECT_NEAR(wall[0], box.min().z() + 0.8 * (x * x + y * y), 1e-3) << name;
         const double slope = 1.6 * std::hypot(x, y);
         const double thickness = (wall[1] - wall[0]) / std::hypot(1, slope);
@@ -196,44 +198,45 @@ TEST(Shapes, BowlsAreOneWallOpenTowardsPositiveZ) {
         thickest = std::max(thickest, thickness);
       }
     EXPECT_GT(thinnest, 0.03) << name;
-    EXPECT_LT(thinnest, 0.08) << name;  // there is a relief
+    EXPECT_LT(thinnest, 0.08) << name;  // The relief makes the wall thinner somewhere.
     EXPECT_LT(thickest, 0.13) << name;
   }
 }
 
 TEST(Shapes, TheHelixBowlsGrooveWindsOutwards) {
-  // along a ray the wall is thinnest once a turn; a quarter round the axis it is so a quarter of that farther out
+  // Along a ray from the axis the wall is thinnest once a turn. A rotation of the ray by a quarter turn moves these
+  // positions outwards by a quarter of their spacing.
   const TriangleMesh mesh = shapes::mesh("helix-bowl,cells=96,height=0.1");
   const auto depthAt = [&](double radius, double angle) {
     const auto wall = crossings(mesh, radius * std::cos(angle) + 1e-4, radius * std::sin(angle) + 1e-4);
     return wall.size() == 2 ? 0.1 - (wall[1] - wall[0]) : 0;
   };
   for (const double angle : {0.1, 0.1 + kPi / 2}) {
-    const double groove = 0.5 + angle / (2 * kPi) / 4;  // the second of the four turns
+    const double groove = 0.5 + angle / (2 * kPi) / 4;  // This is the second of the four turns.
     EXPECT_GT(depthAt(groove, angle), 0.05);
     EXPECT_LT(depthAt(groove + 0.125, angle), 0.01);
     EXPECT_GT(depthAt(groove + 0.25, angle), 0.05);
   }
 }
 
-TEST(Shapes, TheMarbleRunIsSmallAgainstItsBoxAndDescends) {
+TEST(Shapes, TheMarbleRunFillsLittleOfItsBoxAndDescends) {
   const TriangleMesh mesh = shapes::mesh("marble-run");
   const MeshReport report = inspect(mesh);
   EXPECT_EQ(report.faces, 2u * 18 * 4 * 96 + 4 * 8);
   EXPECT_LT(report.volume / report.box.volume(), 0.03);
-  // half an annulus of 16 corners, upright, along the turns
+  // The volume is that of half an annulus with 16 corners swept along the turns.
   const double length = 4 * 2 * kPi * 0.92, area = 8 * std::sin(kPi / 8) / 2 * (0.08 * 0.08 - 0.06 * 0.06);
   EXPECT_NEAR(report.volume, length * area, 0.002 * length * area);
-  // below the channel's middle, on the far side of the axis half a turn later, its floors
+  // Vertical lines through the channel's middle, on two sides of the axis, intersect the floors of all turns.
   const std::vector<double> floors = crossings(mesh, 0.92, 1e-3);
-  ASSERT_EQ(floors.size(), 8u);  // four turns, the wall's two sides each
+  ASSERT_EQ(floors.size(), 8u);  // Each of the four turns has two sides of the wall.
   for (int turn = 0; turn < 4; ++turn) EXPECT_NEAR(floors[2 * turn + 1] - floors[2 * turn], 0.02, 2e-3);
   EXPECT_NEAR(floors[2] - floors[0], 0.25, 1e-3);
   const std::vector<double> opposite = crossings(mesh, -0.92, 1e-3);
   EXPECT_NEAR(std::abs(opposite[0] - floors[0]), 0.125, 2e-3);
 }
 
-TEST(Shapes, TheBowlsAndTheRunReachThePapersFaces) {
+TEST(Shapes, BowlsAndMarbleRunReachThePapersNumbersOfFaces) {
   EXPECT_NEAR(double(shapes::mesh("helix-bowl,cells=143").triangles.size()), 329'800, 1000);
   EXPECT_NEAR(double(shapes::mesh("marble-run,steps=255,sides=12").triangles.size()), 53'000, 200);
   EXPECT_NEAR(double(shapes::mesh("structured-bowl,cells=506,bumps=40").triangles.size()), 4'100'000, 10'000);
@@ -251,7 +254,7 @@ TEST(Shapes, ExtremeParametersStayClosed) {
     const TriangleMesh mesh = shapes::mesh(spec);
     const auto [clean, report] = cleaned(mesh);
     EXPECT_TRUE(report.closed()) << spec;
-    EXPECT_FALSE(report.turned) << spec;
+    EXPECT_FALSE(report.reversed) << spec;
     EXPECT_GT(report.volume, 0) << spec;
     EXPECT_EQ(report.faces, mesh.triangles.size()) << spec;
     EXPECT_EQ(report.vertices, mesh.vertices.size()) << spec;
@@ -259,7 +262,7 @@ TEST(Shapes, ExtremeParametersStayClosed) {
   }
 }
 
-TEST(Shapes, SpecsAreForgivingAboutBlanksAndPrefix) {
+TEST(Shapes, SpecsMayHaveBlanksAndAPrefix) {
   const TriangleMesh mesh = shapes::mesh(" builtin:torus , major = 1.5 , sides=12 ");
   EXPECT_EQ(mesh.vertices.size(), 256u * 12);
   EXPECT_EQ(mesh.name, "builtin:torus , major = 1.5 , sides=12");
@@ -268,8 +271,8 @@ TEST(Shapes, SpecsAreForgivingAboutBlanksAndPrefix) {
 }
 
 TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
-  EXPECT_THAT(errorOf("toras"), HasSubstr("shape 'toras': there is no shape 'toras'; did you mean torus?"));
-  EXPECT_THAT(errorOf("builtin:gera"), HasSubstr("did you mean gear?"));
+  EXPECT_THAT(errorOf("toras"), HasSubstr("toras: there is no shape 'toras'; did you mean 'torus'?"));
+  EXPECT_THAT(errorOf("builtin:gera"), HasSubstr("did you mean 'gear'?"));
   EXPECT_THAT(errorOf("dodecahedron"), HasSubstr("known: sphere, torus, box, gear"));
   EXPECT_THAT(errorOf(""), HasSubstr("known: sphere, torus, box, gear"));
   EXPECT_THAT(errorOf("helix-bowl,depth=0.1"), HasSubstr("make depth smaller than thickness"));
@@ -277,7 +280,7 @@ TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
   EXPECT_THAT(errorOf("marble-run,thickness=0.08"), HasSubstr("make thickness smaller than half of the width"));
   EXPECT_THAT(errorOf("marble-run,turns=13"), HasSubstr("the turns meet"));
   EXPECT_THAT(errorOf("marble-run,width=1"), HasSubstr("make width smaller than radius"));
-  EXPECT_THAT(errorOf("torus,majro=1"), HasSubstr("torus has no parameter 'majro'; did you mean major?"));
+  EXPECT_THAT(errorOf("torus,majro=1"), HasSubstr("torus has no parameter 'majro'; did you mean 'major'?"));
   EXPECT_THAT(errorOf("box,radius=1"), HasSubstr("known: width, height, depth"));
   EXPECT_THAT(errorOf("box,"), HasSubstr("box has no parameter ''"));
   EXPECT_THAT(errorOf("sphere,radius"), HasSubstr("radius has no value; write radius=1"));
@@ -296,7 +299,7 @@ TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
   EXPECT_THAT(errorOf("gear,tooth-depth=1"), HasSubstr("make tooth-depth smaller"));
   EXPECT_THAT(errorOf("gear,hole=0.78"), HasSubstr("make hole smaller"));
   EXPECT_THAT(errorOf("gear", true), HasSubstr("no distance in closed form is known; use builtin:gear"));
-  EXPECT_THAT(errorOf("analytic:shpere", true), HasSubstr("did you mean sphere?"));
+  EXPECT_THAT(errorOf("analytic:shpere", true), HasSubstr("did you mean 'sphere'?"));
 }
 
 TEST(Shapes, AnalyticDistancesKnowTheirSource) {
@@ -310,7 +313,7 @@ TEST(Shapes, AnalyticDistancesKnowTheirSource) {
   EXPECT_EQ(shapes::analytic("torus,major=2,minor=0.5").source().box.max(), Vector3(2.5, 2.5, 0.5));
 }
 
-TEST(Shapes, AnalyticDistancesByHand) {
+TEST(Shapes, AnalyticDistancesAreExact) {
   EXPECT_DOUBLE_EQ(shapes::sphereDistance({0, 3, 4}, 2), 3);
   EXPECT_DOUBLE_EQ(shapes::sphereDistance({0, 0, 0}, 2), -2);
   EXPECT_DOUBLE_EQ(shapes::torusDistance({0, 0, 0}, 2, 0.5), 1.5);
@@ -341,13 +344,13 @@ TEST(Shapes, AnalyticDistancesHaveUnitGradients) {
       distance(points, values);
       const Vector3 gradient =
           Vector3(values[1] - values[0], values[3] - values[2], values[5] - values[4]) / (2 * kStep);
-      if (std::abs(gradient.norm() - 1) > 1e-6) ++kinks;  // only on the medial axis
+      if (std::abs(gradient.norm() - 1) > 1e-6) ++kinks;  // Kinks occur on the medial axis only.
     }
     EXPECT_LE(kinks, 1) << shape.name;
   }
 }
 
-TEST(NearestName, FindsSlipsAndBeginnings) {
+TEST(NearestName, FindsMisspellingsAndBeginnings) {
   const std::vector<std::string> known = {"build", "info", "query", "slice", "render", "target-error"};
   EXPECT_EQ(nearestName("biuld", known), "build");
   EXPECT_EQ(nearestName("Render", known), "render");
@@ -358,12 +361,12 @@ TEST(NearestName, FindsSlipsAndBeginnings) {
   EXPECT_EQ(nearestName("zzzz", known), "");
   EXPECT_EQ(nearestName("", known), "");
   EXPECT_EQ(nearestName("build", {}), "");
-  const std::string endless(1'000'000, 'x');  // to compare it with another would take a trillion steps
+  const std::string endless(1'000'000, 'x');  // Comparing it with another such name would take 10^12 steps.
   EXPECT_EQ(nearestName(endless + "y", std::vector{endless}), "");
   EXPECT_EQ(nearestName("x", std::vector<std::string>{"y", "z"}), "");
 }
 
-TEST(NearestName, CountsLetters) {
+TEST(NearestName, CountsEditedLetters) {
   EXPECT_EQ(editDistance("", "abc"), 3u);
   EXPECT_EQ(editDistance("abc", ""), 3u);
   EXPECT_EQ(editDistance("kitten", "sitting"), 3u);

@@ -1,4 +1,4 @@
-// Inside and outside of meshes that are closed, folded, nested, overlapping, open.
+// Tests of the sign of distances for meshes that are closed, folded, nested, overlapping or open.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,25 +19,25 @@
 #include "hpsdf/shapes.h"
 #include "sign/boundary_edges.h"
 #include "sign/solid_angle.h"
-#include "sign/winding.h"
+#include "sign/winding_number.h"
 #include "support/made_meshes.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
 namespace {
 
-using distance::BoundaryEdges;
-using distance::Hierarchy;
-using distance::Winding;
+using bvh::Hierarchy;
+using sign::BoundaryEdges;
+using sign::WindingNumber;
 using support::boxOfTwo;
 using support::joined;
 using support::moved;
 using support::openBox;
 using support::placesIn;
-using support::turned;
+using support::reversed;
 
-/// The winding number by all triangles, each an integral of its own: the solid angle from the three angles between the
-/// planes through x (Girard), unlike the library's formula.
+/// Returns the winding number as the sum over all triangles. It computes solid angles by Girard's theorem from the
+/// angles between the planes through x, which is independent of the library's formula.
 double sumOfAngles(const TriangleMesh& mesh, const Vector3& x) {
   long double sum = 0;
   using Long = Eigen::Matrix<long double, 3, 1>;
@@ -61,28 +61,28 @@ const DistanceOptions kAutomatic{.insideTest = InsideTest::automatic};
 
 double value(const ExactDistance& distance, const Vector3& x) { return distance(x); }
 
-TEST(Winding, EstimatesAreAsNearAsTheySay) {
+TEST(WindingNumber, EstimatesAreWithinTheirErrorBounds) {
   for (const TriangleMesh& mesh :
        {shapes::mesh("builtin:gear"), openBox(), shapes::mesh("builtin:torus,segments=48,sides=24")}) {
     const Hierarchy hierarchy(mesh, boundingBox(mesh));
-    const Winding winding(hierarchy);
+    const WindingNumber winding(hierarchy);
     double greatest = 0;
     for (const Vector3& x : placesIn(boundingBox(mesh), 100)) {
       const double exact = sumOfAngles(mesh, x);
       EXPECT_NEAR(winding.exact(x), exact, 1e-9);
-      for (int level = 0; level < Winding::kLevels; ++level) {
-        const Winding::Estimate estimate = winding.estimate(x, level);
+      for (int level = 0; level < WindingNumber::kLevels; ++level) {
+        const WindingNumber::Estimate estimate = winding.estimate(x, level);
         EXPECT_LE(std::abs(estimate.value - exact), estimate.error + 1e-9) << "level " << level;
         if (level == 0) greatest = std::max(greatest, std::abs(estimate.value - exact));
       }
-      EXPECT_EQ(winding.inside(x), exact > 0.5);
-      EXPECT_LE(winding.within(x, 1e-6, [](auto&) { return false; }).error, 1e-6);
+      EXPECT_EQ(winding.isAbove(x), exact > 0.5);
+      EXPECT_LE(winding.estimateWithin(x, 1e-6, [](auto&) { return false; }).error, 1e-6);
     }
-    EXPECT_TRUE(mesh.triangles.size() < 1000 || greatest > 1e-9) << "clusters are not taken at all";
+    EXPECT_TRUE(mesh.triangles.size() < 1000 || greatest > 1e-9) << "no cluster was replaced by its series";
   }
 }
 
-/// Every so many of its faces are gone.
+/// Returns the mesh without every n-th face.
 TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
   std::vector<std::array<std::uint32_t, 3>> left;
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
@@ -91,102 +91,101 @@ TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
   return mesh;
 }
 
-TEST(Winding, GradientsAreAsNearAsTheySay) {
+TEST(BoundaryEdges, GradientsAreWithinTheirErrorBounds) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const Hierarchy hierarchy(withHoles(sphere, 7), boundingBox(sphere));
-  const BoundaryEdges rims(hierarchy);
-  ASSERT_GT(rims.size(), 1000u);
+  const BoundaryEdges edges(hierarchy);
+  ASSERT_GT(edges.size(), 1000u);
   double greatest = 0;
   std::size_t terms = 0;
   for (const Vector3& x : placesIn(boundingBox(sphere), 200)) {
     const Vector3 local = hierarchy.local(x);
-    const BoundaryEdges::Gradient exact = rims.gradient(local, 0);
-    EXPECT_EQ(exact.terms, rims.size());
+    const BoundaryEdges::Gradient exact = edges.gradient(local, 0);
+    EXPECT_EQ(exact.terms, edges.size());
     EXPECT_EQ(exact.error, 0);
     for (const double error : {1.0, 1e-2, 1e-4}) {
-      const BoundaryEdges::Gradient found = rims.gradient(local, error);
+      const BoundaryEdges::Gradient found = edges.gradient(local, error);
       EXPECT_LE(found.error, error);
       EXPECT_LE((found.value - exact.value).norm(), found.error + 1e-9);
-      EXPECT_GE(found.change, exact.change * (1 - 1e-9));
-      EXPECT_LE(found.nearest, exact.nearest * (1 + 1e-9));
+      EXPECT_GE(found.derivative, exact.derivative * (1 - 1e-9));
+      EXPECT_LE(found.edgeDistance, exact.edgeDistance * (1 + 1e-9));
       if (error == 1) {
         terms += found.terms;
         greatest = std::max(greatest, (found.value - exact.value).norm());
       }
     }
   }
-  EXPECT_LT(terms, 200 * rims.size() / 5) << "clusters hardly stand for their sides";
-  EXPECT_GT(greatest, 1e-6) << "clusters are not taken at all";
+  EXPECT_LT(terms, 200 * edges.size() / 5) << "few clusters were replaced by their series";
+  EXPECT_GT(greatest, 1e-6) << "no cluster was replaced by its series";
 }
 
-TEST(Winding, GradientsAreHowItChanges) {
+TEST(BoundaryEdges, GradientsEqualDifferenceQuotients) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const TriangleMesh mesh = withHoles(sphere, 7);
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const BoundaryEdges rims(hierarchy);
+  const BoundaryEdges edges(hierarchy);
   const double step = 1e-4;
   int tried = 0;
   for (const Vector3& x : placesIn(boundingBox(mesh), 20)) {
-    const BoundaryEdges::Gradient found = rims.gradient(hierarchy.local(x), 1e-4);
-    if (found.nearest < 0.1) continue;
+    const BoundaryEdges::Gradient found = edges.gradient(hierarchy.local(x), 1e-4);
+    if (found.edgeDistance < 0.1) continue;
     ++tried;
     for (int k = 0; k < 3; ++k) {
-      const Vector3 aside = step * Vector3::Unit(k);
-      const double change = (sumOfAngles(mesh, x + aside) - sumOfAngles(mesh, x - aside)) / (2 * step);
+      const Vector3 offset = step * Vector3::Unit(k);
+      const double change = (sumOfAngles(mesh, x + offset) - sumOfAngles(mesh, x - offset)) / (2 * step);
       EXPECT_NEAR(found.value[k] * hierarchy.scale(), change, 2e-4);
     }
   }
   EXPECT_GT(tried, 5);
 }
 
-/// Few sides are summed one by one, whatever error is allowed.
-TEST(Winding, GradientsOfFewRimsAreExact) {
+TEST(BoundaryEdges, GradientsOfFewEdgesAreExactWhateverErrorIsAllowed) {
   const TriangleMesh mesh = openBox();
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
-  const BoundaryEdges rims(hierarchy);
-  const BoundaryEdges::Gradient found = rims.gradient({100, 0, 0}, HUGE_VAL);
+  const BoundaryEdges edges(hierarchy);
+  const BoundaryEdges::Gradient found = edges.gradient({100, 0, 0}, HUGE_VAL);
   EXPECT_EQ(found.error, 0);
-  EXPECT_EQ(found.terms, rims.size());
+  EXPECT_EQ(found.terms, edges.size());
 }
 
-TEST(InsideTest, OfAClosedMeshIsThePseudonormals) {
+TEST(InsideTest, IsThePseudonormalForClosedMeshes) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
   EXPECT_EQ(distance.source().insideTest, InsideTest::pseudonormal);
-  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("does not meet itself"));
+  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("does not intersect itself"));
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(InsideTest, OfAMeshThatLooksInwardsIsTheOther) {
-  const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
+TEST(InsideTest, AgreesWithTheWindingNumberForInwardMeshes) {
+  const TriangleMesh mesh = reversed(shapes::mesh("builtin:torus,segments=48,sides=24"));
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
   for (const Vector3& x : placesIn(boundingBox(mesh), 1000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(InsideTest, OfBodiesThatOverlapIsThatOfTheirUnion) {
+TEST(InsideTest, OfOverlappingBodiesIsThatOfTheirUnion) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance distance(joined(ball, moved(ball, {1, 0, 0})), kAutomatic);
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
-  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("meets itself"));
+  EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("intersects itself"));
   EXPECT_LT(value(distance, {0.5, 0, 0}), 0);
-  EXPECT_LT(value(distance, {0.02, 0, 0}), 0) << "inside of one, beside the other's surface";
+  EXPECT_LT(value(distance, {0.02, 0, 0}), 0) << "the point is inside one ball, near the surface of the other";
   EXPECT_GT(value(distance, {2.5, 0, 0}), 0);
 }
 
-TEST(InsideTest, OfABodyWithinAnotherIsThatOfTheOuter) {
+TEST(InsideTest, OfNestedBodiesIsThatOfTheOuterBody) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance solid(joined(ball, moved(ball, Vector3::Zero(), 0.5)), kAutomatic);
   EXPECT_EQ(solid.insideTestChoice().insideTest, InsideTest::winding);
   EXPECT_THAT(solid.insideTestChoice().reason, testing::HasSubstr("lies within another"));
   EXPECT_LT(value(solid, {0.55, 0, 0}), 0);
-  const ExactDistance hollow(joined(ball, turned(moved(ball, Vector3::Zero(), 0.5))), kAutomatic);
+  const ExactDistance hollow(joined(ball, reversed(moved(ball, Vector3::Zero(), 0.5))), kAutomatic);
   EXPECT_EQ(hollow.insideTestChoice().insideTest, InsideTest::pseudonormal);
   EXPECT_GT(value(hollow, {0.3, 0, 0}), 0);
 }
 
-TEST(InsideTest, OfBodiesSideBySideIsThePseudonormals) {
+TEST(InsideTest, IsThePseudonormalForSeparateBodies) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=2");
   const TriangleMesh mesh = joined(ball, joined(moved(ball, {3, 0, 0}), moved(ball, {0, 3, 0}, 0.1)));
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
@@ -194,8 +193,8 @@ TEST(InsideTest, OfBodiesSideBySideIsThePseudonormals) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-/// Two boxes with an edge in common, welded: four faces there, whose normals cancel.
-TEST(InsideTest, OfBodiesThatShareAnEdgeIsCertainToo) {
+/// At the welded common edge of two boxes the normals of four faces cancel.
+TEST(InsideTest, IsTheWindingNumberForBodiesThatShareAnEdge) {
   const TriangleMesh box = shapes::mesh("box,width=2,height=2,depth=2");
   const TriangleMesh mesh = cleaned(joined(box, moved(box, {2, 2, 0}))).mesh;
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
@@ -204,8 +203,8 @@ TEST(InsideTest, OfBodiesThatShareAnEdgeIsCertainToo) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-/// A vertex pushed through the other side: the spike that it makes there is inside out, and misleads normals around it.
-TEST(InsideTest, IsRightWhereAClosedMeshFoldsOver) {
+/// A vertex is pushed through the opposite side of a ball. The spike there is inside out and misleads pseudonormals.
+TEST(InsideTest, IsRightWhereAClosedMeshFoldsIntoItself) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
   const std::uint32_t vertex = mesh.triangles[100][0];
   mesh.vertices[vertex] *= -1.5;
@@ -222,7 +221,7 @@ TEST(InsideTest, IsRightWhereAClosedMeshFoldsOver) {
     EXPECT_EQ(distance(x) < 0, exact > 0.5) << x.transpose();
     misled += (byNormals(x) < 0) != (exact > 0.5);
   }
-  EXPECT_GT(misled, 0) << "else this tells nothing";
+  EXPECT_GT(misled, 0) << "the test has no power";
 }
 
 TEST(InsideTest, HolesAreClosedWithoutAJump) {
@@ -230,14 +229,14 @@ TEST(InsideTest, HolesAreClosedWithoutAJump) {
   const ExactDistance distance(mesh, kAutomatic);
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
   EXPECT_THAT(distance.insideTestChoice().reason,
-              testing::StartsWith("4 edges have a side without a neighbour, and holes"));
+              testing::StartsWith("4 edges are unbalanced (holes or reversed faces), and holes"));
   EXPECT_LT(value(distance, {0, 0, 0}), -0.9);
   EXPECT_GT(value(distance, {0, 0, 3}), 0.5);
   EXPECT_GT(value(distance, {0, 0, -1.5}), 0.49);
   double steepest = 0, least = 1;
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> u(-1.5, 1.5);
-  for (int n = 0; n < 200; ++n) {  // straight ways through the box and its hole
+  for (int n = 0; n < 200; ++n) {  // straight paths through the box and its hole
     const double a = u(random), b = u(random), c = u(random), d = u(random);
     const Vector3 from(a, b, -1.5), to(c, d, 2);
     double before = distance(from);
@@ -248,17 +247,17 @@ TEST(InsideTest, HolesAreClosedWithoutAJump) {
       before = now;
     }
   }
-  EXPECT_LT(steepest, 2.5) << "a jump of 1 across 1/500 of the way would be some 150";
+  EXPECT_LT(steepest, 2.5) << "a jump of 1 within 1/500 of the path would have a slope of about 150";
   EXPECT_LT(least, -0.5);
 }
 
-TEST(InsideTest, AFieldOfAnOpenMeshChasesNoJump) {
+TEST(InsideTest, FieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
   const TriangleMesh mesh = openBox();
   const BuildOptions options{.targetError = 1e-5};
   const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
   const Field unsignedField =
       build(ExactDistance(mesh, {.insideTest = InsideTest::shell, .thickness = 1e-9}), domainAround(mesh), options);
-  // the winding number's sign, and no patch
+  // This distance has the sign of the winding number, but ignores the surface that closes the hole.
   const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal}), byWinding(mesh, kAutomatic);
   const auto jump = [&](const Vector3& x) { return std::copysign(byNormals(x), byWinding(x)); };
   BuildOptions asLong = options;
@@ -266,36 +265,37 @@ TEST(InsideTest, AFieldOfAnOpenMeshChasesNoJump) {
   const Field jumping = build(jump, domainAround(mesh), asLong);
   EXPECT_LT(field.data().nodes.size(), unsignedField.data().nodes.size());
   EXPECT_LT(field.metadata().totalError, 1e-5);
-  EXPECT_GT(jumping.metadata().totalError, 1e-4) << "else this tells nothing";
+  EXPECT_GT(jumping.metadata().totalError, 1e-4) << "the test has no power";
   EXPECT_EQ(field.metadata().source.insideTest, InsideTest::winding);
 }
 
-TEST(InsideTest, OneAndManyAreTheSameToTheBit) {
+TEST(InsideTest, SingleAndBatchedQueriesAgreeBitForBit) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh torn = withHoles(shapes::mesh("builtin:sphere,subdivisions=4"), 7);
   for (const TriangleMesh& mesh : {openBox(), torn, joined(ball, moved(ball, {1, 0, 0}))}) {
     const ExactDistance distance(mesh, kAutomatic);
     ASSERT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
-    for (const double size : {2.0, 0.3, 0.01}) {  // of the places' box: the smaller, the more they tell each other
+    for (const double size :
+         {2.0, 0.3, 0.01}) {  // size of the box of the points: the nearer they are, the more share samples
       const Box box(Vector3(0.9, 0.2, 0.95), Vector3(0.9, 0.2, 0.95) + Vector3::Constant(size));
-      std::vector<Vector3> places = placesIn(box, 700);
-      places[13].setConstant(std::numeric_limits<double>::quiet_NaN());
-      std::vector<double> found(places.size());
-      distance(places, found);
+      std::vector<Vector3> points = placesIn(box, 700);
+      points[13].setConstant(std::numeric_limits<double>::quiet_NaN());
+      std::vector<double> found(points.size());
+      distance(points, found);
       EXPECT_FALSE(std::isfinite(std::exchange(found[13], 0)));
-      places[13] = mesh.vertices[0];
-      for (std::size_t i = 0; i < places.size(); ++i)
-        EXPECT_EQ(found[i], distance(places[i])) << "place " << i << " of " << size;
+      points[13] = mesh.vertices[0];
+      for (std::size_t i = 0; i < points.size(); ++i)
+        EXPECT_EQ(found[i], distance(points[i])) << "point " << i << " of " << size;
     }
   }
 }
 
-TEST(InsideTest, OfAShellIsBelowZeroInTheWallAlone) {
+TEST(InsideTest, OfAShellIsNegativeOnlyWithinTheWall) {
   TriangleMesh sheet;
   sheet.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
-  const ExactDistance plain(sheet, kAutomatic);
-  EXPECT_THAT(plain.insideTestChoice().reason, testing::HasSubstr("surround nothing"));
+  const ExactDistance withoutThickness(sheet, kAutomatic);
+  EXPECT_THAT(withoutThickness.insideTestChoice().reason, testing::HasSubstr("enclose nothing"));
   const ExactDistance shell(sheet, {.insideTest = InsideTest::shell, .thickness = 0.1});
   EXPECT_EQ(value(shell, {0, 0, 0}), -0.05);
   EXPECT_DOUBLE_EQ(value(shell, {0, 0, -0.5}), 0.45);
@@ -308,44 +308,44 @@ TEST(InsideTest, OfAShellIsBelowZeroInTheWallAlone) {
 
 TEST(InsideTest, IsTheSameAtAnyScale) {
   const TriangleMesh mesh = openBox();
-  const std::vector<Vector3> places = placesIn(boundingBox(mesh), 300);
-  const ExactDistance plain(mesh, kAutomatic);
+  const std::vector<Vector3> points = placesIn(boundingBox(mesh), 300);
+  const ExactDistance unscaled(mesh, kAutomatic);
   for (const double scale : {1e-20, 1e-6, 1e6, 1e20}) {
     const ExactDistance scaled(moved(mesh, Vector3::Zero(), scale), kAutomatic);
-    for (const Vector3& x : places) EXPECT_NEAR(scaled(scale * x) / scale, plain(x), 1e-9) << scale;
+    for (const Vector3& x : points) EXPECT_NEAR(scaled(scale * x) / scale, unscaled(x), 1e-9) << scale;
   }
 }
 
-TEST(InsideTest, IsCheckedAgainstTheWholeSum) {
+TEST(SignCheck, ComparesWithTheSumOverAllTriangles) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(ball, moved(ball, {1, 0, 0}));
   for (const Vector3& x : placesIn(boundingBox(mesh), 50))
     EXPECT_NEAR(windingNumber(mesh, x), sumOfAngles(mesh, x), 1e-9);
   const SignCheck right = checkSign(mesh, ExactDistance(mesh), 4000);
   EXPECT_EQ(right.wrong, 0u);
-  EXPECT_EQ(right.places, 4000u);
+  EXPECT_EQ(right.points, 4000u);
   EXPECT_LT(right.tooNear, 100u);
-  // What is inside of one looks outside to normals, beside the surface of the other.
+  // Pseudonormals are wrong inside one ball near the surface of the other.
   const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal});
   const SignCheck wrong = checkSign(mesh, byNormals, 4000), other = checkSign(mesh, byNormals, 4000, 2);
   EXPECT_GT(wrong.wrong, 100u);
-  EXPECT_GT(wrong.depth, 0.1);
-  EXPECT_DOUBLE_EQ(std::abs(byNormals(wrong.worst)), wrong.depth);
+  EXPECT_GT(wrong.worstDistance, 0.1);
+  EXPECT_DOUBLE_EQ(std::abs(byNormals(wrong.worst)), wrong.worstDistance);
   EXPECT_GT(sumOfAngles(mesh, wrong.worst), 0.5);
   EXPECT_NE(wrong.worst, other.worst);
   const SignCheck alone = withThreads(1, [&] { return checkSign(mesh, byNormals, 4000); });
   EXPECT_EQ(alone.wrong, wrong.wrong);
   EXPECT_EQ(alone.worst, wrong.worst);
-  // it keeps none of the places: so many would not fit into any memory
+  // The check stores no points: so many would not fit into memory.
   EXPECT_THROW(checkSign(ball, ExactDistance(ball), 1'000'000'000'000'000, 1, {{}, [] { return true; }}), Cancelled);
 }
 
-TEST(InsideTest, IsCheckedOfAMeshThatLooksInwards) {
-  const TriangleMesh mesh = turned(shapes::mesh("builtin:torus,segments=48,sides=24"));
+TEST(SignCheck, AcceptsInwardMeshes) {
+  const TriangleMesh mesh = reversed(shapes::mesh("builtin:torus,segments=48,sides=24"));
   EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 2000).wrong, 0u);
 }
 
-/// A part within a box, both of which look outwards, its greatest face this far from the box's wall at x = 0.
+/// A part within a box, both oriented outward. The largest face of the part is `gap` away from the wall at x = 0.
 TriangleMesh partBeforeWall(double gap) {
   TriangleMesh part = boxOfTwo();
   for (Vector3& v : part.vertices)
@@ -353,20 +353,20 @@ TriangleMesh partBeforeWall(double gap) {
   return joined(moved(boxOfTwo(), {1, 0, 0}), part);
 }
 
-TEST(InsideTest, IsRightHoweverNearWallsCome) {
+TEST(InsideTest, IsRightForWallsAtAnyDistance) {
   int misled = 0;
   for (const double gap : {1e-6, 1e-10, 1e-12, 1e-14, 1e-15, 1e-16, 1e-17, 1e-20}) {
     const TriangleMesh nested = partBeforeWall(gap);
     const TriangleMesh beside = joined(moved(boxOfTwo(), {1 + gap, 0, 0}), moved(boxOfTwo(), {-1, 0, 0}));
     TriangleMesh far = beside;
     for (Vector3& v : far.vertices)
-      if (v.x() == 1 + gap - 1) v.x() = gap;  // representable near 0 alone
+      if (v.x() == 1 + gap - 1) v.x() = gap;  // representable near 0 only
     for (const TriangleMesh& mesh : {nested, far}) {
       EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 3000).wrong, 0u) << gap;
       misled += checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong > 0;
     }
   }
-  EXPECT_GT(misled, 8) << "else this tells nothing";
+  EXPECT_GT(misled, 8) << "the test has no power";
 }
 
 TEST(InsideTest, IsRightBesideFacesThinnerThanRounding) {
@@ -374,14 +374,14 @@ TEST(InsideTest, IsRightBesideFacesThinnerThanRounding) {
   needle.vertices = {{0.5, 0, 0}, {0.5 + 6e-8, 0, 0}, {0.5, 1e-16, 0}, {0.5, 0, 1e-16}};
   needle.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   const TriangleMesh mesh = cleaned(joined(boxOfTwo(), needle)).mesh;
-  ASSERT_EQ(mesh.triangles.size(), 16u) << "else this tells nothing";
+  ASSERT_EQ(mesh.triangles.size(), 16u) << "the test has no power";
   const ExactDistance distance(mesh);
   EXPECT_THAT(distance.insideTestChoice().reason, testing::HasSubstr("thinner"));
   EXPECT_EQ(checkSign(mesh, distance, 3000).wrong, 0u);
   EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong, 0u);
 }
 
-/// A blade along z, its edge at x = 1: beyond that edge all is outside, however little.
+/// The edge of a blade along z is at x = 1. All points beyond it are outside, however near.
 TEST(InsideTest, IsRightBesideBlades) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(-1, 1), exponent(-18, -1);
@@ -402,9 +402,9 @@ TEST(InsideTest, IsRightBesideBlades) {
   }
 }
 
-TEST(InsideTest, OfBodiesThatShareAnEdgeIsTurnedToo) {
-  const ImportedMesh inward = cleaned(turned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))));
-  EXPECT_TRUE(inward.report.turned);
+TEST(InsideTest, OfInwardBodiesThatShareAnEdgeIsCorrectedOnImport) {
+  const ImportedMesh inward = cleaned(reversed(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))));
+  EXPECT_TRUE(inward.report.reversed);
   EXPECT_EQ(inward.report.unbalancedEdges, 0u);
   EXPECT_EQ(inward.report.nonManifoldEdges, 1u);
   EXPECT_LT(value(ExactDistance(inward.mesh), {0, 0, 0}), 0);
@@ -414,20 +414,20 @@ TEST(InsideTest, OfBodiesThatShareAnEdgeIsTurnedToo) {
 TEST(AngleSum, CountsTurns) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> u(-1, 1);
-  distance::AngleSum sum;
-  double plain = 0;
+  sign::AngleSum sum;
+  double expected = 0;
   for (int i = 0; i < 2000; ++i) {
     double x = u(random), y = u(random);
-    if (i % 3 == 0) y = 0;  // half a turn, or none
+    if (i % 3 == 0) y = 0;  // half a turn or no turn
     if (i % 7 == 0) x = 0;
     sum.add(x, y);
-    if (x != 0 || y != 0) plain += std::atan2(y, x);
-    ASSERT_NEAR(sum.value(), plain, 1e-9) << i;
+    if (x != 0 || y != 0) expected += std::atan2(y, x);
+    ASSERT_NEAR(sum.value(), expected, 1e-9) << i;
   }
 }
 
-/// Real meshes, closed and broken, at fewer places than `hpsdf mesh --check-sign` takes.
-TEST(InsideTest, OfRealMeshesIsTheWindingNumbers) {
+/// Meshes of files, closed and broken, at fewer points than `hpsdf mesh --check-sign` takes.
+TEST(InsideTest, OfMeshFilesEqualsTheWindingNumber) {
   HPSDF_SKIP_WITHOUT_MESHES();
   for (const char* name : {"cad/cube_12.obj", "cad/fandisk.obj", "cad/wingnut.obj", "cad/1002_tray_bottom.STL",
                            "paper/finger_skeletonhand_part.ply", "broken/self_intersectA.obj", "broken/teapot.obj",

@@ -65,8 +65,8 @@ TEST(Steering, OptimalNeedsFewerCoefficientsForTheSameError) {
   EXPECT_LT(measure(after).rms, 1.05 * measure(before).rms);
   EXPECT_LE(after.metadata().totalError, 1e-7);
   EXPECT_GT(after.metadata().totalError, 0.9e-7) << "no more than needed is left";
-  EXPECT_EQ(after.metadata().criterion, Criterion::optimal);
-  EXPECT_EQ(before.metadata().criterion, Criterion::paper);
+  EXPECT_EQ(after.metadata().settings.criterion, Criterion::optimal);
+  EXPECT_EQ(before.metadata().settings.criterion, Criterion::paper);
 }
 
 TEST(Steering, OptimalKeepsToItsStrategyAndLimits) {
@@ -103,8 +103,8 @@ TEST(Steering, OptimalTakesBackWhateverEndedTheConstruction) {
 TEST(Steering, EveryWayIsTheSameForAnyNumberOfThreads) {
   const std::vector<BuildOptions> ways = {
       {.targetError = 1e-6, .criterion = Criterion::optimal},
-      {.targetError = 0, .nearError = 1e-3, .farError = 4e-3},
-      {.targetError = 0, .nearError = 1e-3, .farError = 4e-3, .criterion = Criterion::optimal},
+      {.targetError = NearFarError{1e-3, 4e-3}},
+      {.targetError = NearFarError{1e-3, 4e-3}, .criterion = Criterion::optimal},
       {.targetError = 0, .maxError = 0.02},
       {.targetError = 0, .maxBytes = 200000, .criterion = Criterion::optimal},
       {.targetError = 1e-5, .nearnessKind = NearnessKind::exponential, .estimator = Estimator::residual}};
@@ -192,7 +192,7 @@ TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
   EXPECT_GT(m.largest, 0.002);
   EXPECT_LE(field.metadata().measuredError, 0.01);
   EXPECT_GE(field.metadata().measuredError, m.largest) << "with half of the greatest step beside it";
-  EXPECT_EQ(field.metadata().maxError, 0.01);
+  EXPECT_EQ(field.metadata().settings.maxError, 0.01);
 
   const Field band = build(spheres, cube(), {.targetError = 0, .maxError = 0.01, .band = kBand});
   EXPECT_LE(measure(band).largestInBand, 0.01);
@@ -225,18 +225,16 @@ TEST(Steering, WhatIsLeftOfTheMaximumErrorIsSaid) {
 
 TEST(Steering, NearAndFarErrorsAreReached) {
   for (const Criterion criterion : {Criterion::paper, Criterion::optimal}) {
-    const Field field =
-        build(spheres, cube(), {.targetError = 0, .nearError = 3e-4, .farError = 3e-3, .criterion = criterion});
+    const Field field = build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-3}, .criterion = criterion});
     const Measured m = measure(field);
     EXPECT_LT(m.near, 1.2 * 3e-4);
     EXPECT_LT(m.far, 1.2 * 3e-3);
     EXPECT_GT(m.far, 3e-4) << "far away may be worse";
-    EXPECT_GT(field.metadata().nearness, 0);
-    EXPECT_EQ(field.metadata().nearnessKind, NearnessKind::exponential);
-    EXPECT_EQ(field.metadata().targetError, field.metadata().totalError);
-    const Field even =
-        build(spheres, cube(), {.targetError = 0, .nearError = 3e-4, .farError = 3e-4, .criterion = criterion});
-    EXPECT_EQ(even.metadata().nearness, 0);
+    EXPECT_GT(field.metadata().settings.nearness, 0);
+    EXPECT_EQ(field.metadata().settings.nearnessKind, NearnessKind::exponential);
+    EXPECT_EQ(field.metadata().settings.targetError.weighted(), field.metadata().totalError);
+    const Field even = build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-4}, .criterion = criterion});
+    EXPECT_EQ(even.metadata().settings.nearness, 0);
     EXPECT_LT(measure(even).far, 1.2 * 3e-4);
     EXPECT_GT(even.bytes(), field.bytes());
   }
@@ -245,8 +243,7 @@ TEST(Steering, NearAndFarErrorsAreReached) {
 /// What lies outside of it neither counts as exact nor as wrong.
 TEST(Steering, NearAndFarErrorsLookAtTheBandAlone) {
   const auto made = [](Criterion criterion) {
-    return build(spheres, cube(),
-                 {.targetError = 0, .nearError = 3e-4, .farError = 3e-3, .criterion = criterion, .band = kBand});
+    return build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-3}, .criterion = criterion, .band = kBand});
   };
   const Field paper = made(Criterion::paper), optimal = made(Criterion::optimal);
   EXPECT_LT(double(optimal.bytes()), 0.8 * double(paper.bytes()));
@@ -278,12 +275,12 @@ TEST(Steering, ResidualIsTheErrorItself) {
   for (const Estimator estimator : {Estimator::embedded, Estimator::residual}) {
     const Field field = build(spheres, cube(), {.targetError = 1e-7, .nearness = 0, .estimator = estimator});
     EXPECT_NEAR(measure(field).rms / field.metadata().rmsEstimate(field.domain()), 1.1, 0.2);
-    EXPECT_EQ(field.metadata().estimator, estimator);
+    EXPECT_EQ(field.metadata().settings.estimator, estimator);
   }
 }
 
 TEST(Steering, NearnessWeighs) {
-  const Nearness polynomial{NearnessKind::polynomial, 4, 2}, exponential{NearnessKind::exponential, 4, 2};
+  const detail::Nearness polynomial{NearnessKind::polynomial, 4, 2}, exponential{NearnessKind::exponential, 4, 2};
   EXPECT_EQ(polynomial.weight(0), 1);
   EXPECT_EQ(exponential.weight(0), 1);
   EXPECT_DOUBLE_EQ(polynomial.weight(-0.5), std::pow(0.75, 4));
@@ -298,10 +295,9 @@ TEST(Steering, NearnessWeighs) {
 
 TEST(Steering, RefusesWhatDoesNotGoTogether) {
   EXPECT_NE(refusal({.targetError = 0}).find("target error 0"), std::string::npos);
-  EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3}).find("give both"), std::string::npos);
-  EXPECT_NE(refusal({.targetError = 1e-5, .nearError = 1e-3, .farError = 1e-4}).find("above far error"),
-            std::string::npos);
-  EXPECT_NE(refusal({.maxError = -1}).find("maximum error -1"), std::string::npos);
+  EXPECT_NE(refusal({.targetError = NearFarError{.near = 1e-3}}).find("give both"), std::string::npos);
+  EXPECT_NE(refusal({.targetError = NearFarError{1e-3, 1e-4}}).find("above far error"), std::string::npos);
+  EXPECT_NE(refusal({.maxError = -1}).find("max error -1"), std::string::npos);
   EXPECT_NE(refusal({.maxError = 0.1, .criterion = Criterion::optimal}).find("maximum error"), std::string::npos);
   BuildOptions paper = paperOptions();
   paper.criterion = Criterion::optimal;

@@ -18,19 +18,19 @@ namespace {
 
 double height(const Vector3& x) { return x.z(); }
 
-/// The plane z = 0, as far as the domain [-1, 1]³ goes.
+/// Returns the part of the plane z = 0 in the domain [−1, 1]³.
 const TriangleMesh& plane() {
   static const TriangleMesh mesh = {{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, "plane"};
   return mesh;
 }
 
-/// Two cells along x over [-1, 1]³; in each f = offset + ∑ slope·x.
+/// Makes two cells along x over [−1, 1]³, in each of which f = offset + slope·x.
 Field twoPlanes(const std::array<double, 2>& offset, const Vector3& slope) {
   FieldData data;
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   data.grid = {2, 1, 1};
   data.nodes = {node::leaf(1, 0), node::leaf(1, 4)};
-  std::vector<double> coefficients;  // 1, w, v, u of local coordinates, u from −1 to 1 over half of the domain
+  std::vector<double> coefficients;  // of 1, w, v, u; the local coordinate u runs over half of the domain
   for (int cell = 0; cell < 2; ++cell) {
     const double center = cell == 0 ? -0.5 : 0.5;
     coefficients.insert(coefficients.end(), {offset[cell] + slope.x() * center, slope.z(), slope.y(), slope.x() / 2});
@@ -44,7 +44,7 @@ Verification verifyAgainstPlane(const Field& field, VerifyOptions options = {.po
   return verify(field, {distance, [](const Vector3&, double) { return Vector3(0, 0, 1); }, plane()}, options);
 }
 
-TEST(Verify, AnOffsetIsTheErrorEverywhere) {
+TEST(Verify, MeasuresAConstantError) {
   for (const double offset : {0.01, 0.25}) {
     const Verification found = verifyAgainstPlane(twoPlanes({offset, offset}, {0, 0, 1}));
     for (const SampleFigures* figures : {&found.uniform, &found.nearSurface}) {
@@ -58,12 +58,12 @@ TEST(Verify, AnOffsetIsTheErrorEverywhere) {
       EXPECT_NEAR(figures->gradient.maxAngleDegrees, 0, 1e-6);
     }
     EXPECT_EQ(found.uniform.error.percentiles.size(), 4u);
-    EXPECT_NEAR(found.near, 0.02, 1e-15);  // a hundredth of the plane's side
+    EXPECT_NEAR(found.near, 0.02, 1e-15);  // The default is a hundredth of the plane's side.
   }
 }
 
-TEST(Verify, PercentilesAreThoseOfTheErrors) {
-  // |f − Φ| = |x|, uniform from 0 to 1
+TEST(Verify, ComputesPercentilesOfTheErrors) {
+  // |f − Φ| = |x| is distributed uniformly between 0 and 1.
   const Verification found = verifyAgainstPlane(twoPlanes({0, 0}, {1, 0, 1}), {.points = 200'000});
   for (const double percent : {50.0, 90.0, 99.0, 99.9})
     EXPECT_NEAR(found.uniform.error.percentiles.at(percent), percent / 100, 0.01);
@@ -71,19 +71,19 @@ TEST(Verify, PercentilesAreThoseOfTheErrors) {
   EXPECT_NEAR(found.uniform.error.mean, 0.5, 0.005);
 }
 
-TEST(Verify, SignsAreWrongBetweenTheSurfaceAndTheZero) {
+TEST(Verify, FindsWrongSignsBetweenTheSurfaceAndTheZeroOfTheField) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.1, 0.1}, {0, 0, 1}), {.points = 40'000});
   EXPECT_NEAR(double(found.uniform.signs.mismatches), 20'000 * 0.05, 150);
-  EXPECT_NEAR(found.uniform.signs.deepest, 0.1, 2e-3);
-  EXPECT_EQ(found.uniform.signs.beyondCount, 0u);  // all within ten times the error
+  EXPECT_NEAR(found.uniform.signs.farthest, 0.1, 2e-3);
+  EXPECT_EQ(found.uniform.signs.defects, 0u);  // All lie within ten times the error.
   const Verification strict =
       verifyAgainstPlane(twoPlanes({0.1, 0.1}, {0, 0, 1}), {.points = 40'000, .signBound = 0.05});
-  EXPECT_NEAR(double(strict.uniform.signs.beyondCount), 20'000 * 0.025, 150);
+  EXPECT_NEAR(double(strict.uniform.signs.defects), 20'000 * 0.025, 150);
   EXPECT_EQ(strict.uniform.signs.mismatches, found.uniform.signs.mismatches);
   EXPECT_EQ(verifyAgainstPlane(twoPlanes({0, 0}, {0, 0, 1})).uniform.signs.mismatches, 0u);
 }
 
-TEST(Verify, GradientsAreComparedByAngleAndLength) {
+TEST(Verify, ComparesGradientsByAngleAndLength) {
   const Verification found = verifyAgainstPlane(twoPlanes({0, 0}, {0.5, 0, 1}));
   const double length = std::sqrt(1.25), angle = std::atan(0.5) * 180 / M_PI;
   EXPECT_NEAR(found.uniform.gradient.meanLength, length, 1e-12);
@@ -95,9 +95,9 @@ TEST(Verify, GradientsAreComparedByAngleAndLength) {
     EXPECT_NEAR(figure, angle, 1e-9);
 }
 
-TEST(Verify, WorstPointsComeFromCellsOfTheirOwnWorstFirst) {
+TEST(Verify, ListsTheWorstPointOfEachCellWorstFirst) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.3, 0.1}, {0, 0, 1}));
-  ASSERT_EQ(found.worst.size(), 2u);  // there are two cells
+  ASSERT_EQ(found.worst.size(), 2u);  // The field has two cells.
   EXPECT_EQ(found.worst[0].cell, 0u);
   EXPECT_LT(found.worst[0].point.x(), 0);
   EXPECT_NEAR(found.worst[0].error(), 0.3, 1e-12);
@@ -108,7 +108,7 @@ TEST(Verify, WorstPointsComeFromCellsOfTheirOwnWorstFirst) {
   EXPECT_GT(found.worst[1].point.x(), 0);
 }
 
-TEST(Verify, SlopesBetweenNeighboursSeeJumps) {
+TEST(Verify, MeasuresJumpsAsSlopesBetweenSamples) {
   const Verification found = verifyAgainstPlane(twoPlanes({5, 0}, {0, 0, 1}));
   EXPECT_NEAR(found.uniform.gradient.maxLength, 1, 1e-12);
   EXPECT_GT(found.uniform.gradient.maxPairSlope, 3);
@@ -133,7 +133,7 @@ TEST(Verify, FiguresDoNotDependOnTheThreads) {
     std::vector<double> list;
     for (const SampleFigures* f : {&v.uniform, &v.nearSurface}) {
       list.insert(list.end(), {f->error.rms, f->error.mean, f->error.max, f->error.percentiles.at(99.9),
-                               double(f->signs.mismatches), f->signs.deepest, f->gradient.meanLength,
+                               double(f->signs.mismatches), f->signs.farthest, f->gradient.meanLength,
                                f->gradient.lengthErrorRms, f->gradient.maxLength, f->gradient.meanAngleDegrees,
                                f->gradient.angle99Degrees, f->gradient.maxPairSlope});
     }
@@ -143,26 +143,26 @@ TEST(Verify, FiguresDoNotDependOnTheThreads) {
   EXPECT_EQ(figures(one), figures(three));
   EXPECT_NE(figures(one), figures(other));
   EXPECT_EQ(one.worst.size(), 5u);
-  // the near points' gradients do follow the surface's normal
+  // The gradients at near points follow the surface's normal.
   EXPECT_LT(one.nearSurface.gradient.meanAngleDegrees, 10);
 }
 
-TEST(Verify, UniformSamplesFillTheDomainAndTheBand) {
+TEST(Verify, DrawsUniformSamplesInTheDomainAndInTheBand) {
   const Box domain(Vector3(-1, -2, -1), Vector3(1, 2, 3));
   const ExactSamples samples = sampleUniform(height, domain, 0, {.count = 80'000});
   ASSERT_EQ(samples.points.size(), 80'000u);
   std::array<int, 8> octants{};
-  double apart = 0;
+  double distance = 0;
   for (std::size_t n = 0; n < samples.points.size(); ++n) {
     const Vector3& x = samples.points[n];
     ASSERT_TRUE(domain.contains(x));
     ASSERT_EQ(samples.distances[n], x.z());
     const Vector3 from = x - domain.center();
     ++octants[(from.x() > 0) + 2 * (from.y() > 0) + 4 * (from.z() > 0)];
-    if (n > 0) apart += (x - samples.points[n - 1]).norm();
+    if (n > 0) distance += (x - samples.points[n - 1]).norm();
   }
   for (const int count : octants) EXPECT_NEAR(count, 10'000, 400);
-  EXPECT_LT(apart / 80'000, 0.15);  // neighbours in the list are neighbours in space: at random it would be 2
+  EXPECT_LT(distance / 80'000, 0.15);  // In random order the mean distance between consecutive points would be 2.
 
   const ExactSamples band = sampleUniform(height, domain, 0.05, {.count = 20'000});
   ASSERT_EQ(band.points.size(), 20'000u);
@@ -176,8 +176,8 @@ TEST(Verify, UniformSamplesFillTheDomainAndTheBand) {
   EXPECT_NEAR(right, 10'000, 400);
 }
 
-TEST(Verify, NearSamplesLieByTheSurfaceAndInTheDomain) {
-  const Box half(Vector3(-1, -1, -1), Vector3(0, 1, 1));  // it leaves out half of the plane
+TEST(Verify, DrawsNearSamplesCloseToTheSurfaceAndInTheDomain) {
+  const Box half(Vector3(-1, -1, -1), Vector3(0, 1, 1));  // contains half of the plane
   const ExactSamples samples = sampleNear(height, plane(), half, 0.1, {.count = 20'000});
   ASSERT_EQ(samples.points.size(), 20'000u);
   int lower = 0, front = 0;
@@ -203,7 +203,7 @@ std::string errorOf(const std::function<void()>& work) {
   return "no error";
 }
 
-TEST(Verify, WhatCannotBeSampledIsRefused) {
+TEST(Verify, RefusesImpossibleSamples) {
   const Box domain(Vector3(-1, -1, 1), Vector3(1, 1, 2));
   EXPECT_NE(errorOf([&] { sampleUniform(height, domain, 0.05); }).find("within the band"), std::string::npos);
   EXPECT_NE(errorOf([&] { sampleNear(height, plane(), domain, 0.1, {.count = 100}); }).find("misses the surface"),
@@ -221,8 +221,8 @@ TEST(Verify, WhatCannotBeSampledIsRefused) {
             std::string::npos);
 }
 
-/// Rather than after a thousand candidates for each point that is wanted.
-TEST(Verify, WhatCannotBeSampledIsRefusedSoon) {
+/// The check comes before a thousand candidates for each wanted point have been drawn.
+TEST(Verify, RefusesImpossibleSamplesSoon) {
   std::atomic<std::size_t> calls = 0;
   const auto counting = [&](const Vector3& x) {
     ++calls;

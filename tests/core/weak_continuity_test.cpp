@@ -31,21 +31,21 @@ Field withCoefficients(const Field& field, const std::vector<double>& coefficien
 
 Field inDouble(const Field& field) {
   FieldData data = field.data();
-  toDouble(data);
+  query::toDouble(data);
   return Field(std::move(data));
 }
 
-/// Σ w_F ∫ jump² dA, measured face by face by a quadrature.
+/// Measures Σ w_F ∫ jump² dA face by face with a quadrature.
 double jumpEnergy(const Field& field) {
   double sum = 0;
   for (const Interface& face : findJumps(field).interfaces) {
-    const double width = cellSize(field.data(), std::max(face.depths[0], face.depths[1]))[face.axis];
+    const double width = query::cellSize(field.data(), std::max(face.depths[0], face.depths[1]))[face.axis];
     sum += width * face.area * face.value.rms * face.value.rms;
   }
   return sum;
 }
 
-/// ‖f − g‖² of fields with the same leaves, wherever their coefficients lie, by sums over them.
+/// Computes ‖f − g‖² from the coefficients of fields with the same leaves, in whatever order these are stored.
 double squaredDistance(const Field& field, const Field& other) {
   const auto& a = coefficientsOf(field);
   const auto& b = coefficientsOf(other);
@@ -53,9 +53,9 @@ double squaredDistance(const Field& field, const Field& other) {
   field.forEachCell([&](const Cell& cell) {
     const std::uint32_t atA = node::offset(field.data().nodes[cell.id]);
     const std::uint32_t atB = node::offset(other.data().nodes[cell.id]);
-    forEachCoefficient(cell.degree, [&](int i, int j, int k, int index) {
+    basis::forEachCoefficient(cell.degree, [&](int i, int j, int k, int index) {
       const double d = a[atA + index] - b[atB + index];
-      sum += d * d * squaredNorm(i, j, k) * cellSize(field.data(), cell.depth).prod();
+      sum += d * d * basis::squaredNorm(i, j, k) * query::cellSize(field.data(), cell.depth).prod();
     });
   });
   return sum;
@@ -65,8 +65,8 @@ double functional(const Field& field, const Field& fits, double weight) {
   return jumpEnergy(field) + weight * squaredDistance(field, fits);
 }
 
-/// M column by column.
-Eigen::MatrixXd denseMatrix(FaceCoupling& coupling, std::size_t size) {
+/// Returns M from its products with unit vectors.
+Eigen::MatrixXd denseMatrix(continuity::FaceCoupling& coupling, std::size_t size) {
   Eigen::MatrixXd matrix(size, size);
   std::vector<double> unit(size), column(size);
   for (std::size_t n = 0; n < size; ++n) {
@@ -79,8 +79,8 @@ Eigen::MatrixXd denseMatrix(FaceCoupling& coupling, std::size_t size) {
   return matrix;
 }
 
-/// M from the functional alone, by polarisation: knows nothing of traces and restrictions.
-Eigen::MatrixXd measuredMatrix(const Field& field, FaceCoupling& coupling, std::size_t size) {
+/// Returns M by polarisation of the measured functional, without traces and restrictions.
+Eigen::MatrixXd measuredMatrix(const Field& field, continuity::FaceCoupling& coupling, std::size_t size) {
   const double volume = field.domain().sizes().prod();
   const auto energy = [&](std::size_t m, std::size_t n) {
     std::vector<double> x(size, 0.0);
@@ -99,7 +99,7 @@ Eigen::MatrixXd measuredMatrix(const Field& field, FaceCoupling& coupling, std::
   return matrix;
 }
 
-/// Two cells beside each other, the domain no cube; of unequal degree.
+/// Makes two neighbouring cells of unequal degree that are not cubes.
 Field twoCells() {
   return randomField(3, {.domain = Box(Vector3(0, 0, 0), Vector3(2, 1.5, 0.7)),
                          .grid = {2, 1, 1},
@@ -108,7 +108,7 @@ Field twoCells() {
                          .maxDegree = 4});
 }
 
-/// A cell beside cells halved once and twice.
+/// Makes a base cell whose neighbours are split once and twice.
 Field hangingCells() {
   return randomField(8, {.domain = Box(Vector3(0, 0, 0), Vector3(1, 2, 1.3)),
                          .grid = {1, 2, 1},
@@ -119,9 +119,9 @@ Field hangingCells() {
                          .maxDegree = 2});
 }
 
-TEST(FaceCoupling, IsWhatTheFunctionalSays) {
+TEST(FaceCoupling, EqualsTheMatrixOfTheFunctional) {
   for (const Field& field : {twoCells(), hangingCells()}) {
-    FaceCoupling coupling(field.data());
+    continuity::FaceCoupling coupling(field.data());
     const std::size_t size = coupling.toUnknowns(field.data()).size();
     const Eigen::MatrixXd matrix = denseMatrix(coupling, size);
     EXPECT_TRUE(matrix.isApprox(measuredMatrix(field, coupling, size), 1e-10));
@@ -136,7 +136,7 @@ TEST(FaceCoupling, IsWhatTheFunctionalSays) {
 
 TEST(FaceCoupling, ReadsAndWritesCoefficients) {
   const Field field = hangingCells();
-  const FaceCoupling coupling(field.data());
+  const continuity::FaceCoupling coupling(field.data());
   const std::vector<double> x = coupling.toUnknowns(field.data());
   double squares = 0;
   for (const double value : x) squares += value * value;
@@ -155,20 +155,20 @@ TEST(FaceCoupling, ReadsAndWritesCoefficients) {
 TEST(WeakContinuity, SolvesTheDenseSystem) {
   for (const Field& field : {twoCells(), hangingCells()})
     for (const double weight : {0.01, 1.0}) {
-      FaceCoupling coupling(field.data());
+      continuity::FaceCoupling coupling(field.data());
       const std::vector<double> x0 = coupling.toUnknowns(field.data());
       const auto size = static_cast<Eigen::Index>(x0.size());
       Eigen::MatrixXd system = denseMatrix(coupling, x0.size());
       system.diagonal().array() += weight;
       const Eigen::VectorXd expected = system.ldlt().solve(weight * Eigen::Map<const Eigen::VectorXd>(x0.data(), size));
       const WeaklyContinuous made = weaklyContinuous(field, {.weight = weight, .tolerance = 1e-13});
-      const std::vector<double> x = FaceCoupling(made.field.data()).toUnknowns(made.field.data());
+      const std::vector<double> x = continuity::FaceCoupling(made.field.data()).toUnknowns(made.field.data());
       EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(x.data(), size) - expected).norm(), 1e-10 * expected.norm());
       EXPECT_GT(made.iterations, 1);
       EXPECT_LE(made.residual, 1e-13);
       const double change = std::sqrt(squaredDistance(made.field, inDouble(field)) / field.domain().sizes().prod());
       EXPECT_NEAR(made.change, change, 1e-12 * change);
-      EXPECT_EQ(made.field.metadata().continuityWeight, weight);
+      EXPECT_EQ(made.field.metadata().settings.continuityWeight, weight);
     }
 }
 
@@ -179,7 +179,7 @@ TEST(WeakContinuity, IsAMinimumOfTheFunctional) {
   const double least = functional(made, field, kWeight);
   EXPECT_LT(least, functional(field, field, kWeight));
   const std::vector<double>& c = coefficientsOf(made);
-  for (std::size_t n = 0; n < c.size(); ++n) {  // of a quadratic, differences are exact but for rounding
+  for (std::size_t n = 0; n < c.size(); ++n) {  // Central differences of a quadratic are exact.
     std::vector<double> above = c, below = c;
     above[n] += kStep;
     below[n] -= kStep;
@@ -205,11 +205,11 @@ TEST(WeakContinuity, TradesJumpForChange) {
 }
 
 TEST(WeakContinuity, LeavesAContinuousFieldAlone) {
-  // all leaves hold the one cubic x³ − x·y + z, whatever their size and degree
+  // All leaves hold the cubic x³ − x·y + z.
   const Field pattern = randomField(11, {.minDegree = 3, .maxDegree = 5});
   FieldData data = pattern.data();
   auto& c = std::get<std::vector<double>>(data.coefficients);
-  const auto projection = productProjection(gaussLegendre(8), 5);
+  const auto projection = basis::productProjection(basis::gaussLegendre(8), 5);
   pattern.forEachCell([&](const Cell& cell) {
     std::vector<double> samples;
     for (const Vector3& point : projection->points()) {
@@ -217,7 +217,7 @@ TEST(WeakContinuity, LeavesAContinuousFieldAlone) {
       samples.push_back(x.x() * x.x() * x.x() - x.x() * x.y() + x.z());
     }
     std::vector<double> polynomial = (*projection)(samples);
-    for (int degree = 5; degree > cell.degree; --degree) polynomial = truncated(polynomial, degree, degree - 1);
+    for (int degree = 5; degree > cell.degree; --degree) polynomial = basis::truncated(polynomial, degree, degree - 1);
     std::ranges::copy(polynomial, c.begin() + node::offset(data.nodes[cell.id]));
   });
   const Field field{std::move(data)};
@@ -237,7 +237,7 @@ TEST(WeakContinuity, GivesTheSameBytesForAnyNumberOfThreads) {
 TEST(WeakContinuity, DoesNotDependOnTheUnit) {
   const Field field = randomField(9);
   FieldData scaled = field.data();
-  constexpr double kScale = 1024;  // exact
+  constexpr double kScale = 1024;  // a power of two, which scales exactly
   scaled.domain = Box(kScale * scaled.domain.min(), kScale * scaled.domain.max());
   for (double& c : std::get<std::vector<double>>(scaled.coefficients)) c *= kScale;
   const auto small = weaklyContinuous(field), large = weaklyContinuous(Field(std::move(scaled)));
@@ -290,11 +290,11 @@ TEST(WeakContinuity, KeepsFloatsAsFloats) {
   EXPECT_LT(made.metadata().roundingRms, 2 * field.metadata().roundingRms);
   const Field exact = weaklyContinuous(inDouble(field)).field;
   FieldData rounded = exact.data();
-  toFloat(rounded);
+  query::toFloat(rounded);
   EXPECT_EQ(rounded.coefficients, made.data().coefficients);
 }
 
-TEST(WeakContinuity, TheGreatestWeightChangesNothing) {
+TEST(WeakContinuity, ChangesNothingWithTheGreatestWeight) {
   const WeaklyContinuous made = weaklyContinuous(randomField(5), {.weight = kMaxContinuityWeight});
   EXPECT_LE(made.residual, 1e-3);
   EXPECT_LT(made.change, 1e-6);
@@ -302,7 +302,7 @@ TEST(WeakContinuity, TheGreatestWeightChangesNothing) {
 
 TEST(WeakContinuity, DropsTheMeasuredMaximum) {
   const Field made = weaklyContinuous(sphereField({.targetError = 0, .maxError = 0.1})).field;
-  EXPECT_EQ(made.metadata().maxError, 0);
+  EXPECT_EQ(made.metadata().settings.maxError, 0);
   EXPECT_EQ(made.metadata().measuredError, 0);
 }
 
@@ -321,10 +321,10 @@ TEST(WeakContinuity, RefusesBadSettings) {
   for (const double tolerance : {0.0, 1.0, -1.0, std::nan("")})
     EXPECT_THROW(weaklyContinuous(field, {.tolerance = tolerance}), Error) << tolerance;
   EXPECT_THROW(weaklyContinuous(field, {.maxIterations = 0}), Error);
-  EXPECT_THROW(weaklyContinuous(weaklyContinuous(field).field), Error) << "twice";
+  EXPECT_THROW(weaklyContinuous(weaklyContinuous(field).field), Error) << "the field is weakly continuous already";
   try {
     weaklyContinuous(field, {.weight = 1e-3, .maxIterations = 3});
-    FAIL() << "three iterations do not do";
+    FAIL() << "three iterations do not suffice";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("3 iterations"), std::string::npos) << error.what();
   }
@@ -347,14 +347,14 @@ TEST(WeakContinuity, ReportsAndStops) {
   progress.cancelled = [&] { return last > 0; };
   EXPECT_THROW(weaklyContinuous(field, {}, 0, progress), Cancelled);
   last = 0;
-  EXPECT_THROW(weaklyContinuous(field, {}, 0, progress), Cancelled) << "on the way";
+  EXPECT_THROW(weaklyContinuous(field, {}, 0, progress), Cancelled) << "during the iterations";
 }
 
 TEST(Build, EnrichesEveryLeaf) {
-  const BuildOptions plain{.targetError = 1e-4, .maxDegree = 3, .coefficients = CoefficientType::float64};
-  BuildOptions enriching = plain;
+  const BuildOptions usual{.targetError = 1e-4, .maxDegree = 3, .coefficients = CoefficientType::float64};
+  BuildOptions enriching = usual;
   enriching.enrich = true;
-  const Field before = sphereField(plain), after = sphereField(enriching);
+  const Field before = sphereField(usual), after = sphereField(enriching);
   ASSERT_EQ(statistics(before).degreeLeaves.size(), 2u) << "of degree 2 and 3";
   ASSERT_EQ(before.data().nodes.size(), after.data().nodes.size());
   for (std::size_t n = 0; n < before.data().nodes.size(); ++n) {
@@ -363,8 +363,8 @@ TEST(Build, EnrichesEveryLeaf) {
     if (!node::isLeaf(a)) continue;
     EXPECT_EQ(node::degree(b), std::min(node::degree(a) + 1, 3));
   }
-  EXPECT_TRUE(after.metadata().enriched);
-  EXPECT_FALSE(before.metadata().enriched);
+  EXPECT_TRUE(after.metadata().settings.enrich);
+  EXPECT_FALSE(before.metadata().settings.enrich);
   EXPECT_GT(after.metadata().exactEvaluations, before.metadata().exactEvaluations);
   EXPECT_LT(measuredRms(after), measuredRms(before));
   EXPECT_LT(after.metadata().totalError, before.metadata().totalError);
@@ -379,21 +379,21 @@ TEST(Build, EnrichedFieldsAreMoreExact) {
 
 TEST(Build, IsWeaklyContinuousBeforeItRounds) {
   BuildOptions options{.targetError = 1e-5, .coefficients = CoefficientType::float64};
-  const Field plain = sphereField(options);
+  const Field before = sphereField(options);
   options.continuityWeight = 0.1;
   const Field made = sphereField(options);
-  const Field expected = weaklyContinuous(plain, {.weight = 0.1}).field;
+  const Field expected = weaklyContinuous(before, {.weight = 0.1}).field;
   EXPECT_EQ(coefficientsOf(made), coefficientsOf(expected));
   EXPECT_EQ(made.metadata().totalError, expected.metadata().totalError);
   options.coefficients = CoefficientType::float32;
   FieldData rounded = expected.data();
-  toFloat(rounded);
+  query::toFloat(rounded);
   EXPECT_EQ(sphereField(options).data().coefficients, rounded.coefficients);
   options.continuityWeight = 0;
   EXPECT_THROW(sphereField(options), Error);
 }
 
-TEST(Build, StagesAreFinishedToo) {
+TEST(Build, AppliesContinuityToEveryStage) {
   const DistanceFunction sphere = shapes::analytic("analytic:sphere");
   BuildOptions options{.targetError = 1e-5, .enrich = true, .continuityWeight = 0.5};
   const std::array<std::uint64_t, 3> steps{0, 4, 9};

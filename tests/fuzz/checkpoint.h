@@ -16,9 +16,7 @@ inline std::array<BuildOptions, 3> constructions() {
   BuildOptions optimal = paper;
   optimal.criterion = Criterion::optimal;
   BuildOptions byDistance = paper;
-  byDistance.targetError = 0;
-  byDistance.nearError = 3e-2;
-  byDistance.farError = 1e-1;
+  byDistance.targetError = NearFarError{3e-2, 1e-1};
   byDistance.maxError = 0.1;
   return {paper, optimal, byDistance};
 }

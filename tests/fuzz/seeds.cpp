@@ -78,7 +78,7 @@ void writeReplies(const fs::path& folder) {
   ImportedMesh mesh;
   mesh.mesh.vertices = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, -0.0}};
   mesh.mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-  mesh.report = {.vertices = 4, .faces = 4, .parts = 1, .turned = true, .volume = 2.5, .area = 12.5, .box = {}};
+  mesh.report = {.vertices = 4, .faces = 4, .components = 1, .reversed = true, .volume = 2.5, .area = 12.5, .box = {}};
   app::writeMesh(mesh, sink);
   keep("mesh");
   app::writeRefusal("t.off: no mesh", sink);

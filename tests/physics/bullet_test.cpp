@@ -18,7 +18,7 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/physics/world.h"
 #include "hpsdf/shapes.h"
-#include "spread.h"
+#include "reduce_contacts.h"
 
 namespace hpsdf::physics {
 namespace {
@@ -85,12 +85,12 @@ TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
   EXPECT_THROW(massProperties(mesh), Error);
 }
 
-TEST(Spread, KeepsTheDeepestAndWhatSurroundsIt) {
+TEST(ReduceContacts, keepsTheDeepestAndThoseAroundIt) {
   std::vector<BodyContact> contacts;
   for (int x = 0; x < 10; ++x)
     for (int y = 0; y < 10; ++y)
       contacts.push_back({Vector3(x, y, 0), Vector3::UnitZ(), x == 4 && y == 5 ? -0.2 : -0.1});
-  spread(5, 1, contacts);
+  reduceContacts(5, 1, contacts);
   ASSERT_EQ(contacts.size(), 5u);
   EXPECT_EQ(contacts[0].onSecond, Vector3(4, 5, 0));
   for (const Vector3& corner : {Vector3(0, 0, 0), Vector3(9, 0, 0), Vector3(0, 9, 0), Vector3(9, 9, 0)})

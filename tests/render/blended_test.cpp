@@ -49,40 +49,40 @@ double differenceAt(const Field& smooth, const Field& plain, const Cell& cell, c
   return smooth.value(x) - plain.value(x);
 }
 
-TEST(ZoneBounds, HoldWithinTheWholeLeaf) {
+TEST(BlendZoneBounds, HoldWithinTheWholeLeaf) {
   for (const unsigned seed : {1u, 2u, 3u})
     for (const double width : {0.05, 0.25}) {
       const Field plain = jumping(seed, 1), smooth = blended(plain, width);
       const TraceField polynomials(plain);
-      const std::vector<ZoneBounds> zones = zoneBounds(smooth);
+      const std::vector<BlendZoneBounds> zones = blendZoneBounds(smooth);
       ASSERT_EQ(zones.size(), smooth.data().nodes.size());
-      const std::vector<NodeBounds> bounds = nodeBounds(smooth.data(), zones);
+      const std::vector<SurfaceBounds> bounds = surfaceBounds(smooth.data(), zones);
       std::mt19937 random(seed);
       std::uniform_real_distribution<double> unit(-1, 1);
       double closest = 0, closestTwist = 0, mostSag = 0;
       smooth.forEachCell([&](const Cell& cell) {
-        const ZoneBounds& zone = zones[cell.id];
+        const BlendZoneBounds& zone = zones[cell.id];
         for (int n = 0; n < 100; ++n) {
           Vector3 local(unit(random), unit(random), unit(random));
           const int axis = n % 3;
           if (n % 2 == 1) local[axis] = std::copysign(1 - 2 * width * std::abs(unit(random)), local[axis]);
           const double apart = std::abs(differenceAt(smooth, plain, cell, local));
-          ASSERT_LE(apart, zone.apart);
+          ASSERT_LE(apart, zone.valueDifference);
           const double value = smooth.value(cell.box.center() + (cell.box.sizes() / 2).cwiseProduct(local));
           ASSERT_LE(value, bounds[cell.id].hi);
           ASSERT_GE(value, bounds[cell.id].lo);
-          closest = std::max(closest, apart / zone.apart);
+          closest = std::max(closest, apart / zone.valueDifference);
           if ((local.cwiseAbs().array() < 1 - 2 * width).all()) {
             ASSERT_EQ(apart, 0);
             continue;
           }
           // steps of a quarter of a weight's reach
-          const Vector3 half = zone.reach / 8 * Vector3(unit(random), unit(random), unit(random)).normalized();
+          const Vector3 half = zone.extent / 8 * Vector3(unit(random), unit(random), unit(random)).normalized();
           if ((local.cwiseAbs() + half.cwiseAbs()).maxCoeff() > 1) continue;
           const double sag = 0.5 * (differenceAt(smooth, plain, cell, local - half) +
                                     differenceAt(smooth, plain, cell, local + half)) -
                              differenceAt(smooth, plain, cell, local);
-          mostSag = std::max(mostSag, std::abs(sag) / zone.apart);
+          mostSag = std::max(mostSag, std::abs(sag) / zone.valueDifference);
         }
         // the leaf across a face and this one, where the one reaches into the other
         for (int n = 0; n < 30; ++n) {
@@ -105,8 +105,8 @@ TEST(ZoneBounds, HoldWithinTheWholeLeaf) {
           const Vector3 twist =
               std::ldexp(1.0, other.depth - own.depth) * polynomials.sample(other, localThere).gradient -
               polynomials.sample(own, local).gradient;
-          ASSERT_LE(twist.norm(), zone.twist);
-          closestTwist = std::max(closestTwist, twist.norm() / zone.twist);
+          ASSERT_LE(twist.norm(), zone.gradientDifference);
+          closestTwist = std::max(closestTwist, twist.norm() / zone.gradientDifference);
         }
       });
       EXPECT_GT(closest, 0.2) << "bounds so wide tell nothing";
@@ -114,7 +114,7 @@ TEST(ZoneBounds, HoldWithinTheWholeLeaf) {
       EXPECT_LT(mostSag, 0.05);
       EXPECT_GT(mostSag, 0.002);
     }
-  EXPECT_TRUE(zoneBounds(jumping(1)).empty());
+  EXPECT_TRUE(blendZoneBounds(jumping(1)).empty());
 }
 
 TEST(Blended, TheOraclesSlicesAreWhatTheFieldAnswers) {

@@ -17,13 +17,14 @@
 #include <string>
 #include <vector>
 
+#include "coloring/color_view.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/shapes.h"
-#include "picture/color_view.h"
+#include "scene/body_meshes.h"
+#include "scene/body_view.h"
 #include "support/require_gl.h"
-#include "view/body_meshes.h"
 
 namespace hpsdf::render {
 namespace {
@@ -514,7 +515,7 @@ TEST(Bodies, MeshesThatCannotBeDrawnAreRefused) {
   EXPECT_THAT(making([](TriangleMesh& m) { m.triangles.clear(); }),
               ThrowsMessage<Error>(HasSubstr("the mesh \"crate\" has no triangles")));
   EXPECT_THAT(making([](TriangleMesh& m) { m.triangles[3][1] = 8; }),
-              ThrowsMessage<Error>(HasSubstr("triangle, 3, with a vertex beyond its 8")));
+              ThrowsMessage<Error>(HasSubstr("triangle, 3, with a vertex index beyond its 8 vertices")));
   for (const double wrong : {std::nan(""), kInfinity, 1e16})
     EXPECT_THAT(making([&](TriangleMesh& m) { m.vertices[5].y() = wrong; }),
                 ThrowsMessage<Error>(HasSubstr("has a vertex, 5, that is not finite")));
@@ -530,11 +531,11 @@ TEST(Bodies, PlacesThatAreNoneAreRefused) {
     return [bodies, &cpu] { cpu->view(cameraFrom(Projection::perspective), bodies, kWidth, kHeight); };
   };
   EXPECT_NO_THROW(drawing([](Body&) {})());
-  EXPECT_THAT(drawing([](Body& b) { b.mesh = 1; }), ThrowsMessage<Error>(HasSubstr("body 2 is of mesh 1, of 1")));
+  EXPECT_THAT(drawing([](Body& b) { b.mesh = 1; }), ThrowsMessage<Error>(HasSubstr("body 2 has mesh 1 of 1 meshes")));
   EXPECT_THAT(drawing([](Body& b) { b.worldFromBody.translation().x() = std::nan(""); }),
-              ThrowsMessage<Error>(HasSubstr("body 2 is at a place that is not finite")));
+              ThrowsMessage<Error>(HasSubstr("body 2 has a transform that is not finite")));
   EXPECT_THAT(drawing([](Body& b) { b.worldFromBody.linear()(1, 1) = kInfinity; }),
-              ThrowsMessage<Error>(HasSubstr("body 2 is at a place that is not finite")));
+              ThrowsMessage<Error>(HasSubstr("body 2 has a transform that is not finite")));
   EXPECT_THAT(drawing([](Body& b) { b.worldFromBody.linear() *= 1.1; }),
               ThrowsMessage<Error>(HasSubstr("body 2 is scaled or sheared")));
 }
@@ -551,7 +552,7 @@ TEST(Bodies, ViewsAndVerticesThatDoNotFitAreRefused) {
   EXPECT_THAT([&] { cpu->view(camera, bodies, 10, 10); }, ThrowsMessage<Error>(HasSubstr("eye is not finite")));
 
   std::vector<Vector3> vertices = shapes::mesh("box").vertices;
-  EXPECT_THAT([&] { cpu->moveVertices(1, vertices); }, ThrowsMessage<Error>(HasSubstr("mesh 1, of 1")));
+  EXPECT_THAT([&] { cpu->moveVertices(1, vertices); }, ThrowsMessage<Error>(HasSubstr("mesh 1 of 1 meshes")));
   const Box before = cpu->bounds(bodies);
   for (Vector3& vertex : vertices) vertex *= 2;
   vertices.back().z() = std::nan("");

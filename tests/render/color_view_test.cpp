@@ -1,4 +1,4 @@
-#include "picture/color_view.h"
+#include "coloring/color_view.h"
 
 #include <gtest/gtest.h>
 

@@ -132,11 +132,11 @@ TEST(ColorScale, SpansPowersOfTenOrStartsAtZero) {
   const ColorScale decades = ColorScale::around(3e-5, 0.02, true);
   EXPECT_DOUBLE_EQ(decades.low(), 1e-5);
   EXPECT_DOUBLE_EQ(decades.high(), 0.1);
-  EXPECT_NEAR(decades.place(1e-3), 0.5, 1e-12);
-  EXPECT_EQ(decades.place(0), 0);
-  EXPECT_EQ(decades.place(-1), 0);
-  EXPECT_EQ(decades.place(7), 1);
-  EXPECT_EQ(decades.place(std::numeric_limits<double>::quiet_NaN()), 0);
+  EXPECT_NEAR(decades.fraction(1e-3), 0.5, 1e-12);
+  EXPECT_EQ(decades.fraction(0), 0);
+  EXPECT_EQ(decades.fraction(-1), 0);
+  EXPECT_EQ(decades.fraction(7), 1);
+  EXPECT_EQ(decades.fraction(std::numeric_limits<double>::quiet_NaN()), 0);
   EXPECT_EQ(decades(1e-9), orderedColor(0));
   EXPECT_EQ(decades(1e-3), orderedColor(0.5));
   EXPECT_EQ(decades(5), orderedColor(1));
@@ -146,7 +146,7 @@ TEST(ColorScale, SpansPowersOfTenOrStartsAtZero) {
   const ColorScale even = ColorScale::around(0.3, 0.37, false);
   EXPECT_EQ(even.low(), 0);
   EXPECT_DOUBLE_EQ(even.high(), 0.4);
-  EXPECT_NEAR(even.place(0.1), 0.25, 1e-12);
+  EXPECT_NEAR(even.fraction(0.1), 0.25, 1e-12);
   for (const bool logarithmic : {false, true}) EXPECT_EQ(ColorScale::around(0, 0, logarithmic).high(), 1);
 }
 

@@ -7,9 +7,9 @@
 #include <set>
 #include <string>
 
+#include "coloring/color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
-#include "picture/color_view.h"
 #include "picture/line_layout.h"
 #include "support/random_field.h"
 

@@ -9,9 +9,9 @@
 #include <set>
 #include <tuple>
 
+#include "coloring/color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
-#include "picture/color_view.h"
 #include "picture/legend.h"
 
 namespace hpsdf::render {
@@ -39,7 +39,7 @@ Field planeField(std::array<int, 3> degrees = {2, 3, 5}, std::string name = "pla
   for (int i = 0; i < 8; ++i) data.nodes.push_back(leaf(degrees[2], i % 2 ? 0.75 : 0.25, 0.25));
   data.coefficients = std::move(coefficients);
   data.metadata.source.name = std::move(name);
-  data.metadata.targetError = 1e-6;
+  data.metadata.settings.targetError = 1e-6;
   return Field(std::move(data));
 }
 
@@ -320,7 +320,7 @@ TEST(Picture, ABarePictureIsTheViewAloneAndItsLegendComesWithIt) {
   ASSERT_EQ(bar.bar.size(), 256u);
   ASSERT_EQ(bar.marks.size(), 4u);
   EXPECT_EQ(bar.marks.front().text, "0.001");
-  EXPECT_NEAR(bar.marks[1].place, 1 / 3.0, 1e-12);
+  EXPECT_NEAR(bar.marks[1].t, 1 / 3.0, 1e-12);
 }
 
 TEST(Picture, ACaptionOfOnesOwnStandsInPlaceOfWhatIsKnownOfTheField) {

@@ -1,11 +1,11 @@
-#include "picture/quantity.h"
+#include "coloring/quantity.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "hpsdf/error.h"
-#include "hpsdf/render/renderer.h"
+#include "hpsdf/render/picture.h"
 #include "support/random_field.h"
 
 namespace hpsdf::render {

@@ -22,7 +22,7 @@
 #include "picture/cracks.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
-#include "view/section.h"
+#include "scene/section.h"
 
 namespace hpsdf::render {
 namespace {

@@ -16,9 +16,11 @@
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
 #include "picture/arrows.h"
+#include "scene/cell_boxes.h"
+#include "scene/cell_lines.h"
+#include "scene/cell_selection.h"
+#include "scene/section.h"
 #include "support/random_field.h"
-#include "view/cells.h"
-#include "view/section.h"
 
 namespace hpsdf::render {
 namespace {

@@ -23,7 +23,7 @@ struct Found {
 Found find(const Field& field, const SurfaceView& view) {
   const GridSpace space(field.data());
   const RayGeometry rays(space, view.camera, kWidth, kHeight);
-  const SurfaceBlocks found = surfaceBlocks(field.data(), nodeBounds(field.data()), space, rays, view.offset);
+  const SurfaceBlocks found = surfaceBlocks(field.data(), surfaceBounds(field.data()), space, rays, view.offset);
   Found result{found.side, std::vector<float>(std::size_t(kWidth) * kHeight, std::numeric_limits<float>::infinity())};
   for (const Block& block : found.blocks)
     for (int y = int(block.y); y < std::min(kHeight, int(block.y) + kBlock); ++y)
@@ -42,7 +42,7 @@ void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
   const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
   const GridSpace space(field.data());
   const RayGeometry rays(space, view.camera, kWidth, kHeight);
-  const std::vector<NodeBounds> bounds = nodeBounds(field.data());
+  const std::vector<SurfaceBounds> bounds = surfaceBounds(field.data());
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const std::size_t i = std::size_t(y) * kWidth + x;
@@ -58,7 +58,7 @@ void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
       for (int step = 1; step <= 200; ++step) {
         const Vector3 point = start + (end - 1e-5) * step / 200 * direction;
         if (!field.domain().contains(point)) continue;
-        const NodeBounds& leaf = bounds[field.cellAt(point).id];
+        const SurfaceBounds& leaf = bounds[field.cellAt(point).id];
         ASSERT_TRUE(found.side > 0 ? leaf.lo > view.offset : leaf.hi < view.offset) << x << ", " << y;
       }
     }

@@ -24,7 +24,7 @@ inline TriangleMesh joined(TriangleMesh one, const TriangleMesh& other) {
   return one;
 }
 
-inline TriangleMesh turned(TriangleMesh mesh) {
+inline TriangleMesh reversed(TriangleMesh mesh) {
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   return mesh;
 }

@@ -25,7 +25,9 @@
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "console/version.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
+#include "construction/surface.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
@@ -41,14 +43,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kOwnFolder = ".batch";            // in that of the fields: the claims, and what each was made of
-constexpr auto kTick = std::chrono::milliseconds(100);  // between two looks at whether another process is done
+constexpr const char* kOwnFolder = ".batch";  // subfolder of the output for locks and records of finished fields
+constexpr auto kPollInterval = std::chrono::milliseconds(100);  // while other processes build the last meshes
 
-/// What became of a mesh. The first three: its field is there.
+/// The result of a mesh. All but `failed` mean that its field exists.
 enum class Status : std::uint8_t {
   built,
-  skipped,    ///< it was there already
-  elsewhere,  ///< another process was at work on it, and is done
+  skipped,    ///< the field existed already
+  elsewhere,  ///< another process built the field meanwhile
   failed,
 };
 
@@ -57,7 +59,8 @@ std::string statusName(Status status) {
   return kNames[std::size_t(status)];
 }
 
-/// Of a file's bytes, "" for one that cannot be read; of a glTF file, whose bytes may name others, of its mesh.
+/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so that its
+/// mesh is hashed. The result is "" where the file cannot be read.
 std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
@@ -75,7 +78,7 @@ std::string contentOf(const Console& console, const std::string& surface) {
   return file.eof() ? fmt::format("bytes {:016x}", hash) : std::string();
 }
 
-/// As the file has it at its end, right or wrong.
+/// Returns the checksum at the end of a field file without verifying it; "" where the file is too short.
 std::string checksumOf(const fs::path& field) {
   constexpr int kBytes = 8;
   std::array<char, kBytes> bytes{};
@@ -86,8 +89,7 @@ std::string checksumOf(const fs::path& field) {
   return file ? text : std::string();
 }
 
-/// Options that were written down: beside --paper, for one, that makes a difference, even with the value that they have
-/// anyway.
+/// Lists the options that the caller wrote. An option that repeats its default still matters beside --paper.
 Json givenNames(const Arguments& arguments) {
   Json names = Json::array();
   for (const Parameter& parameter : buildParameters())
@@ -102,21 +104,21 @@ Json optionsJson(const Arguments& arguments) {
   return options;
 }
 
-/// An empty file that is there while a process builds a field, and after its death.
-class Mark {
+/// An empty file that exists while a process builds a field. It remains where the process dies.
+class BuildMark {
  public:
-  /// Throws `Error` where it cannot be written: a death would leave no trace.
-  explicit Mark(fs::path file) : file_(std::move(file)) {
+  /// Throws `Error` where the file cannot be written, because the death of the process would leave no trace then.
+  explicit BuildMark(fs::path file) : file_(std::move(file)) {
     if (!std::ofstream(file_))
       throw Error(fmt::format("{}: cannot be written ({}); check the folder's permissions", file_.string(),
                               std::strerror(errno)));
   }
-  ~Mark() {
+  ~BuildMark() {
     std::error_code ignored;
     fs::remove(file_, ignored);
   }
-  Mark(const Mark&) = delete;
-  Mark& operator=(const Mark&) = delete;
+  BuildMark(const BuildMark&) = delete;
+  BuildMark& operator=(const BuildMark&) = delete;
 
  private:
   fs::path file_;
@@ -130,16 +132,16 @@ class Batch {
         arguments_(arguments),
         meshes_(meshes),
         folder_(folder),
-        own_(folder / kOwnFolder),
-        claims_(own_ / "claims") {}
+        ownFolder_(folder / kOwnFolder),
+        claims_(ownFolder_ / "claims") {}
 
   void run() {
     const auto start = std::chrono::steady_clock::now();
     try {
       workThrough();
     } catch (const Cancelled&) {
-      throw CancelledPartway(fmt::format("{} of {} meshes were done and stay; the same command goes on with the others",
-                                         done_, meshes_.size()));
+      throw CancelledPartway(fmt::format(
+          "{} of {} meshes are finished and kept; the same command continues with the others", done_, meshes_.size()));
     }
     console_.err << fmt::format("{}: {} built, {} skipped, {} built elsewhere, {} failed, {}\n", folder_.string(),
                                 count(Status::built), count(Status::skipped), count(Status::elsewhere),
@@ -159,27 +161,27 @@ class Batch {
   };
 
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
-  fs::path recordOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".json"); }
-  fs::path markOf(const BatchMesh& mesh) const { return own_ / (mesh.name + ".begun"); }
+  fs::path recordOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".json"); }
+  fs::path markOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".begun"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
-  /// In the list's order; what others are at work on at the end, as they end.
+  /// Builds the meshes in the order of the list. Those that other processes build are revisited until all are finished.
   void workThrough() {
-    std::vector<const BatchMesh*> left;
-    for (const BatchMesh& mesh : meshes_) left.push_back(&mesh);
-    for (bool again = false; !left.empty(); again = true) {
+    std::vector<const BatchMesh*> remaining;
+    for (const BatchMesh& mesh : meshes_) remaining.push_back(&mesh);
+    for (bool again = false; !remaining.empty(); again = true) {
       std::vector<const BatchMesh*> busy;
-      for (const BatchMesh* mesh : left)
+      for (const BatchMesh* mesh : remaining)
         if (!attempt(*mesh, again)) busy.push_back(mesh);
       if (!again && !busy.empty())
-        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are at work on", busy.size(),
+        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are building", busy.size(),
                                    meshes_.size()));
-      if (again && busy.size() == left.size()) std::this_thread::sleep_for(kTick);
-      left = std::move(busy);
+      if (again && busy.size() == remaining.size()) std::this_thread::sleep_for(kPollInterval);
+      remaining = std::move(busy);
     }
   }
 
-  /// Whether it is done; not where another process is at work on it.
+  /// Finishes a mesh. Returns false where another process is building it.
   bool attempt(const BatchMesh& mesh, bool again) {
     if (InterruptGuard::interrupted() || (console_.listener != nullptr && console_.listener->wantsCancel()))
       throw Cancelled();
@@ -190,17 +192,17 @@ class Batch {
     const Made made = make(mesh, again);
     ++done_;
     ++counts_[std::size_t(made.status)];
-    tell(mesh, made, secondsSince(start));
+    report(mesh, made, secondsSince(start));
     return true;
   }
 
   Made make(const BatchMesh& mesh, bool again) {
     try {
-      sweep(mesh);
+      removeAbandoned(mesh);
       std::optional<CurrentField> field = finished(mesh);
       Made made = field ? Made{again ? Status::elsewhere : Status::skipped, std::move(field)} : built(mesh);
       std::error_code ignored;
-      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // of other options too: later it would stop a construction
+      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // one of other options would stop a later construction
       return made;
     } catch (const Cancelled&) {
       throw;
@@ -209,7 +211,7 @@ class Batch {
     }
   }
 
-  /// The field that is there, where it is what a construction would give.
+  /// Returns the existing field where its record shows that a construction would give the same.
   std::optional<CurrentField> finished(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh), record = recordOf(mesh);
     if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
@@ -218,14 +220,14 @@ class Batch {
     try {
       return CurrentField{load(output), output.string(), fs::file_size(output)};
     } catch (const Error& error) {
-      note(console_, std::string(error.what()) + "; building it anew");
+      note(console_, std::string(error.what()) + "; building it again");
       return std::nullopt;
     }
   }
 
-  /// The claim is ours: who left a mark has died, and what it left half-written is abandoned, whatever machine it was
-  /// on. Without a mark there is none, which saves a look through the whole folder.
-  void sweep(const BatchMesh& mesh) const {
+  /// Removes files that a dead process left half-written. This process holds the claim, so that the author of a mark
+  /// has died, on whatever machine. Without a mark there are no such files, and the folder need not be searched.
+  void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
     for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
@@ -237,29 +239,29 @@ class Batch {
     const fs::path output = outputOf(mesh);
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    const Mark mark(markOf(mesh));
-    // before the mesh is read: if it changes in between, the next run sees that
+    const BuildMark mark(markOf(mesh));
+    // Hashing before reading the mesh lets the next run notice a change in between.
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // Where locks are lost, another process may have taken us for dead and swept away what we had half-written. It
-      // may be done with the mesh itself; if not, it sweeps no more.
-      if (std::optional<CurrentField> theirs = finished(mesh)) return {Status::elsewhere, std::move(theirs)};
+      // Where locks were lost, another process may have removed our unfinished files as those of a dead one. It may
+      // have finished the mesh; if not, it removes nothing more, and a second attempt succeeds.
+      if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }
     return {Status::built, CurrentField{std::move(field), output.string(), fs::file_size(output)}};
   }
 
-  /// The field, then what it was made of.
+  /// Saves the field, then the record of its origin.
   void write(const BatchMesh& mesh, const Field& field, const std::string& content) const {
     save(field, outputOf(mesh));
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
   }
 
-  /// What the field that lies in the folder is made of, if the options are the ones of now: kept beside it, and
-  /// compared as a whole. The field's checksum ties the two together.
+  /// Returns the record of the field that is in the folder, as the present options would produce it. The record is kept
+  /// beside the field and compared as a whole; the field's checksum ties both together.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
     std::ostringstream text;
     printJson(text, {{"program", versionText()},
@@ -271,35 +273,32 @@ class Batch {
     return std::move(text).str();
   }
 
-  void tell(const BatchMesh& mesh, const Made& made, double seconds) const {
+  void report(const BatchMesh& mesh, const Made& made, double seconds) const {
     const std::string position = fmt::format("{} of {}", done_, meshes_.size()), name = printable(mesh.surface);
     if (made.status == Status::failed) {
-      // some errors speak of what is wrong alone
-      const std::string error = printable(made.error);
-      const bool named = error.find(name) != std::string::npos;
-      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, named ? "" : name + ": ", error);
+      console_.err << fmt::format("hpsdf: error: {}: {}\n", position, withSubject(name, printable(made.error)));
     } else {
       console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, name, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
     }
     console_.err << std::flush;
-    // in one piece, so that the lines of several processes do not mix
+    // One write keeps the lines of several processes from mixing.
     console_.out << lineOf(mesh, made, seconds).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"
                  << std::flush;
-    if (!console_.out) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
+    requireWritten(console_.out);
   }
 
   Json lineOf(const BatchMesh& mesh, const Made& made, double seconds) const {
     Json field = made.field ? fieldJson(*made.field) : Json();
-    const auto of = [&](const char* name) { return made.field ? field.at(name) : Json(); };
+    const auto value = [&](const char* name) { return made.field ? field.at(name) : Json(); };
     return {{"file", mesh.surface},
             {"output", outputOf(mesh).string()},
             {"status", statusName(made.status)},
             {"seconds", std::round(1e3 * seconds) / 1e3},
-            {"leaves", of("leaves")},
-            {"bytes", of("bytes")},
-            {"file_bytes", of("file_bytes")},
-            {"rms_estimate", of("rms_estimate")},
+            {"leaves", value("leaves")},
+            {"bytes", value("bytes")},
+            {"file_bytes", value("file_bytes")},
+            {"rms_estimate", value("rms_estimate")},
             {"sign", made.field ? field.at("mesh").at("sign") : Json()},
             {"error", made.status == Status::failed ? Json(printable(made.error)) : Json()}};
   }
@@ -308,21 +307,21 @@ class Batch {
   const Arguments& arguments_;
   const std::vector<BatchMesh>& meshes_;
   fs::path folder_;
-  fs::path own_;
+  fs::path ownFolder_;
   FileLocks claims_;
   std::size_t done_ = 0;
-  std::array<std::size_t, 4> counts_{};  // by `Status`
+  std::array<std::size_t, 4> counts_{};  // number of meshes for each `Status`
 };
 
 std::vector<BatchMesh> readList(const Console& console, const std::string& list) {
-  const bool typed = list == "-";
-  const std::string text = typed ? readText(console.in, "standard input") : readTextFile(list);
+  const bool isStandardInput = list == "-";
+  const std::string text = isStandardInput ? readText(console.in, "standard input") : readTextFile(list);
   try {
     std::vector<BatchMesh> meshes = parseBatchList(text);
-    if (meshes.empty()) throw Error("names no mesh; write one a line");
+    if (meshes.empty()) throw Error("names no mesh; write one mesh a line");
     return meshes;
   } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", typed ? "standard input" : list, error.what()));
+    throw Error(fmt::format("{}: {}", isStandardInput ? "standard input" : list, error.what()));
   }
 }
 
@@ -331,7 +330,7 @@ std::vector<BatchMesh> readList(const Console& console, const std::string& list)
 void buildBatch(const Console& console, const Arguments& arguments) {
   requireConsistent(arguments);
   const std::vector<BatchMesh> meshes = readList(console, arguments.text("batch"));
-  const InterruptGuard guard;  // no file is left half-written
+  const InterruptGuard guard;  // files are written completely or not at all
   OutputFolder folder(arguments.text("output"));
   OutputFolder own(folder.path() / kOwnFolder);
   Batch batch(console, arguments, meshes, folder.path());

@@ -5,12 +5,12 @@
 
 namespace hpsdf::app {
 
-/// `build --batch`: the fields of all meshes of a list, into a folder, beside any number of other processes at the same
-/// work (docs/batch.md). A line of JSON for each goes to the console's `out` as soon as it is done, in one write.
-/// Returns when all are there, whoever built them.
+/// Builds the fields of all meshes of a list into a folder, as `build --batch` does (docs/batch.md). Any number of
+/// processes may share the list and the folder. Each finished mesh adds one line of JSON to the console's `out`, in one
+/// write. The function returns when all fields exist, whichever process built them.
 ///
-/// Throws `Error` for a list, a folder or options that are of no use, before anything is built; `Failed` at the end
-/// where some meshes failed; `CancelledPartway`.
+/// Throws `Error` before anything is built where list, folder or options cannot be used, `Failed` at the end where some
+/// meshes failed, and `CancelledPartway`.
 void buildBatch(const Console& console, const Arguments& arguments);
 
 }  // namespace hpsdf::app

@@ -13,21 +13,14 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\v\f";
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255, and more is put behind a name
+constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255, and further text follows the name
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) + 1 - first);
-}
-
-/// "torus_major_0.7" of builtin:torus,major=0.7, "bunny" of scans/bunny.obj.
+/// Returns "torus_major_0.7" for builtin:torus,major=0.7 and "bunny" for scans/bunny.obj.
 std::string readableName(std::string surface) {
-  std::ranges::replace(surface, ',', '_');  // where `plainName` would end
+  std::ranges::replace(surface, ',', '_');  // `plainName` would end at the comma
   std::string name = plainName(surface).substr(0, kLongestReadable);
-  if (name.starts_with('.')) name[0] = '_';  // a hidden file would look like none
+  if (name.starts_with('.')) name[0] = '_';  // a leading dot would hide the file
   return name;
 }
 

@@ -7,16 +7,16 @@
 
 namespace hpsdf::app {
 
-/// One of many meshes.
+/// One mesh of a list.
 struct BatchMesh {
-  std::string surface;       ///< as the list has it: a file, builtin:… or analytic:…
-  std::uint64_t number = 0;  ///< hash of `surface`: tells it from all others
-  std::string name;          ///< for files, without an extension: something readable, and the number
+  std::string surface;       ///< the line of the list: a file, builtin:… or analytic:…
+  std::uint64_t number = 0;  ///< hash of `surface`, which identifies the mesh
+  std::string name;          ///< base name of its files: a readable part and the number
 };
 
-/// What a list names, a mesh a line, each once; blanks around it do not count, nor do empty lines and those that begin
-/// with #. Names depend on the line alone, so that they stay when the list grows, and differ where lines do.
-/// Throws `Error` for a line with a zero byte, as of `find -print0` or in UTF-16: names would be lost.
+/// Parses a list that names one mesh a line. Blanks around a name, empty lines, lines that begin with # and repetitions
+/// are ignored. File names depend on the line alone, so that they stay when the list grows, and differ where lines do.
+/// Throws `Error` for a line with a zero byte, as `find -print0` and UTF-16 produce them: its names would be lost.
 std::vector<BatchMesh> parseBatchList(std::string_view text);
 
 }  // namespace hpsdf::app

@@ -27,12 +27,12 @@ FileLocks::FileLocks(std::filesystem::path file)
 
 FileLocks::~FileLocks() { close(descriptor_); }
 
-/// Whether that was possible at once.
+/// Returns whether the lock could be changed at once.
 bool FileLocks::lock(std::uint64_t number, bool taken) const {
   struct flock range = {};
   range.l_type = taken ? F_WRLCK : F_UNLCK;
   range.l_whence = SEEK_SET;
-  range.l_start = static_cast<off_t>(number >> 2);  // far from the end of what can be said: servers differ there
+  range.l_start = static_cast<off_t>(number >> 2);  // file servers differ in their largest offsets
   range.l_len = 1;
   for (;;) {
     if (fcntl(descriptor_, F_SETLK, &range) == 0) return true;
@@ -44,8 +44,8 @@ std::optional<Claim> FileLocks::take(std::uint64_t number) const {
   if (lock(number, true)) return Claim(*this, number);
   if (errno == EACCES || errno == EAGAIN) return std::nullopt;
   throw Error(
-      fmt::format("{}: cannot be locked ({}), so that others could not be kept off; name a folder on a file "
-                  "system with locks",
+      fmt::format("{}: cannot be locked ({}), so that processes cannot share the work; name a folder on a "
+                  "file system with locks",
                   file_.string(), strerror(errno)));
 }
 

@@ -8,7 +8,7 @@ namespace hpsdf::app {
 
 class FileLocks;
 
-/// A piece of work that nobody else may take while this lives.
+/// A piece of work that no other process can take while this object lives.
 class Claim {
  public:
   Claim(Claim&& other) noexcept;
@@ -25,20 +25,21 @@ class Claim {
   std::uint64_t number_;
 };
 
-/// Who is at work on what: pieces of work have numbers, and processes that share a file take them, each for itself. A
-/// claim is a lock on the file's byte of that number (which need not be there), so that the system takes it back from
-/// a process that dies, however it dies. The file stays empty, and stays: whoever removed it would leave others with
-/// locks that newcomers cannot see.
+/// Divides numbered pieces of work among processes that share a file. A claim is a record lock on one byte of the file,
+/// whose offset follows from the number; the byte need not exist. The system releases the lock when a process ends,
+/// however it ends. The file is empty and must never be removed: processes that open its successor would not see the
+/// locks on it.
 class FileLocks {
  public:
-  /// Makes the file where it is not there. Throws `Error` where it cannot be written. One object for a file in a
-  /// process: locks are the process's, and closing the file anywhere in it gives all of them back.
+  /// Creates the file where it does not exist. Throws `Error` where it cannot be written. A process must have one
+  /// object a file: record locks belong to the process, and closing the file anywhere in it releases all of them.
   explicit FileLocks(std::filesystem::path file);
   ~FileLocks();
   FileLocks(const FileLocks&) = delete;
   FileLocks& operator=(const FileLocks&) = delete;
 
-  /// Nothing where another process has it. Throws `Error` where the file system knows no locks.
+  /// Takes a piece of work, or returns nothing where another process has it. Throws `Error` where the file system does
+  /// not support locks.
   std::optional<Claim> take(std::uint64_t number) const;
 
  private:

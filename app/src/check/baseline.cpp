@@ -14,7 +14,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Whole numbers as they stand: nlohmann's JSON would convert any.
+/// Two whole numbers. The check is needed because nlohmann's JSON converts any number.
 std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
   if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))
@@ -22,7 +22,7 @@ std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   return json.get<std::array<std::size_t, 2>>();
 }
 
-/// Throws what nlohmann's JSON throws, or `Error`, for anything that is not what `saveFacts` writes.
+/// Reads what `saveFacts` writes. Throws `Error`, or an exception of nlohmann's JSON, for anything else.
 BaselineFacts factsOf(const std::string& file, const Json& json) {
   BaselineFacts facts;
   for (const auto& [key, value] : json.items()) {

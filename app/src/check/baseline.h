@@ -1,5 +1,5 @@
 #pragma once
-// What is known of a baseline, in a small JSON file beside it; docs/check.md is the manual.
+// The facts about a baseline, which a small JSON file with the baseline's name holds. docs/check.md is the manual.
 
 #include <array>
 #include <filesystem>
@@ -9,21 +9,21 @@
 namespace hpsdf::app {
 
 struct BaselineFacts {
-  std::array<std::size_t, 2> size = {};  ///< width and height of a picture, columns and rows of raw values
-  std::string renderer = {};             ///< that drew it; "" where none did
-  std::string version = {};              ///< of the program
-  std::optional<double> budget = {};     ///< share of its pixels or values that may differ
-  std::optional<double> bound = {};      ///< by how much raw values may differ
+  std::array<std::size_t, 2> size = {};  ///< width and height of a picture, or columns and rows of raw values
+  std::string renderer = {};             ///< renderer that drew the picture; "" for raw values
+  std::string version = {};              ///< version of the program that wrote it
+  std::optional<double> budget = {};     ///< share of pixels or values that may differ, 0 to 1
+  std::optional<double> bound = {};      ///< greatest difference of raw values that is accepted
 };
 
-/// degree.json of degree.png; of raw values the whole name counts: values.csv.json.
+/// The JSON file of a baseline: degree.json for degree.png, but values.csv.json for the raw values of values.csv.
 std::filesystem::path factsFile(const std::filesystem::path& baseline);
 
-/// Throws `Error` naming the JSON file when it is missing or holds something else.
+/// Throws `Error` naming the JSON file if it is missing or malformed.
 BaselineFacts loadFacts(const std::filesystem::path& baseline);
 void saveFacts(const BaselineFacts& facts, const std::filesystem::path& baseline);
 
-/// A picture or raw values, by its ending.
+/// True for pictures and raw values, which the file's ending tells.
 bool isComparable(const std::filesystem::path& file);
 
 }  // namespace hpsdf::app

@@ -14,9 +14,9 @@
 #include "files/data_table.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
-#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/compare.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -30,8 +30,6 @@ void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) 
   item.verdict = verdict;
   item.problem = problem;
 }
-
-// Comparing one file
 
 std::string colorText(const render::Color& color) {
   return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
@@ -76,11 +74,11 @@ void judgeData(CheckedItem& item, double bound) {
                           fmt::format("{:.3g}", worst.difference)});
 }
 
-/// Compares the item's two files, of which either may be missing.
+/// Compares an item's file with its baseline. Either may be missing.
 void judge(CheckedItem& item) {
   if (!fs::exists(item.actual))
     return setVerdict(item, Verdict::noPicture,
-                      "no script writes it: remove the baseline, or mend the script that should");
+                      "no script writes it: remove the baseline, or correct the script that should write it");
   if (!fs::exists(item.baseline))
     return setVerdict(item, Verdict::noBaseline, "it has no baseline: look at it, then 'hpsdf accept' it");
   try {
@@ -94,8 +92,8 @@ void judge(CheckedItem& item) {
   if (item.verdict != Verdict::differs || isDataFile(item.picture)) item.difference.clear();
 }
 
-/// Of a negative control: it passes when its comparison fails as stated.
-void turnAround(CheckedItem& item, Verdict stated) {
+/// Reverses the verdict of a negative control: it passes if its comparison failed as stated.
+void reverseVerdict(CheckedItem& item, Verdict stated) {
   if (item.verdict == stated)
     setVerdict(item, Verdict::passed, "");
   else if (item.verdict == Verdict::passed)
@@ -105,11 +103,9 @@ void turnAround(CheckedItem& item, Verdict stated) {
                fmt::format("it is meant to fail with '{}', but: {}", verdictText(stated), item.problem));
 }
 
-// Negative controls
+using Controls = std::map<int, Verdict>;  ///< verdicts that negative controls must fail with, by their lines
 
-using Controls = std::map<int, Verdict>;  ///< by line, what they are to fail with
-
-/// Turns comments "# wrong REASON: COMMAND" into commands where they stand; columns stay what they were.
+/// Turns comments "# wrong REASON: COMMAND" into commands. Lines and columns stay the same, for error messages.
 Controls enableControls(const std::string& file, std::string& text) {
   Controls controls;
   std::size_t begin = 0;
@@ -133,9 +129,7 @@ Controls enableControls(const std::string& file, std::string& text) {
   return controls;
 }
 
-// One script
-
-/// Names of the files that can be compared, sorted.
+/// The names of the folder's pictures and files of raw values, sorted.
 std::set<std::string> comparableFiles(const fs::path& folder) {
   std::set<std::string> names;
   if (!fs::is_directory(folder)) return names;
@@ -194,7 +188,7 @@ class ScriptCheck {
         throw Error(fmt::format("{}:{}: expected a command after the colon", file_, line));
     if (!controls.empty()) fs::create_directories(wrong_);
     std::istringstream nothing;
-    std::ostringstream ignored;  // what commands report on standard output
+    std::ostringstream ignored;  // takes the reports that commands write to standard output
     Session session(registry, {nothing, ignored, console.err, console.redrawsProgress});
     session.scriptDepth = 1;
     for (std::size_t n = 0; n < calls.size(); ++n) {
@@ -218,7 +212,7 @@ class ScriptCheck {
     }
   }
 
-  /// Compares what a control has just written with the baselines of the same names.
+  /// Compares the files that a negative control has just written with the baselines of the same names.
   void judgeControl(const Session& session, const Call& call, Verdict stated) {
     const fs::path kept = wrong_ / std::to_string(call.line);
     const auto pictures = comparableFiles(wrong_);
@@ -234,12 +228,12 @@ class ScriptCheck {
                        .baseline = baselines_ / picture,
                        .actual = kept / picture};
       judge(item);
-      turnAround(item, stated);
+      reverseVerdict(item, stated);
       items_.push_back(item);
     }
   }
 
-  /// All that were written and all that should have been; of a script that failed only the former.
+  /// Compares the files that were written, and, if the script completed, those that have a baseline.
   void judgePictures(bool completed) {
     const std::vector<CheckedItem> others = std::exchange(items_, {});
     std::set<std::string> pictures = comparableFiles(actual_);
@@ -256,7 +250,7 @@ class ScriptCheck {
       items_.push_back(item);
     }
     items_.insert(items_.end(), others.begin(), others.end());
-    if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // so that it is listed
+    if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // a script without pictures is listed too
   }
 
   const CheckRequest& request_;
@@ -266,8 +260,6 @@ class ScriptCheck {
   std::map<std::string, Origin> origins_;
   std::vector<CheckedItem> items_;
 };
-
-// The folder
 
 std::vector<std::string> scriptNames(const fs::path& folder) {
   std::vector<std::string> names;
@@ -281,17 +273,16 @@ std::vector<std::string> scriptNames(const fs::path& folder) {
   return names;
 }
 
+/// Throws `Error` for a name in `only` that no script has.
 void refuseUnknown(const std::vector<std::string>& names, const std::vector<std::string>& only) {
   for (const std::string& name : only) {
     if (std::ranges::find(names, name) != names.end()) continue;
-    const std::string near = nearestName(name, names);
-    throw Error(fmt::format(
-        "no script is named '{}'{}", name,
-        near.empty() ? "; give the name of its file without .hps" : fmt::format("; did you mean '{}'?", near)));
+    throw Error(fmt::format("no script is named '{}'; {}", name,
+                            suggestion(name, names, "give the name of its file without .hps")));
   }
 }
 
-/// Baselines whose script is gone.
+/// The baselines whose script does not exist.
 std::vector<CheckedItem> strayBaselines(const CheckRequest& request, const std::vector<std::string>& scripts) {
   std::vector<CheckedItem> items;
   std::error_code ignored;

@@ -1,5 +1,5 @@
 #pragma once
-// Runs a folder's scripts and compares what they write with the folder's baselines; docs/check.md is the manual.
+// Runs a folder's scripts and compares the files they write with the folder's baselines. docs/check.md is the manual.
 
 #include <cstdint>
 #include <filesystem>
@@ -18,17 +18,18 @@ enum class Verdict : std::uint8_t {
   otherSize,
   noBaseline,
   noPicture,     ///< a baseline that no script writes
-  unreadable,    ///< the picture, its baseline or the JSON beside that
+  unreadable,    ///< a file that cannot be read: the picture, its baseline or the baseline's JSON file
   expected,      ///< a script whose expectation does not hold
-  scriptFailed,  ///< as a whole
-  notNoticed,    ///< a wrong picture that passes
-  otherReason,   ///< a wrong picture that fails, but not as stated
+  scriptFailed,  ///< a script that ended with an error
+  notNoticed,    ///< a negative control that agrees with the baseline
+  otherReason,   ///< a negative control that fails for another reason than stated
 };
 std::string verdictText(Verdict verdict);
 
-struct WorstPlace {
-  std::string place;
-  std::string baseline;  ///< "#rrggbb" of a picture, a number of raw values
+/// One of the largest differences between a file and its baseline.
+struct WorstDifference {
+  std::string position;  ///< pixel, or row and column
+  std::string baseline;  ///< "#rrggbb" for a picture, a number for raw values
   std::string actual;
   std::string difference;
 };
@@ -36,41 +37,41 @@ struct WorstPlace {
 /// A picture, or raw values, and its baseline; or a script that failed, or that wrote nothing.
 struct CheckedItem {
   std::string script = {};
-  std::string picture = {};  ///< file name; "" of a script
-  int controlLine = 0;       ///< of the negative control that wrote it; 0 for what is meant to be right
+  std::string picture = {};  ///< file name; "" for a script
+  int controlLine = 0;       ///< line of the negative control that wrote it; 0 for other pictures
   Verdict verdict = Verdict::passed;
-  std::string problem = {};  ///< one line; "" where all is well
-  std::size_t compared = 0;  ///< pixels or values
+  std::string problem = {};  ///< one line; "" if it passed
+  std::size_t compared = 0;  ///< number of pixels or values
   std::size_t differing = 0;
-  double largest = 0;
-  double budget = 0;  ///< share of them that may differ
+  double largest = 0;  ///< largest difference
+  double budget = 0;   ///< share of pixels or values that may differ
   std::string renderer = {};
   std::string baselineRenderer = {};
   std::string where = {};                 ///< "file:line:column" of the command that wrote it
-  std::filesystem::path baseline = {};    ///< whether it exists or not
-  std::filesystem::path actual = {};      ///< whether it exists or not
-  std::filesystem::path difference = {};  ///< "" where there is none
-  std::vector<WorstPlace> worst = {};
+  std::filesystem::path baseline = {};    ///< file that need not exist
+  std::filesystem::path actual = {};      ///< file that need not exist
+  std::filesystem::path difference = {};  ///< picture of the differences; "" without one
+  std::vector<WorstDifference> worst = {};
 
-  /// "gallery/degree.png", or a script's name
+  /// "gallery/degree.png", or a script's name.
   std::string name() const { return picture.empty() ? script : script + "/" + picture; }
-  /// "degree.png", or "degree.png, wrong in line 7" of a negative control, or "(script)"
+  /// "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)".
   std::string pictureText() const;
-  /// The script and that
+  /// The script followed by `pictureText`, or the script's name.
   std::string title() const { return picture.empty() ? script : script + "/" + pictureText(); }
 };
 
 struct CheckRequest {
   std::filesystem::path folder;
   std::filesystem::path output;
-  std::vector<std::string> only = {};  ///< names of scripts; all when empty
+  std::vector<std::string> only = {};  ///< names of scripts; empty for all
   Variables variables = {};
-  std::filesystem::path junit = {};  ///< to be written afterwards, and tried before the work; "" for none
+  std::filesystem::path junit = {};  ///< JUnit XML file; "" for none
 };
 
 struct CheckOutcome {
-  std::vector<CheckedItem> items = {};         ///< script by script, in the order of their names
-  std::map<std::string, double> seconds = {};  ///< that each script took
+  std::vector<CheckedItem> items = {};         ///< results of all scripts, by the scripts' names
+  std::map<std::string, double> seconds = {};  ///< time that each script took
 
   std::size_t failures() const;
   bool scriptFailed() const;
@@ -78,8 +79,9 @@ struct CheckOutcome {
 
 constexpr const char* kCheckResults = "results.json";
 
-/// Writes pictures and differences into the output folder, which is emptied before of what an earlier check left there.
-/// Throws `Error` for a folder without scripts, an unknown name in `only`, an output folder with other things in it.
+/// Runs the scripts and writes pictures and differences into the output folder, from which it first removes the results
+/// of an earlier check. Throws `Error` for a folder without scripts, for an unknown name in `only`, and for an output
+/// folder that contains other files.
 CheckOutcome check(const Registry& registry, const Console& console, const CheckRequest& request);
 
 }  // namespace hpsdf::app

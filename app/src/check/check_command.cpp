@@ -11,7 +11,6 @@
 #include "console/version.h"
 #include "files/data_table.h"
 #include "files/text_file.h"
-#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/render/image.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -154,9 +153,8 @@ const Candidate& candidate(const std::vector<Candidate>& all, const std::string&
   if (found != all.end()) return *found;
   std::vector<std::string> names;
   for (const Candidate& other : all) names.push_back(other.name);
-  const std::string near = nearestName(name, names);
   throw Error(fmt::format("the last check wrote no picture '{}'; {}", name,
-                          near.empty() ? "expected SCRIPT/PICTURE.png" : fmt::format("did you mean '{}'?", near)));
+                          suggestion(name, names, "expected SCRIPT/PICTURE.png")));
 }
 
 std::array<std::size_t, 2> sizeOf(const fs::path& file) {
@@ -213,84 +211,91 @@ void runAccept(Session& session, const Arguments& arguments) {
   for (const Json& one : accepted) session.console().out << acceptedText(one);
 }
 
-Parameter folderParameter() {
-  return {.name = "folder",
-          .type = ParameterType::path,
-          .help = "Holds scripts/NAME.hps and baselines/NAME/PICTURE.png.",
-          .valueName = "FOLDER",
-          .positional = true,
-          .need = Need::always};
-}
+const Parameter kFolder = {.name = "folder",
+                           .type = ParameterType::path,
+                           .help = "Folder that holds scripts/NAME.hps and baselines/NAME/PICTURE.png.",
+                           .valueName = "FOLDER",
+                           .positional = true,
+                           .need = Need::always};
+
+const Command kCheck = {
+    .name = "check",
+    .summary = "Run a folder's scripts and compare their pictures with its baselines.",
+    .help =
+        "Each script of FOLDER/scripts runs in a session of its own and writes pictures (.png) and raw values (.csv, "
+        ".pfm) into $out. Each result is compared with its baseline in FOLDER/baselines/SCRIPT. A check fails where "
+        "sizes differ, too many pixels differ, a baseline is missing or no script writes it, a script fails, or a "
+        "picture that must be rejected passes.\n"
+        "\n"
+        "The output folder receives all results, the differences, and one page that shows the failures and can be "
+        "mailed. docs/check.md is the manual.\n"
+        "\n"
+        "Exit status: 0 nothing failed, 1 a comparison failed, 2 a script failed or bad input.",
+    .examples = {"hpsdf check screenshots mesh=bunny.obj",
+                 "hpsdf check pictures --only gallery --out /tmp/check --junit check.xml"},
+    .parameters = {kFolder,
+                   {.name = "variables",
+                    .type = ParameterType::text,
+                    .help = "Variables of the scripts.",
+                    .valueName = "name=value",
+                    .positional = true,
+                    .repeatable = true},
+                   {.name = "out",
+                    .type = ParameterType::outputPath,
+                    .help = "Folder of the results. Those of an earlier check are removed.",
+                    .defaultText = "check-results",
+                    .valueName = "FOLDER"},
+                   {.name = "only",
+                    .type = ParameterType::text,
+                    .help = "Runs this script instead of all: the name of its file without .hps.",
+                    .valueName = "SCRIPT",
+                    .repeatable = true},
+                   {.name = "junit",
+                    .type = ParameterType::outputPath,
+                    .help = "Writes the results as JUnit XML, for continuous integration."}},
+    .action = runCheck,
+    .takesVariables = true};
+
+const Command kAccept = {
+    .name = "accept",
+    .summary = "Accept pictures of the last check as new baselines, one by one.",
+    .help =
+        "Each NAME is SCRIPT/PICTURE.png as in the table of the check. The picture and a small JSON file with size, "
+        "renderer and version are copied to FOLDER/baselines/SCRIPT. View the pictures first.",
+    .examples = {"hpsdf accept screenshots gallery/degree.png",
+                 "hpsdf accept pictures lines/cracks.png --from /tmp/check --budget 0.005"},
+    .parameters = {kFolder,
+                   {.name = "names",
+                    .type = ParameterType::text,
+                    .help = "Pictures to accept.",
+                    .valueName = "SCRIPT/PICTURE",
+                    .positional = true,
+                    .repeatable = true,
+                    .need = Need::always},
+                   {.name = "from",
+                    .type = ParameterType::path,
+                    .help = "Folder of the check's results.",
+                    .defaultText = "check-results",
+                    .valueName = "FOLDER"},
+                   {.name = "budget",
+                    .type = ParameterType::number,
+                    .help =
+                        "Share of the pixels or values that may differ in future checks. When left out, that of the "
+                        "older baseline, or 0.002.",
+                    .minimum = 0,
+                    .maximum = 1},
+                   {.name = "bound",
+                    .type = ParameterType::number,
+                    .help = "Difference of raw values that future checks accept. When left out, that of the older "
+                            "baseline, or 1e-6.",
+                    .minimum = 0}},
+    .action = runAccept};
 
 }  // namespace
 
 void addCheckCommands(Registry& registry) {
-  registry.add(
-      {.name = "check",
-       .summary = "Run a folder's scripts and compare their pictures with its baselines.",
-       .help =
-           "Each script of FOLDER/scripts runs in a session of its own and writes pictures (.png) and raw values "
-           "(.csv, .pfm) into $out; each is compared with its baseline in FOLDER/baselines/SCRIPT. Another size, too "
-           "many pixels that differ, a missing baseline, a baseline that nothing writes, a script that fails, and a "
-           "wrong picture that passes are failures.\n"
-           "\n"
-           "The output folder receives all that was written, the differences, and one page that shows the failures "
-           "and can be mailed. docs/check.md tells more.\n"
-           "\n"
-           "Exit status: 0 all as it should be, 1 a comparison failed, 2 a script failed or bad input.",
-       .examples = {"hpsdf check screenshots mesh=bunny.obj",
-                    "hpsdf check pictures --only gallery --out /tmp/check --junit check.xml"},
-       .parameters = {folderParameter(),
-                      {.name = "variables",
-                       .type = ParameterType::text,
-                       .help = "Variables of the scripts.",
-                       .valueName = "name=value",
-                       .positional = true,
-                       .repeatable = true},
-                      {.name = "out",
-                       .type = ParameterType::outputPath,
-                       .help = "The folder for the results; those of an earlier check in it are removed.",
-                       .defaultText = "check-results",
-                       .valueName = "FOLDER"},
-                      {.name = "only",
-                       .type = ParameterType::text,
-                       .help = "A script to run, rather than all: its file's name without .hps.",
-                       .valueName = "SCRIPT",
-                       .repeatable = true},
-                      {.name = "junit", .type = ParameterType::outputPath, .help = "XML file for CI."}},
-       .action = runCheck,
-       .takesVariables = true});
-  registry.add({.name = "accept",
-                .summary = "Take pictures of the last check as new baselines, one by one.",
-                .help = "Look at them first. Each NAME is SCRIPT/PICTURE.png as the check's table has it; its picture "
-                        "and a small JSON file with size, renderer and version go to FOLDER/baselines/SCRIPT.",
-                .examples = {"hpsdf accept screenshots gallery/degree.png",
-                             "hpsdf accept pictures lines/cracks.png --from /tmp/check --budget 0.005"},
-                .parameters = {folderParameter(),
-                               {.name = "names",
-                                .type = ParameterType::text,
-                                .help = "Which pictures to take.",
-                                .valueName = "SCRIPT/PICTURE",
-                                .positional = true,
-                                .repeatable = true,
-                                .need = Need::always},
-                               {.name = "from",
-                                .type = ParameterType::path,
-                                .help = "The folder that check wrote its results to.",
-                                .defaultText = "check-results",
-                                .valueName = "FOLDER"},
-                               {.name = "budget",
-                                .type = ParameterType::number,
-                                .help = "Share of the pixels or values that may differ, from now on. When left out, "
-                                        "that of the older baseline, or 0.002.",
-                                .minimum = 0,
-                                .maximum = 1},
-                               {.name = "bound",
-                                .type = ParameterType::number,
-                                .help = "By how much raw values may differ, from now on. When left out, that of the "
-                                        "older baseline, or 1e-6.",
-                                .minimum = 0}},
-                .action = runAccept});
+  registry.add(kCheck);
+  registry.add(kAccept);
 }
 
 }  // namespace hpsdf::app

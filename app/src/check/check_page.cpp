@@ -34,7 +34,7 @@ i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; bo
           vertical-align: -.15em; }
 )";
 
-/// The slider takes its pictures from those above it, so that the page holds each once.
+/// The script that gives each slider the pictures above it, so that the page embeds every picture only once.
 constexpr std::string_view kScript = R"(<script>
 for (const slider of document.querySelectorAll('.slider')) {
   const [under, over] = slider.querySelectorAll('img');
@@ -81,12 +81,12 @@ std::string swatch(const std::string& value) {
   return color + htmlEscaped(value);
 }
 
-std::string worstPlaces(const CheckedItem& item) {
+std::string worstDifferences(const CheckedItem& item) {
   if (item.worst.empty()) return {};
   std::string html =
       "<table>\n<tr><th>The worst, from the top left</th><th>baseline</th><th>actual</th><th>difference</th></tr>\n";
-  for (const WorstPlace& worst : item.worst)
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", htmlEscaped(worst.place),
+  for (const WorstDifference& worst : item.worst)
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", htmlEscaped(worst.position),
                         swatch(worst.baseline), swatch(worst.actual), htmlEscaped(worst.difference));
   return html + "</table>\n";
 }
@@ -106,13 +106,13 @@ std::string shareText(const CheckedItem& item) {
 std::string failure(const CheckedItem& item, const CheckPage& page) {
   std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
                                  verdictText(item.verdict), htmlEscaped(item.problem));
-  html += pictures(item) + worstPlaces(item);
+  html += pictures(item) + worstDifferences(item);
   html += "<table>\n" + fact("Differing", shareText(item)) + fact("Written by", item.where) +
           fact("Renderer of the baseline", item.baselineRenderer) + fact("Renderer now", item.renderer) + "</table>\n";
   html +=
       fmt::format("<code>{} --only {}</code>\n", htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
-  const bool canBeTaken = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
-  if (canBeTaken)
+  const bool canBeAccepted = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
+  if (canBeAccepted)
     html += fmt::format("<p>If it is right now:</p>\n<code>{} {}</code>\n", htmlEscaped(page.acceptCommand),
                         htmlEscaped(shellWord(item.name())));
   return html;
@@ -130,13 +130,13 @@ std::string overview(const CheckOutcome& outcome) {
   return html + "</table>\n";
 }
 
-/// XML knows no control characters and no broken UTF-8.
+/// Escapes a text for XML, which allows no control characters and no invalid UTF-8.
 std::string xmlText(const std::string& text) {
-  std::string plain = text;
-  for (char& c : plain)
+  std::string printable = text;
+  for (char& c : printable)
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-  const std::string mended = Json(plain).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return htmlEscaped(Json::parse(mended).get<std::string>());
+  const std::string valid = Json(printable).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return htmlEscaped(Json::parse(valid).get<std::string>());
 }
 
 std::string junitCase(const CheckedItem& item) {

@@ -1,5 +1,5 @@
 #pragma once
-// What a check found, for people (one HTML page that can be mailed) and for CI (JUnit's XML).
+// The results of a check as an HTML page for people and as JUnit XML for CI.
 
 #include <string>
 
@@ -9,15 +9,15 @@ namespace hpsdf::app {
 
 struct CheckPage {
   std::string title;
-  std::string checkCommand;   ///< that repeats the check, but for --only
-  std::string acceptCommand;  ///< that takes a picture, but for its name
+  std::string checkCommand;   ///< command that repeats the check, without --only
+  std::string acceptCommand;  ///< command that accepts a picture, without the picture's name
   std::string footer;
 };
 
-/// All figures, and of each failure its pictures, read from their files and kept in the page itself.
+/// A page with the results of all comparisons and the pictures of each failure, which are embedded in the page.
 std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page);
 
-/// A suite a script, a case a picture.
+/// JUnit XML with a test suite for each script and a test case for each picture.
 std::string junitXml(const CheckOutcome& outcome);
 
 }  // namespace hpsdf::app

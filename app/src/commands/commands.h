@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// All commands of the program.
+/// Returns the registry of all commands of the program.
 Registry makeRegistry();
 
 }  // namespace hpsdf::app

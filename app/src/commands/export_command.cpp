@@ -1,14 +1,13 @@
 #include "commands/export_command.h"
 
-// export: the field in a format that other programs load.
-
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "commands/shared_parameters.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
 #include "hpsdf/detail/cubic_grid.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
@@ -44,7 +43,7 @@ struct Exported {
   CubicGridError error;
 };
 
-/// All but the last step: the file is whole, and has its name once it is committed.
+/// Samples, measures and writes the grid. The file gets its name when the caller commits it.
 Exported exportGrid(const Session& session, const Arguments& arguments, OutputFile& out) {
   const Field& field = session.current().field;
   const GridResolution resolution = exportResolution(field.domain(), arguments);
@@ -93,7 +92,7 @@ std::string exportText(const Exported& made, const std::string& file) {
 
 void runExport(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  const InterruptGuard guard;  // until the file is whole
+  const InterruptGuard guard;  // the file is written completely or not at all
   OutputFile out(file);
   useField(session, arguments);
   const Exported made = exportGrid(session, arguments, out);
@@ -103,55 +102,62 @@ void runExport(Session& session, const Arguments& arguments) {
   result << exportText(made, file);
 }
 
+const Command kExport = {
+    .name = "export",
+    .summary = "Write a field as a cubic grid for Bullet or PositionBasedDynamics.",
+    .help =
+        "Writes FILE.cdf, the file format of Discregrid's cubic Lagrange grid: a regular grid over the field's domain "
+        "whose cells interpolate 32 distances at their corners and edges. Bullet loads it by btSdfCollisionShape or "
+        "btMiniSDF (as float or double), PositionBasedDynamics by CubicSDFCollisionDetection.\n"
+        "\n"
+        "Use it for simulations that cannot load .hpsdf files. Lengths are those of the field, negative inside. The "
+        "grid has no distances outside the domain: build the field with a --margin as wide as the deepest contact that "
+        "must be resolved.\n"
+        "\n"
+        "A regular grid follows the field less closely than the field's own cells do. The command measures the "
+        "additional error at random points in the whole domain and near the surface, where |f| is at most one cell "
+        "diagonal. Doubling the number of cells along each axis makes the file eight times as long. It divides the "
+        "error by sixteen where the field is smooth and by two at creases of the distance; it does not reduce the "
+        "jumps between cells of the field.\n"
+        "\n"
+        "The file appears when it is complete. Bullet reads at most 2147 MB, about 224 cells along each axis.",
+    .examples = {"hpsdf export bunny.hpsdf -o bunny.cdf", "hpsdf export bunny.hpsdf -o small.cdf --max-bytes 5e6",
+                 "hpsdf export bunny.hpsdf -o box.cdf --resolution 40,40,30 --json"},
+    .action = runExport,
+    .check = checkExport};
+
+const std::vector<Parameter> kExportParameters = {
+    {.name = "output",
+     .type = ParameterType::outputPath,
+     .help = "File of the grid, *.cdf.",
+     .alias = 'o',
+     .need = Need::always},
+    {.name = "resolution",
+     .type = ParameterType::numbers,
+     .help =
+         "Number of cells. One number counts the cells along the longest side of the domain, which are nearly cubes; "
+         "three numbers count those along x, y and z. Use it instead of max-bytes.",
+     .valueName = "N|NX,NY,NZ",
+     .minimum = 1,
+     .maximum = 1e7,
+     .whole = true,
+     .counts = {1, 3}},
+    {.name = "max-bytes",
+     .type = ParameterType::wholeNumber,
+     .help = "Largest size of the file, e.g. 64e6. The finest grid that fits is written; a cell takes 188 bytes.",
+     .defaultText = "64e6",
+     .unit = "bytes",
+     .minimum = 1,
+     .maximum = double(kMaxCubicGridBytes)}};
+
 }  // namespace
 
 void addExportCommand(Registry& registry) {
-  registry.add(
-      {.name = "export",
-       .summary = "Write a field as a cubic grid that Bullet and PositionBasedDynamics load.",
-       .help =
-           "FILE.cdf is the file of Discregrid's cubic Lagrange grid: a regular grid over the field's domain, a cell "
-           "interpolated from 32 distances at its corners and edges. Bullet loads it by btSdfCollisionShape or "
-           "btMiniSDF (as float or as double), PositionBasedDynamics by CubicSDFCollisionDetection. Lengths are the "
-           "field's, negative inside; outside the domain there is no distance: build with a --margin as wide as what "
-           "is to be pushed out.\n"
-           "\n"
-           "A regular grid follows the field less closely than its own cells do. How much that adds to the field's own "
-           "error is measured at random points and told: everywhere, and near the surface, that is where |f| is at "
-           "most a cell's diagonal. Where the field is smooth, twice as many cells an axis are wrong by a sixteenth, "
-           "in a file eight times as long; at creases, which distances have, by a half, and where the field's cells do "
-           "not match by as much as before.\n"
-           "\n"
-           "The file appears whole or not at all. Bullet reads 2147 MB at most, some 224 cells an axis.",
-       .examples = {"hpsdf export bunny.hpsdf -o bunny.cdf", "hpsdf export bunny.hpsdf -o small.cdf --max-bytes 5e6",
-                    "hpsdf export bunny.hpsdf -o box.cdf --resolution 40,40,30 --json"},
-       .parameters = {fieldParameter(),
-                      {.name = "output",
-                       .type = ParameterType::outputPath,
-                       .help = "The grid's file, *.cdf.",
-                       .alias = 'o',
-                       .need = Need::always},
-                      {.name = "resolution",
-                       .type = ParameterType::numbers,
-                       .help = "Cells along the domain's longest side, with cells that are as good as cubes, or along "
-                               "x, y and z. Instead of max-bytes.",
-                       .valueName = "N|NX,NY,NZ",
-                       .minimum = 1,
-                       .maximum = 1e7,
-                       .whole = true,
-                       .counts = {1, 3}},
-                      {.name = "max-bytes",
-                       .type = ParameterType::wholeNumber,
-                       .help = "The finest grid whose file has at most so many bytes, e.g. 64e6; 188 a cell.",
-                       .defaultText = "64e6",
-                       .unit = "bytes",
-                       .minimum = 1,
-                       .maximum = double(kMostCubicGridBytes)},
-                      pointsParameter("Random points at which the grid is compared with the field.", "100000", 1),
-                      seedParameter(),
-                      threadsParameter("The file is")},
-       .action = runExport,
-       .check = checkExport});
+  registry.add(withParameters(
+      kExport, {{fieldParameter()},
+                kExportParameters,
+                {pointsParameter("Number of random points at which the grid is compared with the field.", "100000", 1),
+                 seedParameter(), threadsParameter("The file is")}}));
 }
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds export.
+/// Adds the command `export`.
 void addExportCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -6,11 +6,14 @@
 #include <fstream>
 
 #include "batch/batch.h"
+#include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "construction/mesh_summary.h"
+#include "construction/reference_surface.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
@@ -32,15 +35,6 @@ void saveCurrent(Session& session, const std::string& file) {
   session.setFileBytes(std::filesystem::file_size(file));
 }
 
-/// Where a command keeps the field that it makes; in a script the current field may be all that is wanted.
-Parameter fieldOutputParameter() {
-  return {.name = "output",
-          .type = ParameterType::outputPath,
-          .help = "The field's file, usually *.hpsdf.",
-          .alias = 'o',
-          .need = Need::onCommandLine};
-}
-
 void checkFieldOutput(const Arguments& arguments) {
   if (arguments.has("output")) checkWritable(arguments.text("output"));
 }
@@ -49,33 +43,33 @@ void saveMade(Session& session, const Arguments& arguments) {
   if (arguments.has("output")) saveCurrent(session, arguments.text("output"));
 }
 
-/// What a command tells of the field that it made.
+/// Describes the resulting field and its file.
 Json madeJson(const Session& session, const Arguments& arguments) {
   Json json = fieldJson(session.current());
   json["output"] = arguments.has("output") ? Json(arguments.text("output")) : Json();
   return json;
 }
 
-/// Another form of the current field takes its place.
+/// Replaces the current field by another form of it and saves that where an output is given.
 void changeCurrent(Session& session, const Arguments& arguments, Field field) {
   const CurrentField& before = session.current();
   session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});
   saveMade(session, arguments);
 }
 
-/// Where the construction keeps its state; empty: nowhere.
+/// Returns the file of the checkpoint, or an empty path where none was asked for.
 std::filesystem::path checkpointFile(const Arguments& arguments) {
   return arguments.flag("checkpoint") ? checkpointOf(arguments.text("output")) : std::filesystem::path();
 }
 
 void checkBuildArguments(const Arguments& arguments) {
   const bool many = arguments.has("batch");
-  if (many && arguments.has("mesh")) throw Error("batch: its list names the meshes; leave MESH out");
-  if (many && !arguments.has("output")) throw Error("batch: its fields go into a folder; give output");
+  if (many && arguments.has("mesh")) throw Error("batch: the list names the meshes; leave MESH out");
+  if (many && !arguments.has("output")) throw Error("batch: the fields are written to a folder; give output");
   if (!many && !arguments.has("mesh"))
     throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
   const bool keeps = arguments.flag("checkpoint");
-  if (keeps && !arguments.has("output")) throw Error("checkpoint: it is kept beside the output; give output");
+  if (keeps && !arguments.has("output")) throw Error("checkpoint: the file is kept beside the output; give output");
   requireOwner(arguments, "checkpoint-seconds", "checkpoint", keeps);
 }
 
@@ -86,13 +80,14 @@ BuiltField buildAndKeep(const Console& console, const std::string& surface, cons
   } catch (const Cancelled&) {
     if (!checkpoint.empty() && std::filesystem::exists(checkpoint))
       throw CancelledPartway(
-          fmt::format("{} keeps what was done; the same command goes on from it", checkpoint.string()));
+          fmt::format("{} keeps the state; the same command continues from it", checkpoint.string()));
     throw;
   }
 }
 
-/// The state of the construction is no longer needed, nor what a process left that was killed while it wrote the field.
-void tidyUp(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
+/// Removes the checkpoint of a finished construction, and temporary files of a process that was killed while it wrote
+/// the field.
+void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
   std::error_code ignored;
   std::filesystem::remove(checkpoint, ignored);
   OutputFile::removeAbandoned(output);
@@ -104,12 +99,12 @@ void runBuild(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
   const std::filesystem::path checkpoint = checkpointFile(arguments);
   checkFieldOutput(arguments);
-  const InterruptGuard guard;  // until the file is whole
+  const InterruptGuard guard;  // the file is written completely or not at all
   BuiltField built = buildAndKeep(console, surface, arguments, checkpoint);
   session.setField({std::move(built.field), arguments.textOr("output", surface), {}, surface});
   session.setExact(std::move(built.exact));
   saveMade(session, arguments);
-  if (!checkpoint.empty()) tidyUp(checkpoint, arguments.text("output"));
+  if (!checkpoint.empty()) removeLeftovers(checkpoint, arguments.text("output"));
   if (session.wantsJson(arguments)) {
     Json json = madeJson(session, arguments);
     json["build_seconds"] = built.seconds;
@@ -157,7 +152,7 @@ void runQuery(Session& session, const Arguments& arguments) {
     queryPoints(field, in, name, format, [&out](std::string_view text) {
       out.write(text.data(), static_cast<std::streamsize>(text.size()));
       out.flush();
-      if (!out) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
+      requireWritten(out);
     });
     return;
   }
@@ -170,10 +165,11 @@ void runQuery(Session& session, const Arguments& arguments) {
 void runSmooth(Session& session, const Arguments& arguments) {
   checkFieldOutput(arguments);
   useField(session, arguments);
-  if (session.current().field.metadata().continuityWeight > 0)
-    throw Error(session.current().name + ": is weakly continuous already: take it as it was before, or build it anew");
+  if (session.current().field.metadata().settings.continuityWeight)
+    throw Error(session.current().name +
+                ": is weakly continuous already; smooth the original field, or build it again");
   const Console& console = session.console();
-  const InterruptGuard guard;  // until the file is whole
+  const InterruptGuard guard;  // the file is written completely or not at all
   const auto start = std::chrono::steady_clock::now();
   WeaklyContinuous made = withProgress(console, [&](const Progress& progress) {
     return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
@@ -194,30 +190,10 @@ void runSmooth(Session& session, const Arguments& arguments) {
                              shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
 }
 
-Command smoothCommand() {
-  return {.name = "smooth",
-          .summary = "Let a field jump less from cell to cell, for a little error: weak continuity.",
-          .help =
-              "Changes the cells' polynomials so that Σ w ∫ jump² dA + λ‖f − f₀‖² becomes least: the sum goes over the "
-              "faces between cells, w is the smaller cell's edge across the face, f₀ the field as it was, λ the "
-              "weight, which has no unit. Cells, degrees and bytes stay as they are. What 'build --continuity weak' "
-              "does, for a field that is there; that rounds to float once, this a second time.\n"
-              "\n"
-              "The polynomials of cells have too few coefficients to meet along whole faces, so that this trades error "
-              "for jump; 'hpsdf study continuity' shows how. Bounds are not kept. A field can be smoothed once. In a "
-              "script, the smoothed field becomes the current one, "
-              "and the output may be left out.",
-          .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
-                       "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
-          .parameters = {fieldParameter(), fieldOutputParameter(), continuityWeightParameter(),
-                         threadsParameter("The field is")},
-          .action = runSmooth};
-}
-
 void runBlend(Session& session, const Arguments& arguments) {
   checkFieldOutput(arguments);
   useField(session, arguments);
-  const InterruptGuard guard;  // until the file is whole
+  const InterruptGuard guard;  // the file is written completely or not at all
   changeCurrent(session, arguments, blended(session.current().field, arguments.number("width")));
   if (session.wantsJson(arguments)) return printJson(session.console().out, madeJson(session, arguments));
   session.console().out << fmt::format("{}: {}, blended within {} of an edge from faces\n", session.current().name,
@@ -229,7 +205,7 @@ void runBounds(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   const CurrentField& from = session.current();
   const Console& console = session.console();
-  const InterruptGuard guard;  // until the file is whole
+  const InterruptGuard guard;  // the file is written completely or not at all
   const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(console, surface, from.field.metadata().source);
   refuseForeign(from, reference, surface);
@@ -248,160 +224,194 @@ void runBounds(Session& session, const Arguments& arguments) {
                              shortNumber(json["bounds"]["median"].get<double>()), seconds);
 }
 
-Command boundsCommand() {
-  return {
-      .name = "bounds",
-      .summary = "Find what is certain of a field: how wrong it may be in each cell, and how steep.",
-      .help =
-          "Keeps two numbers for each cell: |f − Φ| is at most the one anywhere in it, not only where it was "
-          "measured, and ‖∇f‖ at most the other. By them rays and collisions miss nothing: |f| less the first is "
-          "a distance within which there is certainly no surface. What 'build --bounds' does, for a field that is "
-          "there; bounds that it has are found anew. Coefficients stay as they are, to the bit.\n"
-          "\n"
-          "It takes MESH, what the field was made from, and 24 exact distances a cell; Φ is 1-Lipschitz, so that "
-          "these bound it between them. MESH may be left out where the field was made from a built-in shape; a "
-          "mesh that the field was not made from is refused. Bounds hold where Φ is a signed distance: not beside "
-          "the holes of an open mesh, nor where one cuts itself.\n"
-          "\n"
-          "'smooth' and 'blend' change the field and leave bounds out: find them last. 'hpsdf verify' holds them "
-          "against random points (--max-violations 0).",
-      .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
-      .parameters = {fieldParameter(),
-                     {.name = "mesh",
-                      .type = ParameterType::text,
-                      .help = "What the field was made from: mesh file, builtin:SHAPE or analytic:SHAPE.",
-                      .valueName = "MESH",
-                      .positional = true},
-                     fieldOutputParameter(),
-                     threadsParameter("The field is")},
-      .action = runBounds};
-}
+const Parameter kFieldOutput = {.name = "output",
+                                .type = ParameterType::outputPath,
+                                .help =
+                                    "File of the resulting field, usually *.hpsdf. A script may leave it out; the "
+                                    "result becomes the current field in any case.",
+                                .alias = 'o',
+                                .need = Need::onCommandLine};
 
-Command buildCommand() {
-  Command command{
-      .name = "build",
-      .summary = "Build a field from a mesh or a built-in shape.",
-      .help =
-          "MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), builtin:SHAPE,parameter=value,… for the mesh of a built-in "
-          "shape, or analytic:SHAPE,… for its distance in closed form; 'hpsdf shapes' lists the shapes.\n"
-          "\n"
-          "The construction refines the worst cell, by a higher degree or by eight children, until the weighted "
-          "squared "
-          "error over the domain falls below the target error τ. τ is meant for a mesh whose longest side L is 2, as "
-          "in "
-          "the paper; internally it is τ·(L/2)^5, so that the same τ gives the same cells whether the mesh is in "
-          "metres "
-          "or in millimetres. A hundredth of τ is about a tenth of the RMS error.\n"
-          "\n"
-          "Inside is what the mesh surrounds; where that is not plain, because it has holes or meets itself, a line "
-          "says "
-          "how it is decided (--sign). Ctrl-C stops and writes "
-          "no field; with --checkpoint the same command goes on later from where it was. In a script, the field "
-          "becomes the current one, and the output may be left out.\n"
-          "\n"
-          "With --batch every mesh of a list becomes OUTPUT/name-hash.hpsdf, and a line of JSON on standard output "
-          "says what came of it. One that fails does not stop the others: the exit status is 3 at the end. Those that "
-          "are there already, made from the same contents with the same options, are skipped. Any number of processes "
-          "may work on one list and one folder: each mesh is built by one of them. docs/batch.md shows how, also with "
-          "GNU parallel and Slurm.",
-      .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
-                   "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
-                   "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
-                   "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
-                   "hpsdf build --batch list.txt -o fields"},
-      .parameters = {{.name = "mesh",
-                      .type = ParameterType::text,
-                      .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
-                      .valueName = "MESH",
-                      .positional = true},
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "The field's file, usually *.hpsdf; with batch, the folder of the fields, made where it "
-                              "is not there.",
-                      .alias = 'o',
-                      .need = Need::onCommandLine},
-                     {.name = "batch",
-                      .type = ParameterType::path,
-                      .help = "In place of MESH: a list of many, one a line, files (from the current folder) and "
-                              "shapes; empty lines and # comments are passed over. - reads standard input.",
-                      .valueName = "LIST"}},
-      .action = runBuild,
-      .check = checkBuildArguments};
-  for (auto& parameters : {checkpointParameters(), buildParameters()})
-    for (const Parameter& parameter : parameters) command.parameters.push_back(parameter);
-  return command;
+const Command kBuild = {
+    .name = "build",
+    .summary = "Build a field from a mesh or a built-in shape.",
+    .help =
+        "MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape "
+        "(builtin:SHAPE,parameter=value,…) "
+        "or a shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes.\n"
+        "\n"
+        "The construction refines the worst cell, by a higher degree or by eight children, until the weighted squared "
+        "error over the domain falls below the target error τ. As in the paper, τ refers to a mesh whose longest side "
+        "is 2. A mesh with the longest side L is built for τ·(L/2)^5, so that the same τ gives the same cells whether "
+        "its units are metres or millimetres. One hundredth of τ gives about one tenth of the RMS error.\n"
+        "\n"
+        "The inside is what the mesh encloses. Where that is not certain, because the mesh has holes or intersects "
+        "itself, a line reports which inside test was chosen (see --sign). Ctrl-C stops the construction without "
+        "writing a field; with --checkpoint the same command continues it later. In a script, the field becomes the "
+        "current one, and the output may be left out.\n"
+        "\n"
+        "With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output "
+        "reports its result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist "
+        "already, made from the same contents with the same options, are skipped. Any number of processes may share "
+        "one "
+        "list and one folder: each mesh is built by one of them. docs/batch.md shows how, also with GNU parallel and "
+        "Slurm.",
+    .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
+                 "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
+                 "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
+                 "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
+                 "hpsdf build --batch list.txt -o fields"},
+    .action = runBuild,
+    .check = checkBuildArguments};
+
+const std::vector<Parameter> kBuildFiles = {
+    {.name = "mesh",
+     .type = ParameterType::text,
+     .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
+     .valueName = "MESH",
+     .positional = true},
+    {.name = "output",
+     .type = ParameterType::outputPath,
+     .help = "File of the field, usually *.hpsdf. With batch it is the folder of the fields, which is created where it "
+             "does not exist.",
+     .alias = 'o',
+     .need = Need::onCommandLine,
+     .group = "Files"},
+    {.name = "batch",
+     .type = ParameterType::path,
+     .help = "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current "
+             "folder) or shape a line; empty lines and # comments are ignored, - is standard input.",
+     .valueName = "LIST",
+     .group = "Files"}};
+
+const Command kSmooth = {
+    .name = "smooth",
+    .summary = "Make a field weakly continuous: smaller jumps for a little error.",
+    .help =
+        "Changes the polynomials of the cells so that Σ w ∫ jump² dA + λ‖f − f₀‖² becomes minimal. The sum runs over "
+        "the faces between cells; w is the edge of the smaller cell across the face, f₀ the original field, and λ the "
+        "weight, which has no unit. Cells, degrees and size stay. 'build --continuity weak' does the same during the "
+        "construction; it rounds to float once, this command a second time.\n"
+        "\n"
+        "Use it where jumps between cells disturb more than a small error. The polynomials of cells have too few "
+        "coefficients to agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows "
+        "how much. Bounds are removed. A field can be smoothed once.",
+    .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
+                 "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
+    .action = runSmooth};
+
+const Command kBlend = {
+    .name = "blend",
+    .summary = "Make a field and its gradient continuous.",
+    .help =
+        "Blends neighbouring cells by smooth weights in a zone along their faces, so that neither value nor gradient "
+        "jumps anywhere in the domain. Outside of the zones the field stays the same to the bit. No coefficient "
+        "changes: "
+        "the file stores the width of the zones, and queries and pictures blend. 'build --continuity exact' does the "
+        "same.\n"
+        "\n"
+        "Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long, "
+        "and bounds are removed.",
+    .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
+    .action = runBlend};
+
+const Command kBounds = {
+    .name = "bounds",
+    .summary = "Compute proven bounds of the error and the slope of each cell.",
+    .help =
+        "Stores two numbers for each cell: |f − Φ| does not exceed the first anywhere in the cell, and ‖∇f‖ does not "
+        "exceed the second. Subtracting the first from |f| gives a distance within which there is certainly no "
+        "surface, "
+        "so that rays and collisions miss nothing. 'build --bounds' does the same; existing bounds are computed again. "
+        "Coefficients stay the same to the bit.\n"
+        "\n"
+        "It needs MESH, from which the field was made, and computes 24 exact distances a cell, between which the "
+        "1-Lipschitz property of Φ bounds it. A mesh from which the field was not made is refused. Bounds hold where Φ "
+        "is a signed distance: not beside the holes of an open mesh, nor where a mesh intersects itself.\n"
+        "\n"
+        "'smooth' and 'blend' change the field and remove bounds: compute them last. 'hpsdf verify --max-violations 0' "
+        "tests them at random points.",
+    .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
+    .action = runBounds};
+
+const Command kInfo = {
+    .name = "info",
+    .summary = "Show the size, the settings and the estimated error of a field.",
+    .help =
+        "Prints leaves, coefficients, memory, errors, settings, the mesh from which the field was made, and the "
+        "shares of its volume by degree and depth. The estimated RMS error is √(ε/|Ω|) in mesh units, where ε is the "
+        "weighted estimate of the construction; 'hpsdf verify' measures the error.",
+    .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
+    .action = runInfo};
+
+const Command kQuery = {
+    .name = "query",
+    .summary = "Compute distances and gradients at points.",
+    .help =
+        "Reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments and a "
+        "header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, "
+        "or with --json an array of objects.\n"
+        "\n"
+        "Distances are negative inside. Outside the domain the field is continued continuously.",
+    .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf", "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
+    .action = runQuery};
+
+const std::vector<Parameter> kQueryFiles = {{.name = "points",
+                                             .type = ParameterType::path,
+                                             .help = "File of points; - or nothing for standard input.",
+                                             .valueName = "POINTS",
+                                             .positional = true},
+                                            {.name = "output",
+                                             .type = ParameterType::outputPath,
+                                             .help = "File to write; standard output when left out.",
+                                             .alias = 'o'}};
+
+const Command kLoad = {.name = "load",
+                       .summary = "Load a field, which becomes the current one.",
+                       .help = "The following commands of the script work on it.",
+                       .examples = {"load bunny.hpsdf"},
+                       .parameters = {{.name = "field",
+                                       .type = ParameterType::path,
+                                       .help = "File of the field.",
+                                       .valueName = "FIELD",
+                                       .positional = true,
+                                       .need = Need::always}},
+                       .action = runLoad,
+                       .scriptOnly = true};
+
+const Command kSave = {.name = "save",
+                       .summary = "Save the current field.",
+                       .help =
+                           "The file is written under a temporary name and renamed, so that an interrupted save "
+                           "leaves an older file intact.",
+                       .examples = {"save output=bunny.hpsdf"},
+                       .parameters = {{.name = "output",
+                                       .type = ParameterType::outputPath,
+                                       .help = "File of the field, usually *.hpsdf.",
+                                       .alias = 'o',
+                                       .need = Need::always}},
+                       .action = runSave,
+                       .scriptOnly = true};
+
+/// The parameter `width` of `blend`: `build`'s blend-width under its shorter name.
+Parameter widthParameter() {
+  Parameter parameter = settingParameter("blend-width");
+  parameter.name = "width";
+  return parameter;
 }
 
 }  // namespace
 
 void addFieldCommands(Registry& registry) {
-  registry.add(buildCommand());
-  registry.add(smoothCommand());
-  registry.add(
-      {.name = "blend",
-       .summary = "Make a field continuous, with its gradient.",
-       .help = "Along their faces neighbouring cells are blended by smooth weights, so that neither value nor "
-               "gradient jumps anywhere in the domain; away from faces the field stays as it is, to the bit. "
-               "No coefficient changes: the file says how wide the zones are, and queries and pictures do "
-               "the rest. Bounds are not kept. 'build --continuity exact' does the same at once.\n"
-               "\n"
-               "In a script, the blended field becomes the current one, and the output may be left out.",
-       .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
-       .parameters = {fieldParameter(), fieldOutputParameter(), blendWidthParameter("width")},
-       .action = runBlend});
-  registry.add(boundsCommand());
-  registry.add({.name = "info",
-                .summary = "Tell what a field holds and how exact it is.",
-                .help = "Leaves, coefficients, memory, errors, settings, the mesh it came from, and how its volume is "
-                        "divided among degrees and depths. The estimated RMS error is √(ε/|Ω|) in mesh units, ε the "
-                        "construction's own weighted estimate.",
-                .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
-                .parameters = {fieldParameter()},
-                .action = runInfo});
-  registry.add({.name = "query",
-                .summary = "Distances and gradients at points.",
-                .help = "Reads points, one a line, x,y,z or x y z, from a file or from standard input; empty lines, # "
-                        "comments and a header line are passed over. Writes CSV with the header "
-                        "x,y,z,distance,gx,gy,gz, numbers in full precision; with --json an array of objects.\n"
-                        "\n"
-                        "Negative distances are inside. Points outside the domain get a continuous extension.",
-                .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
-                             "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
-                .parameters = {fieldParameter(),
-                               {.name = "points",
-                                .type = ParameterType::path,
-                                .help = "File of points; standard input when left out or -.",
-                                .valueName = "POINTS",
-                                .positional = true},
-                               {.name = "output",
-                                .type = ParameterType::outputPath,
-                                .help = "File to write; standard output when left out.",
-                                .alias = 'o'}},
-                .action = runQuery});
-  registry.add({.name = "load",
-                .summary = "Load a field: it becomes the current one.",
-                .help = "The commands that follow work on it.",
-                .examples = {"load bunny.hpsdf"},
-                .parameters = {{.name = "field",
-                                .type = ParameterType::path,
-                                .help = "A field's file.",
-                                .valueName = "FIELD",
-                                .positional = true,
-                                .need = Need::always}},
-                .action = runLoad,
-                .scriptOnly = true});
-  registry.add(
-      {.name = "save",
-       .summary = "Save the current field.",
-       .help = "Written under a temporary name and renamed: an interrupted save leaves an older file as it was.",
-       .examples = {"save output=bunny.hpsdf"},
-       .parameters = {{.name = "output",
-                       .type = ParameterType::outputPath,
-                       .help = "The field's file, usually *.hpsdf.",
-                       .alias = 'o',
-                       .need = Need::always}},
-       .action = runSave,
-       .scriptOnly = true});
+  const Parameter field = fieldParameter(), threads = threadsParameter("The field is");
+  registry.add(withParameters(kBuild, {kBuildFiles, checkpointParameters(), buildParameters()}));
+  registry.add(withParameters(kSmooth, {{field, kFieldOutput, settingParameter("continuity-weight"), threads}}));
+  registry.add(withParameters(kBlend, {{field, kFieldOutput, widthParameter()}}));
+  registry.add(withParameters(kBounds, {{field, surfaceParameter(), kFieldOutput, threads}}));
+  registry.add(withParameters(kInfo, {{field}}));
+  registry.add(withParameters(kQuery, {{field}, kQueryFiles}));
+  registry.add(kLoad);
+  registry.add(kSave);
 }
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds build, smooth, load, save, info, query.
+/// Adds the commands build, smooth, blend, bounds, info, query, load and save.
 void addFieldCommands(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds jumps.
+/// Adds the command `jumps`.
 void addJumpsCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -5,17 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <exception>
-#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
 #include "construction/mesh_summary.h"
+#include "construction/surface.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/sign_check.h"
 #include "hpsdf/exact_distance.h"
@@ -32,7 +33,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::size_t kPlacesInText = 3, kPlacesInJson = 100;
+constexpr std::size_t kPositionsInText = 3, kPositionsInJson = 100;
 
 struct KindNames {
   const char *text, *json;
@@ -41,7 +42,7 @@ constexpr std::array<KindNames, kDefectKinds> kKinds = {{{"boundary edges", "bou
                                                          {"non-manifold edges", "non_manifold_edges"},
                                                          {"inconsistent edges", "inconsistent_edges"},
                                                          {"pinched vertices", "pinched_vertices"},
-                                                         {"meets itself", "crossings"}}};
+                                                         {"self-intersections", "crossings"}}};
 
 struct Inspected {
   ImportedMesh imported;
@@ -55,7 +56,7 @@ Inspected inspected(Session& session, const Arguments& arguments) {
   const TriangleMesh& mesh = found.imported.mesh;
   const auto distance = distanceTo(session.console(), mesh);
   found.defects = findDefects(mesh, withProgress(session.console(), [&](const Progress& progress) {
-                                return distance->crossings(kMostCrossings, progress);
+                                return distance->crossings(kMaxCrossings, progress);
                               }));
   found.choice = distance->insideTestChoice();
   if (arguments.given("check-sign"))
@@ -66,75 +67,75 @@ Inspected inspected(Session& session, const Arguments& arguments) {
   return found;
 }
 
-std::size_t placesWanted(const Arguments& arguments, std::size_t unsaid) {
-  return arguments.given("places") ? static_cast<std::size_t>(arguments.number("places")) : unsaid;
+std::size_t positionLimit(const Arguments& arguments, std::size_t otherwise) {
+  return arguments.given("places") ? static_cast<std::size_t>(arguments.number("places")) : otherwise;
 }
 
-bool isPlace(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
+bool isPoint(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
 
-/// Those of a kind, the first ones.
+/// Returns the first defects of a kind, at most `limit`.
 std::span<const Defect> firstOf(const MeshDefects& defects, DefectKind kind, std::size_t limit) {
-  const std::span<const Defect> all = defects.of(kind);
+  const std::span<const Defect> all = defects.ofKind(kind);
   return all.first(std::min(limit, all.size()));
 }
 
 Json defectsJson(const MeshDefects& defects, std::size_t limit) {
   Json json = Json::object();
   for (std::size_t i = 0; i < kDefectKinds; ++i) {
-    Json places = Json::array();
+    Json positions = Json::array();
     for (const Defect& defect : firstOf(defects, DefectKind(i), limit)) {
-      Json place = {{"faces", defect.faces}};
-      if (isPlace(defect))
-        place["at"] = vectorJson(defect.ends[0]);
+      Json position = {{"faces", defect.faces}};
+      if (isPoint(defect))
+        position["at"] = vectorJson(defect.ends[0]);
       else
-        place["edge"] = {vectorJson(defect.ends[0]), vectorJson(defect.ends[1])};
-      places.push_back(std::move(place));
+        position["edge"] = {vectorJson(defect.ends[0]), vectorJson(defect.ends[1])};
+      positions.push_back(std::move(position));
     }
-    json[kKinds[i].json] = {{"count", defects.counts[i]}, {"places", std::move(places)}};
+    json[kKinds[i].json] = {{"count", defects.counts[i]}, {"places", std::move(positions)}};
   }
   json["crossings"]["all"] = defects.allCrossings;
-  json["crossings"]["within_parts"] = defects.crossingsWithinParts;
+  json["crossings"]["within_parts"] = defects.crossingsWithinComponents;
   return json;
 }
 
 Json verdictJson(const MeshReport& report, const MeshDefects& defects) {
   return {{"closed", report.closed()},
           {"orientable", defects.orientable},
-          {"self_folding", defects.crossingsWithinParts > 0},
-          {"parts_overlap", defects.count(DefectKind::crossing) > defects.crossingsWithinParts}};
+          {"self_folding", defects.crossingsWithinComponents > 0},
+          {"parts_overlap", defects.count(DefectKind::crossing) > defects.crossingsWithinComponents}};
 }
 
 Json checkJson(const SignCheck& check) {
-  Json json{{"places", check.places}, {"nearer_than", check.nearest}, {"near", check.tooNear}, {"wrong", check.wrong}};
-  if (check.wrong > 0) json["worst"] = {{"at", vectorJson(check.worst)}, {"distance", check.depth}};
+  Json json{{"places", check.points}, {"nearer_than", check.tolerance}, {"near", check.tooNear}, {"wrong", check.wrong}};
+  if (check.wrong > 0) json["worst"] = {{"at", vectorJson(check.worst)}, {"distance", check.worstDistance}};
   return json;
 }
 
-Json repairJson(const RepairedMesh& mended, const std::string& file) {
+Json repairJson(const RepairedMesh& repairedMesh, const std::string& file) {
   return {{"output", file},
-          {"turned_faces", mended.turnedFaces},
-          {"turned_patches", mended.turnedPatches},
-          {"left_edges", mended.leftEdges},
-          {"mesh", meshJson(file, mended.imported.report)}};
+          {"turned_faces", repairedMesh.reversedFaces},
+          {"turned_patches", repairedMesh.reversedPatches},
+          {"left_edges", repairedMesh.imported.report.inconsistentEdges},
+          {"mesh", meshJson(file, repairedMesh.imported.report)}};
 }
 
 std::string verdictText(const MeshReport& report, const MeshDefects& defects) {
   std::string text = report.closed() ? "closed, " : "not closed, ";
-  text += defects.orientable ? "orientable, " : "one-sided: no turning of faces makes them agree, ";
-  if (defects.count(DefectKind::crossing) == 0) return text + "does not meet itself";
-  if (defects.crossingsWithinParts == 0) return text + "parts pass through each other";
-  text += "folds into itself";
-  return defects.count(DefectKind::crossing) > defects.crossingsWithinParts
-             ? text + ", and parts pass through each other"
+  text += defects.orientable ? "orientable, " : "one-sided: no orientation of the faces is consistent, ";
+  if (defects.count(DefectKind::crossing) == 0) return text + "does not intersect itself";
+  if (defects.crossingsWithinComponents == 0) return text + "parts intersect each other";
+  text += "intersects itself";
+  return defects.count(DefectKind::crossing) > defects.crossingsWithinComponents
+             ? text + ", and parts intersect each other"
              : text;
 }
 
-std::string placeText(const Defect& defect, const Box& mesh) {
+std::string positionText(const Defect& defect, const Box& mesh) {
   const std::string from = vectorText(defect.ends[0], mesh);
-  return isPlace(defect) ? from : from + " to " + vectorText(defect.ends[1], mesh);
+  return isPoint(defect) ? from : from + " to " + vectorText(defect.ends[1], mesh);
 }
 
-/// A row for each kind that there is, with its first places.
+/// Prints one row for each kind of defect that occurs, with its first positions.
 std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t limit) {
   std::string text;
   for (std::size_t i = 0; i < kDefectKinds; ++i) {
@@ -143,10 +144,10 @@ std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t
     if (DefectKind(i) == DefectKind::crossing)
       row =
           (defects.allCrossings ? "" : "at least ") + row + (defects.counts[i] == 1 ? " pair" : " pairs") + " of faces";
-    std::string places;
+    std::string positions;
     for (const Defect& defect : firstOf(defects, DefectKind(i), limit))
-      places += (places.empty() ? ", as at " : "; ") + placeText(defect, mesh);
-    text += summaryRow(kKinds[i].text, row + places);
+      positions += (positions.empty() ? ", as at " : "; ") + positionText(defect, mesh);
+    text += summaryRow(kKinds[i].text, row + positions);
   }
   return text;
 }
@@ -154,41 +155,42 @@ std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t
 std::string spacingText(const std::string& surface, const TriangleMesh& mesh) {
   const double spacing = coordinateSpacing(surface, mesh);
   if (spacing == 0) return "";
-  return summaryRow("coordinates", fmt::format("kept {} apart by the reader", shortNumber(spacing)));
+  return summaryRow("coordinates", fmt::format("the reader stores them in steps of {}", shortNumber(spacing)));
 }
 
 std::string checkText(const SignCheck& check) {
   std::string text = summaryRow(
-      "sign checked", fmt::format("at {} places, {} of them nearer than {} to the surface", grouped(check.places),
-                                  grouped(check.tooNear), shortNumber(check.nearest)));
+      "sign checked", fmt::format("at {} points, {} of them nearer than {} to the surface", grouped(check.points),
+                                  grouped(check.tooNear), shortNumber(check.tolerance)));
   return text + summaryRow("wrong signs",
                            check.wrong == 0
                                ? "0"
                                : fmt::format("{}, the farthest from the surface at {}, {} away", grouped(check.wrong),
-                                             vectorText(check.worst), shortNumber(check.depth)));
+                                             vectorText(check.worst), shortNumber(check.worstDistance)));
 }
 
-std::string repairText(const RepairedMesh& mended, const std::string& file) {
-  const MeshReport& report = mended.imported.report;
+std::string repairText(const RepairedMesh& repairedMesh, const std::string& file) {
+  const MeshReport& report = repairedMesh.imported.report;
   std::string done;
   const auto add = [&](std::size_t count, const std::string& what) {
     if (count > 0) done += (done.empty() ? "" : "; ") + what;
   };
-  const std::size_t dropped = report.degenerateFaces + report.duplicateFaces;
-  add(dropped, fmt::format("dropped {}", countOf(dropped, "face", "faces")));
+  const std::size_t removed = report.degenerateFaces + report.duplicateFaces;
+  add(removed, fmt::format("removed {}", countOf(removed, "face", "faces")));
   add(report.flippedFaces, fmt::format("flipped {}", countOf(report.flippedFaces, "edge", "edges")));
-  add(mended.turnedFaces, fmt::format("turned {} as most of what hangs together with them looks",
-                                      countOf(mended.turnedFaces, "face", "faces")));
-  add(mended.turnedPatches,
-      fmt::format("turned {} that looked inwards", countOf(mended.turnedPatches, "patch", "patches")));
-  add(report.turned, "turned the whole mesh");
+  add(repairedMesh.reversedFaces,
+      fmt::format("reversed {} against most of their component", countOf(repairedMesh.reversedFaces, "face", "faces")));
+  add(repairedMesh.reversedPatches,
+      fmt::format("reversed {} that faced inward", countOf(repairedMesh.reversedPatches, "patch", "patches")));
+  add(report.reversed, "reversed the whole mesh");
   std::string text = summaryRow("repaired", done.empty() ? "nothing to do" : done);
-  if (mended.leftEdges > 0)
-    text += summaryRow("left", countOf(mended.leftEdges, "edge", "edges") + " of surfaces that have one side only");
+  if (repairedMesh.imported.report.inconsistentEdges > 0)
+    text +=
+        summaryRow("left", countOf(repairedMesh.imported.report.inconsistentEdges, "edge", "edges") + " of surfaces that have one side only");
   return text + summaryRow("written", printable(file) + ": " + closednessText(report));
 }
 
-/// Draws the mesh with its defects.
+/// Draws the mesh with its defects into the file of the argument `picture`.
 void drawPicture(Session& session, const Arguments& arguments, const Inspected& found) {
   const render::SurfacePicture look = cameraPicture(arguments);
   render::MeshPicture picture{look.camera, look.width, look.height, look.samples, !arguments.given("camera")};
@@ -201,7 +203,8 @@ void drawPicture(Session& session, const Arguments& arguments, const Inspected& 
   savePng(drawMesh(make, found.imported.mesh, found.defects, picture), arguments.text("picture"));
 }
 
-/// Draws it, if that is asked for. What it failed with, to be thrown once all the rest is told.
+/// Draws the picture where one is asked for. Returns the error of a failed picture, which the caller throws after
+/// printing all other results.
 std::exception_ptr tryPicture(Session& session, const Arguments& arguments, const Inspected& found) {
   try {
     if (arguments.given("picture")) drawPicture(session, arguments, found);
@@ -215,7 +218,7 @@ void checkMesh(const Arguments& arguments) {
   const bool draws = arguments.given("picture");
   requireOwner(arguments, "seed", "check-sign", arguments.given("check-sign"));
   requireOwner(arguments, "up", "picture", draws);
-  for (const char* name : kLooks) requireOwner(arguments, name, "picture", draws);
+  for (const char* name : kCameraParameters) requireOwner(arguments, name, "picture", draws);
   if (!draws) return;
   const std::string file = arguments.text("picture");
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
@@ -223,116 +226,137 @@ void checkMesh(const Arguments& arguments) {
   backend(arguments);
 }
 
-void runMesh(Session& session, const Arguments& arguments) {
-  const std::string surface = arguments.text("mesh");
-  if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
-  if (arguments.given("picture")) checkWritable(arguments.text("picture"));
-  const Inspected found = inspected(session, arguments);
+/// The results of one call of the command.
+struct MeshResults {
+  Inspected found;
+  std::optional<RepairedMesh> repairedMesh = {};
+  bool isDrawn = false;
+};
+
+Json resultsJson(const MeshResults& results, const Arguments& arguments) {
+  const Inspected& found = results.found;
   const MeshReport& report = found.imported.report;
-  std::optional<RepairedMesh> mended;
-  if (arguments.given("repair")) {
-    mended = repaired(found.imported);
-    saveMesh(mended->imported.mesh, arguments.text("repair"));
-  }
-  const std::exception_ptr undrawn = tryPicture(session, arguments, found);
-  const bool drawn = arguments.given("picture") && !undrawn;
-  if (session.wantsJson(arguments)) {
-    Json json = meshJson(surface, report);
-    json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
-    json["verdict"] = verdictJson(report, found.defects);
-    json["defects"] = defectsJson(found.defects, placesWanted(arguments, kPlacesInJson));
-    json["sign"] = {{"by", insideTestName(found.choice.insideTest)}, {"because", found.choice.reason}};
-    if (found.choice.place) json["sign"]["at"] = vectorJson(*found.choice.place);
-    if (found.check) json["sign_check"] = checkJson(*found.check);
-    if (mended) json["repair"] = repairJson(*mended, arguments.text("repair"));
-    if (drawn) json["picture"] = arguments.text("picture");
-    printJson(session.console().out, json);
-  } else {
-    session.console().out << meshText(printable(surface), report) << spacingText(surface, found.imported.mesh)
-                          << defectsText(found.defects, report.box, placesWanted(arguments, kPlacesInText))
-                          << summaryRow("verdict", verdictText(report, found.defects))
-                          << summaryRow("sign", insideTestName(found.choice.insideTest) + ": " +
-                                                    reasonText(found.choice, report.box))
-                          << (found.check ? checkText(*found.check) : "")
-                          << (mended ? repairText(*mended, arguments.text("repair")) : "")
-                          << (drawn ? summaryRow("picture", printable(arguments.text("picture"))) : "");
-  }
-  if (undrawn) std::rethrow_exception(undrawn);
-  if (found.check && found.check->wrong > 0)
-    throw Failed(fmt::format("{}: {} of {} signs are wrong", surface, found.check->wrong, found.check->places));
+  const std::string surface = arguments.text("mesh");
+  Json json = meshJson(surface, report);
+  json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
+  json["verdict"] = verdictJson(report, found.defects);
+  json["defects"] = defectsJson(found.defects, positionLimit(arguments, kPositionsInJson));
+  json["sign"] = {{"by", insideTestName(found.choice.insideTest)}, {"because", found.choice.reason}};
+  if (found.choice.position) json["sign"]["at"] = vectorJson(*found.choice.position);
+  if (found.check) json["sign_check"] = checkJson(*found.check);
+  if (results.repairedMesh) json["repair"] = repairJson(*results.repairedMesh, arguments.text("repair"));
+  if (results.isDrawn) json["picture"] = arguments.text("picture");
+  return json;
 }
 
-/// As of `render`, but for what camera and target mean.
+std::string resultsText(const MeshResults& results, const Arguments& arguments) {
+  const Inspected& found = results.found;
+  const MeshReport& report = found.imported.report;
+  const std::string surface = arguments.text("mesh");
+  std::string text = meshText(printable(surface), report) + spacingText(surface, found.imported.mesh);
+  text += defectsText(found.defects, report.box, positionLimit(arguments, kPositionsInText));
+  text += summaryRow("verdict", verdictText(report, found.defects));
+  text += summaryRow("sign", insideTestName(found.choice.insideTest) + ": " + reasonText(found.choice, report.box));
+  if (found.check) text += checkText(*found.check);
+  if (results.repairedMesh) text += repairText(*results.repairedMesh, arguments.text("repair"));
+  if (results.isDrawn) text += summaryRow("picture", printable(arguments.text("picture")));
+  return text;
+}
+
+void runMesh(Session& session, const Arguments& arguments) {
+  if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
+  if (arguments.given("picture")) checkWritable(arguments.text("picture"));
+  MeshResults results{.found = inspected(session, arguments)};
+  if (arguments.given("repair")) {
+    results.repairedMesh = repaired(results.found.imported);
+    saveMesh(results.repairedMesh->imported.mesh, arguments.text("repair"));
+  }
+  const std::exception_ptr pictureError = tryPicture(session, arguments, results.found);
+  results.isDrawn = arguments.given("picture") && !pictureError;
+  if (session.wantsJson(arguments))
+    printJson(session.console().out, resultsJson(results, arguments));
+  else
+    session.console().out << resultsText(results, arguments);
+  if (pictureError) std::rethrow_exception(pictureError);
+  const std::optional<SignCheck>& check = results.found.check;
+  if (check && check->wrong > 0)
+    throw Failed(fmt::format("{}: {} of {} signs are wrong", arguments.text("mesh"), check->wrong, check->points));
+}
+
+const Command kMesh = {
+    .name = "mesh",
+    .summary = "Find the defects of a mesh and how its inside is decided; repair and draw it.",
+    .help =
+        "Prints counts after welding equal positions, parts, volume, area, box, and the triangles that were removed or "
+        "reversed on import. Then it lists defects with their positions: edges that are open, shared by more than two "
+        "faces, or run along in the same direction by both of their faces, so that one face is reversed; vertices at "
+        "which surfaces touch; and faces that intersect others, decided without rounding. The last line names the "
+        "inside test that 'hpsdf build' would choose (--sign auto), with the reason.\n"
+        "\n"
+        "--repair writes the cleaned mesh with consistent orientations: each face is oriented like most faces of its "
+        "component, and closed parts outward, except cavities. It closes no holes and removes no intersections; "
+        "--sign winding works with both.\n"
+        "\n"
+        "--picture draws the mesh: clay from outside, blue from inside, pale red where faces intersect others. Defects "
+        "have colours of their own; small ones are ringed, hidden ones dashed.\n"
+        "\n"
+        "--check-sign compares the sign with the winding number, summed over all faces, at random points: half of them "
+        "in and around the mesh's box, half close to its faces. The exit status is 1 where the sign is wrong farther "
+        "from the surface than a millionth of the mesh's longest side.",
+    .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json",
+                 "hpsdf mesh chair.obj --picture defects.png --view corner",
+                 "hpsdf mesh chair.obj --repair repaired.obj", "hpsdf mesh bunny.obj --check-sign 100000"},
+    .action = runMesh,
+    .check = checkMesh};
+
+const std::vector<Parameter> kMeshParameters = {
+    {.name = "mesh",
+     .type = ParameterType::text,
+     .help = "Mesh file or builtin:SHAPE.",
+     .valueName = "MESH",
+     .positional = true,
+     .need = Need::always},
+    {.name = "repair",
+     .type = ParameterType::outputPath,
+     .help = "Writes the repaired mesh, with all digits of its coordinates.",
+     .valueName = "FILE.obj|FILE.ply"},
+    {.name = "picture",
+     .type = ParameterType::outputPath,
+     .help = "Draws the mesh with its defects.",
+     .valueName = "FILE.png"},
+    {.name = "places",
+     .type = ParameterType::wholeNumber,
+     .help = "Greatest number of positions to list for each kind of defect. When left out, 3, or 100 with json.",
+     .minimum = 0,
+     .maximum = 1e6},
+    {.name = "check-sign",
+     .type = ParameterType::wholeNumber,
+     .help = "Compares signs at this number of random points. Each takes about 15 ns a face.",
+     .valueName = "POINTS",
+     .minimum = 1,
+     .maximum = 1e9}};
+
+/// Returns the camera parameters of `render`, with the defaults that fit a mesh.
 std::vector<Parameter> meshLookParameters(const Registry& registry) {
-  std::vector<Parameter> parameters = lookParameters(registry);
+  std::vector<Parameter> parameters = cameraParameters(registry);
   parameters.push_back(*findParameter(registry.command("render"), "up"));
   Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
   camera.help =
-      "Azimuth and elevation in degrees, and the eye's distance from the mesh's middle in diagonals of a cube around "
-      "it. When left out, 30 and 20 degrees, as near as shows the whole mesh.";
+      "Azimuth and elevation in degrees, and the distance of the eye from the middle of the mesh in diagonals of a "
+      "cube "
+      "around it. When left out, 30 and 20 degrees, at the distance that just shows the whole mesh.";
   camera.defaultText.clear();
   std::ranges::find(parameters, "target", &Parameter::name)->help =
-      "The point in the picture's middle, which the camera circles; the mesh's middle when left out. With a small "
-      "distance in camera, a close look at a defect.";
+      "Point in the middle of the picture, around which the camera turns; the middle of the mesh when left out. A "
+      "small "
+      "distance in camera shows a defect from nearby.";
   return parameters;
 }
 
 }  // namespace
 
 Command meshCommand(const Registry& registry) {
-  Command command{
-      .name = "mesh",
-      .summary = "Tell what is wrong with a mesh, where, and how its inside is told; mend and draw it.",
-      .help =
-          "Counts after welding equal positions, parts, volume, area, box, and what was dropped or turned on import. "
-          "Then what a solid's surface would not have, with places: edges that are open, shared by more than two faces "
-          "or run the same way by both of theirs, so that one looks the wrong way; vertices in which surfaces touch; "
-          "and where faces meet others that are no neighbours, or neighbours beyond what they share, decided without "
-          "rounding. And the sign that 'hpsdf build' would take by itself (--sign auto), with the reason.\n"
-          "\n"
-          "--repair writes the mesh as it was cleaned, its faces turned so that inside and outside are told "
-          "consistently: the way of most of what hangs together with them, and closed parts outwards, but for "
-          "cavities. It closes no holes and cuts no folds, which --sign winding can do with.\n"
-          "\n"
-          "--picture draws it: clay from outside, blue from behind, pale red where faces meet others, defects in "
-          "colours of their own, small ones in rings, hidden ones dashed.\n"
-          "\n"
-          "--check-sign compares the sign with the winding number summed over all faces, at random places: half "
-          "of them in and around the mesh's box, half close to its faces. Exit status 1 where one is wrong that is "
-          "farther from the surface than a millionth of the mesh's longest side.",
-      .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json",
-                   "hpsdf mesh chair.obj --picture defects.png --view corner",
-                   "hpsdf mesh chair.obj --repair mended.obj", "hpsdf mesh bunny.obj --check-sign 100000"},
-      .parameters = {{.name = "mesh",
-                      .type = ParameterType::text,
-                      .help = "Mesh file or builtin:SHAPE.",
-                      .valueName = "MESH",
-                      .positional = true,
-                      .need = Need::always},
-                     {.name = "repair",
-                      .type = ParameterType::outputPath,
-                      .help = "Write the mended mesh there, with all digits of its coordinates.",
-                      .valueName = "FILE.obj|FILE.ply"},
-                     {.name = "picture",
-                      .type = ParameterType::outputPath,
-                      .help = "Draw the mesh with its defects.",
-                      .valueName = "FILE.png"},
-                     {.name = "places",
-                      .type = ParameterType::wholeNumber,
-                      .help = "So many places at most of each kind of defect; when left out, 3, or 100 with json.",
-                      .minimum = 0,
-                      .maximum = 1e6},
-                     {.name = "check-sign",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Compare signs at so many random places: some 15 ns for each and each face.",
-                      .valueName = "PLACES",
-                      .minimum = 1,
-                      .maximum = 1e9},
-                     seedParameter()},
-      .action = runMesh,
-      .check = checkMesh};
-  std::ranges::move(meshLookParameters(registry), std::back_inserter(command.parameters));
-  return command;
+  return withParameters(kMesh, {kMeshParameters, {seedParameter()}, meshLookParameters(registry)});
 }
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// What is wrong with a mesh, where, and how its inside is told. Takes parameters of `render`, which is there already.
+/// Returns the command `mesh`. It shares parameters of `render`, which the registry must contain already.
 Command meshCommand(const Registry& registry);
 
 }  // namespace hpsdf::app

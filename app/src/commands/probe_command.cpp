@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "commands/shared_parameters.h"
 #include "hpsdf/detail/line.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/line_plot.h"
@@ -40,7 +41,7 @@ Line lineOf(const Field& field, const Arguments& arguments) {
   return line;
 }
 
-/// At the line's samples; empty where the exact distance is not at hand.
+/// Returns the exact distances at the line's samples; empty where the exact distance is unknown.
 std::vector<double> exactValues(Session& session, const Arguments& arguments, const Line& line) {
   const std::string mesh = arguments.textOr("mesh", "");
   if (mesh.empty() && !session.knowsExact()) return {};
@@ -51,7 +52,7 @@ std::vector<double> exactValues(Session& session, const Arguments& arguments, co
   return values;
 }
 
-/// A row a sample; empty fields for what is not there.
+/// Writes one row a sample. Columns of unknown values are empty.
 void writeTable(const Line& line, std::span<const double> exact, const std::string& file) {
   OutputFile out(file);
   out.write("t,s,x,y,z,cell,degree,depth,value,exact,error,gx,gy,gz,slope_along\n");
@@ -110,7 +111,7 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
 void runProbe(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const bool picture = isPicture(file);
-  if (!picture && arguments.given("size")) throw Error(fmt::format("{}: a table has no size; leave it out", file));
+  if (!picture && arguments.given("size")) throw Error(fmt::format("{}: only a plot has a size; leave it out", file));
   checkWritable(file);
   useField(session, arguments);
   const Field& field = session.current().field;
@@ -125,69 +126,81 @@ void runProbe(Session& session, const Arguments& arguments) {
   report(session, arguments, line, exact);
 }
 
+const Command kProbe = {
+    .name = "probe",
+    .summary = "Sample a field along a line: distance, error, gradient, cells.",
+    .help =
+        "Evaluates the field at points of a line and draws or writes what it finds. Use it to see jumps between cells "
+        "and errors in detail.\n"
+        "\n"
+        "A .png shows curves over the distance along the line: f and the exact distance; the error f − exact on its "
+        "own "
+        "scale, or, where the exact distance is unknown, the jumps of f at borders of cells; the length of the "
+        "gradient "
+        "and its component along the line; bands of the cells' degrees and depths. Thin lines mark borders of cells. "
+        "Each leaf's polynomial is drawn up to both of its ends, so that a jump is a vertical step.\n"
+        "\n"
+        "A .csv has one row for each sample: the parameter t from 0 to 1, the distance s along the line, the point, "
+        "its "
+        "cell, degree and depth, f, the exact distance, the error, the gradient, and its component along the line. At "
+        "a "
+        "border of two cells two rows with the same t hold the limits from both sides. Outside the domain, f is the "
+        "continuation of the field and the columns of the cell are empty. The columns of the exact distance are empty "
+        "where it is unknown.",
+    .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
+                 "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
+                 "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
+    .action = runProbe};
+
+const std::vector<Parameter> kProbeParameters = {
+    {.name = "from",
+     .type = ParameterType::numbers,
+     .help = "Start of the line.",
+     .valueName = "X,Y,Z",
+     .unit = "world units",
+     .counts = {3},
+     .need = Need::always,
+     .group = "The line"},
+    {.name = "to",
+     .type = ParameterType::numbers,
+     .help = "End of the line.",
+     .valueName = "X,Y,Z",
+     .unit = "world units",
+     .counts = {3},
+     .need = Need::always,
+     .group = "The line"},
+    {.name = "output",
+     .type = ParameterType::outputPath,
+     .help = "File to write: *.png for a plot, *.csv for the samples.",
+     .alias = 'o',
+     .need = Need::always},
+    {.name = "samples",
+     .type = ParameterType::wholeNumber,
+     .help = "Number of evenly spaced samples, both ends included. Each border of cells adds two.",
+     .defaultText = "1000",
+     .minimum = 2,
+     .maximum = 1000000,
+     .group = "The line"},
+    {.name = "mesh",
+     .type = ParameterType::text,
+     .help = "The surface from which the field was made. It gives the exact distance; without it there are no errors. "
+             "It is known already for built-in and analytic shapes, and for a mesh that was built in the same script.",
+     .defaultText = "",
+     .valueName = "MESH"},
+    {.name = "size",
+     .type = ParameterType::size,
+     .help = "Size of the plot.",
+     .defaultText = "1280x720",
+     .unit = "pixels",
+     .minimum = 16,
+     .maximum = 16384,
+     .whole = true,
+     .counts = {2}}};
+
 }  // namespace
 
 void addProbeCommand(Registry& registry) {
-  registry.add(
-      {.name = "probe",
-       .summary = "Follow a field along a line: distance, error, gradient, cells.",
-       .help =
-           "The clearest view of a jump. As a picture, curves over the distance along the line: f and the exact "
-           "distance; the error f − exact on a scale of its own, or, where the exact distance is not at hand, the "
-           "jumps of f at the borders of cells; the gradient's length and its component along the line; bands of the "
-           "cells' degrees and depths. Borders of cells are thin lines through all of them, and jumps are upright "
-           "steps: each leaf's own polynomial is followed up to both of its ends.\n"
-           "\n"
-           "As CSV, a row a sample: t from 0 to 1, the distance s along the line, the point, its cell, degree and "
-           "depth, f, the exact distance, the error, the gradient, and its component along the line. At the border "
-           "of two cells there are two rows of one t, the limits from either side. Where the line is outside of the "
-           "domain, f is the field's continuation and the cell's columns are empty; so are those of the exact "
-           "distance where it is not known.",
-       .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
-                    "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
-                    "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
-       .parameters = {fieldParameter(),
-                      {.name = "from",
-                       .type = ParameterType::numbers,
-                       .help = "Where the line begins.",
-                       .valueName = "X,Y,Z",
-                       .unit = "world units",
-                       .counts = {3},
-                       .need = Need::always},
-                      {.name = "to",
-                       .type = ParameterType::numbers,
-                       .help = "Where it ends.",
-                       .valueName = "X,Y,Z",
-                       .unit = "world units",
-                       .counts = {3},
-                       .need = Need::always},
-                      {.name = "output",
-                       .type = ParameterType::outputPath,
-                       .help = "*.png or *.csv.",
-                       .alias = 'o',
-                       .need = Need::always},
-                      {.name = "samples",
-                       .type = ParameterType::wholeNumber,
-                       .help = "Evenly spaced ones, the ends among them; two more at each border of cells.",
-                       .defaultText = "1000",
-                       .minimum = 2,
-                       .maximum = 1000000},
-                      {.name = "mesh",
-                       .type = ParameterType::text,
-                       .help = "What the field was made from, for the exact distance. A built-in or analytic shape "
-                               "and a mesh that was built in the same script are known; without, there is none.",
-                       .defaultText = "",
-                       .valueName = "MESH"},
-                      {.name = "size",
-                       .type = ParameterType::size,
-                       .help = "Of the whole picture.",
-                       .defaultText = "1280x720",
-                       .unit = "pixels",
-                       .minimum = 16,
-                       .maximum = 16384,
-                       .whole = true,
-                       .counts = {2}}},
-       .action = runProbe});
+  registry.add(withParameters(kProbe, {{fieldParameter()}, kProbeParameters}));
 }
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds probe.
+/// Adds the command `probe`.
 void addProbeCommand(Registry& registry);
 
 }  // namespace hpsdf::app

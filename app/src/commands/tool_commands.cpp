@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "commands/mesh_command.h"
+#include "commands/shared_parameters.h"
 #include "console/machine.h"
 #include "console/version.h"
-#include "construction/building.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/exact_distance.h"
@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// Counts the scripts now running, and the setting of --json for what they call.
+/// Counts a running script, and sets --json for the commands that it runs.
 class ScriptScope {
  public:
   ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {
@@ -51,7 +51,8 @@ void runRun(Session& session, const Arguments& arguments) {
   if (lines.empty()) words.erase(words.begin());
   const std::string text = lines.empty() ? readTextFile(name) : fmt::format("{}", fmt::join(lines, "\n"));
   if (session.scriptDepth >= kMostNestedScripts)
-    throw Error(fmt::format("{}: more than {} scripts run each other; does one run itself?", name, kMostNestedScripts));
+    throw Error(fmt::format("{}: more than {} scripts run each other; check whether one runs itself", name,
+                            kMostNestedScripts));
   const auto calls = parseScript(session.registry(), name, text, parseVariables(words));
   const ScriptScope scope(session, session.wantsJson(arguments));
   runScript(session, calls);
@@ -96,55 +97,76 @@ void runShapes(Session& session, const Arguments& arguments) {
   }
 }
 
-void runDoctor(Session& session, const Arguments& arguments) {
-  std::string renderer;
-  std::string problem;
+/// Facts about the machine and the build.
+struct Diagnosis {
+  std::string renderer = {};
+  std::string rendererProblem = {};  ///< why there is no renderer; "" where there is one
+  std::vector<std::pair<std::string, bool>> simd = simdOfCpu();
+  unsigned threads = std::thread::hardware_concurrency();
+  bool hasMeshReader = false;  ///< a process of its own reads mesh files
+};
+
+Diagnosis diagnosed(const Session& session, const Arguments& arguments) {
+  Diagnosis found{.hasMeshReader = !session.console().meshReader.empty()};
   try {
-    renderer = render::glDescription(glChoice(arguments));
+    found.renderer = render::glDescription(glChoice(arguments));
   } catch (const Error& error) {
-    problem = error.what();
+    found.rendererProblem = error.what();
   }
-  const auto simd = simdOfCpu();
-  const unsigned threads = std::thread::hardware_concurrency();
-  const bool readsApart = !session.console().meshReader.empty();
-  if (session.wantsJson(arguments)) {
-    Json instructions = Json::object();
-    for (const auto& [name, there] : simd) instructions[name] = there;
-    return printJson(session.console().out, {{"version", versionText()},
-                                             {"compiler", compilerText()},
-                                             {"renderer", problem.empty() ? Json(renderer) : Json()},
-                                             {"renderer_problem", problem.empty() ? Json() : Json(problem)},
-                                             {"processor", processorName()},
-                                             {"simd", instructions},
-                                             {"simd_used", instructionSet()},
-                                             {"threads", threads},
-                                             {"mesh_reader", readsApart ? "own process" : "this process"},
-                                             {"assimp", assimpVersion()}});
-  }
-  std::vector<std::string> present;
-  for (const auto& [name, there] : simd)
-    if (there) present.push_back(name);
-  const auto row = [&](std::string_view name, const std::string& text) {
-    session.console().out << fmt::format("{:<10} {}\n", name, text);
+  return found;
+}
+
+Json doctorJson(const Diagnosis& found) {
+  Json instructions = Json::object();
+  for (const auto& [name, supported] : found.simd) instructions[name] = supported;
+  const bool draws = found.rendererProblem.empty();
+  return {{"version", versionText()},
+          {"compiler", compilerText()},
+          {"renderer", draws ? Json(found.renderer) : Json()},
+          {"renderer_problem", draws ? Json() : Json(found.rendererProblem)},
+          {"processor", processorName()},
+          {"simd", instructions},
+          {"simd_used", instructionSet()},
+          {"threads", found.threads},
+          {"mesh_reader", found.hasMeshReader ? "own process" : "this process"},
+          {"assimp", assimpVersion()}};
+}
+
+std::string doctorText(const Diagnosis& found) {
+  std::vector<std::string> supported;
+  for (const auto& [name, isSupported] : found.simd)
+    if (isSupported) supported.push_back(name);
+  std::string text;
+  const auto row = [&](std::string_view name, const std::string& value) {
+    text += fmt::format("{:<10} {}\n", name, value);
   };
   row("version", versionText());
   row("compiler", compilerText());
-  row("renderer", problem.empty() ? renderer : "none: " + problem);
+  row("renderer", found.rendererProblem.empty() ? found.renderer : "none: " + found.rendererProblem);
   row("processor", processorName());
-  row("SIMD",
-      fmt::format("{}; exact distances use {}",
-                  present.empty() ? "the baseline" : fmt::format("{}", fmt::join(present, ", ")), instructionSet()));
-  row("threads", std::to_string(threads));
-  row("meshes", readsApart ? "each file is read by a process of its own, with limits of time and memory"
-                           : "files are read by this process, without limits: it cannot be started again");
+  row("SIMD", fmt::format("{}; exact distances use {}",
+                          supported.empty() ? "the baseline" : fmt::format("{}", fmt::join(supported, ", ")),
+                          instructionSet()));
+  row("threads", std::to_string(found.threads));
+  row("meshes", found.hasMeshReader ? "each file is read by a process of its own, with limits of time and memory"
+                                    : "files are read by this process, without limits: it cannot be started again");
   row("assimp", assimpVersion());
+  return text;
+}
+
+void runDoctor(Session& session, const Arguments& arguments) {
+  const Diagnosis found = diagnosed(session, arguments);
+  if (session.wantsJson(arguments)) return printJson(session.console().out, doctorJson(found));
+  session.console().out << doctorText(found);
 }
 
 void runHelp(Session& session, const Arguments& arguments) {
   std::ostream& out = session.console().out;
   const Registry& registry = session.registry();
   if (session.wantsJson(arguments)) return printJson(out, commandsJson(registry));
-  out << (arguments.has("command") ? commandHelp(registry.command(arguments.text("command"))) : overviewHelp(registry));
+  const HelpDetail detail = arguments.flag("all") ? HelpDetail::all : HelpDetail::common;
+  out << (arguments.has("command") ? commandHelp(registry.command(arguments.text("command")), detail)
+                                   : overviewHelp(registry));
 }
 
 void runDocs(Session& session, const Arguments& arguments) {
@@ -165,107 +187,131 @@ void runDocs(Session& session, const Arguments& arguments) {
   out << fmt::format("{}: {} commands\n", file, count);
 }
 
-Command runCommand() {
-  return {
-      .name = "run",
-      .summary = "Run a script, or script lines given with -e.",
-      .help =
-          "A script holds a command a line: verb value key=value …, with \"quotes\", # comments, and ; between "
-          "commands of one line. $name or ${name} is replaced by the value given as name=value after the "
-          "script. The whole script is checked before its first command runs; a mistake stops with "
-          "file:line:column. Relative paths start at the current folder. docs/scripts.md tells more.",
-      .examples = {"hpsdf run pictures.hps mesh=bunny.obj", "hpsdf run -e 'build builtin:torus; slice output=x.png'"},
-      .parameters = {{.name = "script",
-                      .type = ParameterType::text,
-                      .help = "The script's file, then name=value for its variables. With -e only variables.",
-                      .valueName = "SCRIPT name=value",
-                      .positional = true,
-                      .repeatable = true},
-                     {.name = "execute",
-                      .type = ParameterType::text,
-                      .help = "A line of script instead of a file.",
-                      .valueName = "LINE",
-                      .alias = 'e',
-                      .repeatable = true}},
-      .action = runRun,
-      .takesVariables = true};
-}
+const Command kRun = {
+    .name = "run",
+    .summary = "Run a script, or script lines given with -e.",
+    .help =
+        "A script holds one command a line: verb value key=value …, with \"quotes\", # comments, and ; between "
+        "commands "
+        "of one line. $name or ${name} is replaced by the value that is given as name=value after the script. Relative "
+        "paths start at the current folder.\n"
+        "\n"
+        "The whole script is checked before its first command runs. A mistake ends it with file:line:column. "
+        "docs/scripts.md is the manual.",
+    .examples = {"hpsdf run pictures.hps mesh=bunny.obj", "hpsdf run -e 'build builtin:torus; slice output=x.png'"},
+    .parameters = {{.name = "script",
+                    .type = ParameterType::text,
+                    .help = "File of the script, then name=value for each variable. With -e only variables.",
+                    .valueName = "SCRIPT name=value",
+                    .positional = true,
+                    .repeatable = true},
+                   {.name = "execute",
+                    .type = ParameterType::text,
+                    .help = "Runs this script line instead of a file.",
+                    .valueName = "LINE",
+                    .alias = 'e',
+                    .repeatable = true}},
+    .action = runRun,
+    .takesVariables = true};
 
-Command doctorCommand() {
-  auto parameters = backendParameters();
+const Command kShapes = {
+    .name = "shapes",
+    .summary = "List the built-in shapes and their parameters.",
+    .help =
+        "Commands accept builtin:NAME, the triangle mesh of a shape, and analytic:NAME, its distance in closed form.",
+    .examples = {"hpsdf shapes", "hpsdf build analytic:sphere,radius=0.5 -o sphere.hpsdf"},
+    .action = runShapes};
+
+const Command kDoctor = {
+    .name = "doctor",
+    .summary = "Show the machine and the libraries that the program uses.",
+    .help =
+        "Prints the OpenGL device that would draw pictures, or why there is none; the instruction sets of the "
+        "processor; the number of threads; whether a process of its own reads mesh files; and versions. Use it when "
+        "pictures fail, and attach its output to bug reports.",
+    .examples = {"hpsdf doctor", "hpsdf doctor --gl software"},
+    .action = runDoctor};
+
+const Command kSet = {
+    .name = "set",
+    .summary = "Set variables for the rest of the script.",
+    .help =
+        "In the following lines, $name or ${name} is replaced by the value. It overrides a value that was given on "
+        "the command line.",
+    .examples = {"set size=640x360 mesh=bunny.obj"},
+    .parameters = {{.name = "assignments",
+                    .type = ParameterType::text,
+                    .help = "Variables and their values.",
+                    .valueName = "name=value",
+                    .positional = true,
+                    .repeatable = true,
+                    .need = Need::always}},
+    .action = runSet,
+    .scriptOnly = true,
+    .takesVariables = true,
+    .definesVariables = true};
+
+const Command kInclude = {
+    .name = "include",
+    .summary = "Insert the lines of another script.",
+    .help =
+        "The lines of the included script see the variables of the lines above, and variables that they set are "
+        "valid in the lines below. The file is read and checked together with the script, before any command runs. "
+        "A relative name starts at the folder of the including script.",
+    .examples = {"include settings.hps"},
+    .parameters = {{.name = "script",
+                    .type = ParameterType::path,
+                    .help = "File of the script.",
+                    .valueName = "SCRIPT",
+                    .positional = true,
+                    .need = Need::always}},
+    .action = runInclude,
+    .scriptOnly = true,
+    .includesScript = true};
+
+const Command kHelp = {
+    .name = "help",
+    .summary = "Explain the program or a command.",
+    .help = "Without a command it prints an overview.",
+    .examples = {"hpsdf help", "hpsdf help build", "hpsdf help build --all"},
+    .parameters = {{.name = "command",
+                    .type = ParameterType::text,
+                    .help = "Command to explain.",
+                    .valueName = "COMMAND",
+                    .positional = true},
+                   {.name = "all",
+                    .type = ParameterType::flag,
+                    .help = "Explains the advanced options of the command too, as 'hpsdf COMMAND --help-all' does.",
+                    .defaultText = "false"}},
+    .action = runHelp};
+
+const Command kDocs = {
+    .name = "docs",
+    .summary = "Write the reference of all commands as a Markdown page.",
+    .help =
+        "The page docs/commands.md describes commands, parameters, ranges and defaults of this version of the "
+        "program.",
+    .examples = {"hpsdf docs -o docs/commands.md"},
+    .parameters = {{.name = "output",
+                    .type = ParameterType::outputPath,
+                    .help = "File to write; standard output when left out.",
+                    .alias = 'o'}},
+    .action = runDocs};
+
+std::vector<Parameter> doctorParameters() {
+  std::vector<Parameter> parameters = backendParameters();
   std::erase_if(parameters, [](const Parameter& parameter) { return parameter.name == "cpu"; });
-  return {.name = "doctor",
-          .summary = "Tell what this program runs on: renderer, SIMD, threads.",
-          .help =
-              "The OpenGL device that pictures would be drawn with, or why there is none; instruction sets of the "
-              "processor; threads; whether mesh files are read by a process of their own; versions.",
-          .examples = {"hpsdf doctor", "hpsdf doctor --gl software"},
-          .parameters = std::move(parameters),
-          .action = runDoctor};
+  return parameters;
 }
 
 }  // namespace
 
 void addToolCommands(Registry& registry) {
-  registry.add(runCommand());
+  registry.add(kRun);
   registry.add(meshCommand(registry));
-  registry.add({.name = "shapes",
-                .summary = "List the built-in shapes and their parameters.",
-                .help = "builtin:NAME is a shape's triangle mesh, analytic:NAME its distance in closed form.",
-                .examples = {"hpsdf shapes", "hpsdf build analytic:sphere,radius=0.5 -o sphere.hpsdf"},
-                .action = runShapes});
-  registry.add(doctorCommand());
-  registry.add({.name = "set",
-                .summary = "Give variables a value for the rest of the script.",
-                .help = "$name or ${name} stands for the value in the lines below. A value given here wins over one "
-                        "given on the command line.",
-                .examples = {"set size=640x360 mesh=bunny.obj"},
-                .parameters = {{.name = "assignments",
-                                .type = ParameterType::text,
-                                .help = "What to set.",
-                                .valueName = "name=value",
-                                .positional = true,
-                                .repeatable = true,
-                                .need = Need::always}},
-                .action = runSet,
-                .scriptOnly = true,
-                .takesVariables = true,
-                .definesVariables = true});
-  registry.add({.name = "include",
-                .summary = "The lines of another script, as if they stood here.",
-                .help = "They see the variables of the lines above, and what they set holds for the lines below. The "
-                        "file is read and checked with the script, before anything runs. A relative name starts at the "
-                        "folder of the script that includes it.",
-                .examples = {"include settings.hps"},
-                .parameters = {{.name = "script",
-                                .type = ParameterType::path,
-                                .help = "The script's file.",
-                                .valueName = "SCRIPT",
-                                .positional = true,
-                                .need = Need::always}},
-                .action = runInclude,
-                .scriptOnly = true,
-                .includesScript = true});
-  registry.add({.name = "help",
-                .summary = "Explain the program or a command.",
-                .help = "Without a command, an overview.",
-                .examples = {"hpsdf help", "hpsdf help build"},
-                .parameters = {{.name = "command",
-                                .type = ParameterType::text,
-                                .help = "The command to explain.",
-                                .valueName = "COMMAND",
-                                .positional = true}},
-                .action = runHelp});
-  registry.add({.name = "docs",
-                .summary = "Write the reference of all commands, a Markdown page.",
-                .help = "docs/commands.md is that page: commands, parameters, ranges and defaults as this program has "
-                        "them.",
-                .examples = {"hpsdf docs -o docs/commands.md"},
-                .parameters = {{.name = "output",
-                                .type = ParameterType::outputPath,
-                                .help = "File to write; standard output when left out.",
-                                .alias = 'o'}},
-                .action = runDocs});
+  registry.add(kShapes);
+  registry.add(withParameters(kDoctor, {doctorParameters()}));
+  for (const Command& command : {kSet, kInclude, kHelp, kDocs}) registry.add(command);
 }
 
 }  // namespace hpsdf::app

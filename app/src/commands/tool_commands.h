@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds run, set, include, mesh, shapes, doctor, help, docs.
+/// Adds the commands run, set, include, mesh, shapes, doctor, help and docs.
 void addToolCommands(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -1,14 +1,14 @@
 #include "commands/verify_command.h"
 
-// verify: how wrong a field is, measured; with thresholds it is a gate.
-
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/reference_surface.h"
 #include "explorer/view_state.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/face_steps.h"
@@ -31,53 +31,50 @@ struct Verified {
   Verification figures;
   const Jumps& jumps;
   FaceSteps steps;
-  double diagonal;  ///< of the domain
+  double diagonal;  ///< length of the domain's diagonal
 };
 
-/// A figure that may be limited by an option.
+/// A figure that an option limits.
 struct Threshold {
   const char* option;
-  const char* figure;
+  const char* figure;  ///< name of the figure in messages
   const char* help;
-  bool counts;
+  bool counts;  ///< the figure is a number of points
   double (*value)(const Verified&);
 };
 
-const std::vector<Threshold>& thresholds() {
-  static const std::vector<Threshold> list = {
-      {"max-rms", "the RMS error over uniform points", "RMS error over uniform points.", false,
-       [](const Verified& v) { return v.figures.uniform.error.rms; }},
-      {"max-near-rms", "the RMS error near the surface", "RMS error over points near the surface.", false,
-       [](const Verified& v) { return v.figures.nearSurface.error.rms; }},
-      {"max-error", "the greatest error", "Greatest error of all points.", false,
-       [](const Verified& v) { return std::max(v.figures.uniform.error.max, v.figures.nearSurface.error.max); }},
-      {"max-violations", "the number of points beyond their cell's bound",
-       "Number of points at which the error or the slope is beyond the bound that the field keeps for their cell.",
-       true, [](const Verified& v) { return double(v.figures.bounds->violations); }},
-      {"max-mismatches", "the number of wrong signs beyond the sign bound",
-       "Number of points farther from the surface than the sign bound at which the field has the wrong sign.", true,
-       [](const Verified& v) {
-         return double(v.figures.uniform.signs.beyondCount + v.figures.nearSurface.signs.beyondCount);
-       }},
-      {"max-angle", "the angle between gradients near the surface",
-       "Angle in degrees between the gradients that 99 % of the points near the surface do not exceed.", false,
-       [](const Verified& v) { return v.figures.nearSurface.gradient.angle99Degrees; }},
-      {"max-slope", "the greatest slope", "Greatest length of the gradient: beyond 1, sphere tracing may step too far.",
-       false,
-       [](const Verified& v) {
-         return std::max(v.figures.uniform.gradient.maxLength, v.figures.nearSurface.gradient.maxLength);
-       }},
-      {"max-jump", "the greatest jump of the value", "Greatest jump of the value between two cells.", false,
-       [](const Verified& v) { return v.jumps.value.max; }},
-      {"max-step", "the greatest step of the value across a face, of the domain's diagonal,",
-       "Greatest step of the value from one side of a face to the other, as a part of the domain's diagonal.", false,
-       [](const Verified& v) { return v.steps.value / v.diagonal; }},
-      {"max-gradient-step", "the greatest step of the gradient across a face",
-       "Greatest step of the gradient from one side of a face to the other.", false,
-       [](const Verified& v) { return v.steps.gradient; }},
-  };
-  return list;
-}
+constexpr Threshold kThresholds[] = {
+    {"max-rms", "the RMS error over uniform points", "Limits the RMS error over uniform points.", false,
+     [](const Verified& v) { return v.figures.uniform.error.rms; }},
+    {"max-near-rms", "the RMS error near the surface", "Limits the RMS error over points near the surface.", false,
+     [](const Verified& v) { return v.figures.nearSurface.error.rms; }},
+    {"max-error", "the greatest error", "Limits the greatest error of all points.", false,
+     [](const Verified& v) { return std::max(v.figures.uniform.error.max, v.figures.nearSurface.error.max); }},
+    {"max-violations", "the number of points beyond their cell's bound",
+     "Limits the number of points at which the error or the slope exceeds the bound of their cell. The field must hold "
+     "bounds ('build --bounds').",
+     true, [](const Verified& v) { return double(v.figures.bounds->violations); }},
+    {"max-mismatches", "the number of wrong signs beyond the sign bound",
+     "Limits the number of wrong signs farther from the surface than the sign bound.", true,
+     [](const Verified& v) { return double(v.figures.uniform.signs.defects + v.figures.nearSurface.signs.defects); }},
+    {"max-angle", "the angle between gradients near the surface",
+     "Limits the angle in degrees between the gradients that 99 % of the points near the surface do not exceed.", false,
+     [](const Verified& v) { return v.figures.nearSurface.gradient.angle99Degrees; }},
+    {"max-slope", "the greatest slope",
+     "Limits the greatest length of the gradient. Beyond 1, sphere tracing may step too far.", false,
+     [](const Verified& v) {
+       return std::max(v.figures.uniform.gradient.maxLength, v.figures.nearSurface.gradient.maxLength);
+     }},
+    {"max-jump", "the greatest jump of the value", "Limits the greatest jump of the value between two cells.", false,
+     [](const Verified& v) { return v.jumps.value.max; }},
+    {"max-step", "the greatest step of the value across a face, of the domain's diagonal,",
+     "Limits the greatest step of queried values from one side of a face to the other, as a fraction of the domain's "
+     "diagonal.",
+     false, [](const Verified& v) { return v.steps.value / v.diagonal; }},
+    {"max-gradient-step", "the greatest step of the gradient across a face",
+     "Limits the greatest step of queried gradients from one side of a face to the other.", false,
+     [](const Verified& v) { return v.steps.gradient; }},
+};
 
 struct Judgement {
   const Threshold& threshold;
@@ -89,7 +86,7 @@ struct Judgement {
 
 std::vector<Judgement> judged(const Verified& verified, const Arguments& arguments) {
   std::vector<Judgement> judgements;
-  for (const Threshold& threshold : thresholds())
+  for (const Threshold& threshold : kThresholds)
     if (arguments.given(threshold.option))
       judgements.push_back({threshold, arguments.number(threshold.option), threshold.value(verified)});
   return judgements;
@@ -104,8 +101,6 @@ std::string exceeded(const std::vector<Judgement>& judgements) {
   return text;
 }
 
-// as JSON
-
 Json errorJson(const ErrorFigures& error) {
   Json percentiles = Json::object();
   for (const auto& [percent, value] : error.percentiles) percentiles[fmt::format("{}", percent)] = value;
@@ -118,9 +113,9 @@ Json sampleJson(const SampleFigures& figures) {
           {"error", errorJson(error)},
           {"signs",
            {{"mismatches", signs.mismatches},
-            {"deepest", signs.deepest},
-            {"bound", signs.beyond},
-            {"beyond_bound", signs.beyondCount}}},
+            {"deepest", signs.farthest},
+            {"bound", signs.threshold},
+            {"beyond_bound", signs.defects}}},
           {"gradient",
            {{"mean_length", gradient.meanLength},
             {"length_error_rms", gradient.lengthErrorRms},
@@ -180,8 +175,6 @@ Json verifiedJson(const Verified& verified, const std::vector<Judgement>& judgem
           {"thresholds", limits}};
 }
 
-// as text
-
 std::string tableRow(const std::string& label, const std::string& uniform, const std::string& near) {
   return fmt::format("  {:<34} {:>14} {:>18}\n", label, uniform, near);
 }
@@ -203,9 +196,9 @@ std::string figureTable(const Verification& figures) {
                 [at = percent](F f) { return f.error.percentiles.at(at); });
   text += row("greatest error", [](F f) { return f.error.max; });
   text += countRow("wrong signs", [](F f) { return f.signs.mismatches; });
-  text += row("  the farthest from the surface", [](F f) { return f.signs.deepest; });
-  text += countRow(fmt::format("  farther than {}", shortNumber(figures.uniform.signs.beyond)),
-                   [](F f) { return f.signs.beyondCount; });
+  text += row("  the farthest from the surface", [](F f) { return f.signs.farthest; });
+  text += countRow(fmt::format("  farther than {}", shortNumber(figures.uniform.signs.threshold)),
+                   [](F f) { return f.signs.defects; });
   text += row("angle of gradients, mean [degrees]", [](F f) { return f.gradient.meanAngleDegrees; });
   text += row("  99 % are within", [](F f) { return f.gradient.angle99Degrees; });
   text += row("  greatest", [](F f) { return f.gradient.maxAngleDegrees; });
@@ -247,7 +240,7 @@ std::string verifiedText(const Verified& verified) {
   if (figures.uniform.signs.mismatches + figures.nearSurface.signs.mismatches > 0)
     text += fmt::format(
         "  a sign must be wrong between the surface and the field's own zero; farther away than {} it is a defect\n",
-        shortNumber(figures.uniform.signs.beyond));
+        shortNumber(figures.uniform.signs.threshold));
   if (const auto& bounds = figures.bounds)
     text += fmt::format("bounds: {} in the median of {} cells, where the worst point's error is {}; {}\n",
                         shortNumber(bounds->medianBound), grouped(bounds->cells), shortNumber(bounds->medianWorst),
@@ -256,13 +249,13 @@ std::string verifiedText(const Verified& verified) {
   return text + worstText(figures.worst);
 }
 
-/// Lines that take the explorer to each of the worst points, and a picture of each.
+/// Writes a script that moves the explorer to each of the worst points and takes a picture of it.
 std::string worstScript(const Session& session, const Verified& verified, const std::filesystem::path& file) {
   const bool loaded = session.current().fileBytes.has_value();
   std::string text =
       fmt::format("# The worst points of {} against {}, worst first.\n", verified.field, verified.surface);
   text += loaded ? fmt::format("load {}\n", scriptWord(verified.field))
-                 : "# to be included where that field is the current one\n";
+                 : "# Include this script where that field is the current one.\n";
   text += fmt::format("show slice\ncolor error mesh={}\n", scriptWord(verified.surface));
   int rank = 0;
   for (const WorstPoint& at : verified.figures.worst) {
@@ -292,8 +285,7 @@ void runVerify(Session& session, const Arguments& arguments) {
     throw Error(fmt::format("max-violations: {} keeps no bounds: build it with --bounds", current.name));
   const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(session.console(), surface, current.field.metadata().source);
-  if (!arguments.flag("any-mesh"))
-    refuseForeign(current, reference, surface, ", or --any-mesh to compare them all the same");
+  if (!arguments.flag("any-mesh")) refuseForeign(current, reference, surface, ", or --any-mesh to compare them anyway");
   const VerifyOptions options = verifyOptions(arguments);
   Verification figures = withProgress(session.console(), [&](const Progress& progress) {
     return verify(current.field, {*reference.distance, reference.normal, reference.mesh}, options, progress);
@@ -317,83 +309,95 @@ void runVerify(Session& session, const Arguments& arguments) {
     throw Failed(fmt::format("{}: {}", current.name, problem));
 }
 
+const Command kVerify = {
+    .name = "verify",
+    .summary = "Measure the errors of a field, and fail where they exceed limits.",
+    .help =
+        "Compares the field with the exact distance of MESH at random points, half of them uniform in the domain and "
+        "half near the surface. It prints RMS, mean, percentiles and maximum of the error; wrong signs; the angle "
+        "between the gradients, the length of the field's gradient and slopes; the jumps between cells; steps of the "
+        "queried values across faces, at as many random points of faces; and the worst points, one of each cell. "
+        "Lengths are in the field's units. The same seed gives the same figures for any number of threads.\n"
+        "\n"
+        "Use it to judge a field, or with limits (--max-…) in automated tests: where a limit is exceeded, all figures "
+        "are written, the last line names the limit, and the exit status is 1. A mesh from which the field was not "
+        "made "
+        "is refused.\n"
+        "\n"
+        "Signs between the surface and the field's zero level are always wrong. Only wrong signs farther from the "
+        "surface than the sign bound are defects; --max-mismatches counts these.",
+    .examples = {"hpsdf verify bunny.hpsdf bunny.obj",
+                 "hpsdf verify bunny.hpsdf bunny.obj --max-rms 5e-4 --max-error 0.02 --max-mismatches 0",
+                 "hpsdf verify torus.hpsdf --points 1e7 --band 0.05 --json",
+                 "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps"},
+    .action = runVerify};
+
+constexpr const char* kSampledPoints = "Sampled points";
+
+const std::vector<Parameter> kVerifyParameters = {
+    {.name = "near",
+     .type = ParameterType::number,
+     .help =
+         "Greatest distance of a near point from a random point of the surface. When left out, one hundredth of the "
+         "mesh's longest side.",
+     .unit = "world units",
+     .minimum = 0,
+     .minimumExcluded = true,
+     .group = kSampledPoints},
+    {.name = "band",
+     .type = ParameterType::number,
+     .help = "Restricts the uniform points to those within this distance of the surface. Use it for fields that were "
+             "built with a band.",
+     .unit = "world units",
+     .minimum = 0,
+     .minimumExcluded = true,
+     .group = kSampledPoints},
+    {.name = "sign-bound",
+     .type = ParameterType::number,
+     .help = "Distance from the surface beyond which a wrong sign is a defect. When left out, ten times the RMS error "
+             "near the surface.",
+     .unit = "world units",
+     .minimum = 0,
+     .minimumExcluded = true,
+     .group = "Limits"},
+    {.name = "worst",
+     .type = ParameterType::wholeNumber,
+     .help = "Number of worst points to list.",
+     .defaultText = "10",
+     .minimum = 0,
+     .maximum = 100000},
+    {.name = "script",
+     .type = ParameterType::outputPath,
+     .help =
+         "Writes a script, *.hps, that shows each of the worst points in the explorer. Run it from the same folder.",
+     .valueName = "FILE"},
+    {.name = "any-mesh",
+     .type = ParameterType::flag,
+     .help = "Accepts a mesh from which the field was not made, for instance a simplified one.",
+     .defaultText = "false"}};
+
+std::vector<Parameter> thresholdParameters() {
+  std::vector<Parameter> parameters;
+  for (const Threshold& threshold : kThresholds)
+    parameters.push_back({.name = threshold.option,
+                          .type = threshold.counts ? ParameterType::wholeNumber : ParameterType::number,
+                          .help = threshold.help,
+                          .minimum = 0,
+                          .maximum = threshold.counts ? std::optional(1e9) : std::nullopt,
+                          .group = "Limits"});
+  return parameters;
+}
+
 }  // namespace
 
 void addVerifyCommand(Registry& registry) {
-  Command command{
-      .name = "verify",
-      .summary = "Measure how wrong a field is, and fail where it is worse than allowed.",
-      .help =
-          "Random points, half of them uniform in the domain, half near the surface, with the field's value and the "
-          "exact distance of MESH: RMS, mean, percentiles and maximum of the difference; wrong signs; the angle "
-          "between the gradients and the length of the field's; slopes; the jumps between cells; as many random points "
-          "of faces again, with what queries answer on "
-          "either side; and the worst points, one of each cell. The same seed gives the same figures, whatever the "
-          "number of threads. Lengths are in the "
-          "field's units.\n"
-          "\n"
-          "Between the surface and the field's own zero signs are wrong by necessity. Only those farther from the "
-          "surface than the sign bound are a defect, and count for max-mismatches.\n"
-          "\n"
-          "Each --max-… is a threshold: when one is exceeded, all figures are written, the last line says which, and "
-          "the exit status is 1. MESH may be left out where the field was made from a built-in shape. A mesh that the "
-          "field was not made from is refused.",
-      .examples = {"hpsdf verify bunny.hpsdf bunny.obj",
-                   "hpsdf verify bunny.hpsdf bunny.obj --max-rms 5e-4 --max-error 0.02 --max-mismatches 0",
-                   "hpsdf verify torus.hpsdf --points 1e7 --band 0.05 --json",
-                   "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps"},
-      .parameters =
-          {fieldParameter(),
-           {.name = "mesh",
-            .type = ParameterType::text,
-            .help = "What the field was made from: mesh file, builtin:SHAPE or analytic:SHAPE.",
-            .valueName = "MESH",
-            .positional = true},
-           pointsParameter("How many points, of both kinds together.", "1000000", 2),
-           seedParameter(),
-           {.name = "near",
-            .type = ParameterType::number,
-            .help = "How far from a random point of the surface a near point may lie. When left out, a "
-                    "hundredth of the mesh's longest side.",
-            .unit = "world units",
-            .minimum = 0,
-            .minimumExcluded = true},
-           {.name = "band",
-            .type = ParameterType::number,
-            .help = "Look only so near to the surface: uniform points are those of the band.",
-            .unit = "world units",
-            .minimum = 0,
-            .minimumExcluded = true},
-           {.name = "sign-bound",
-            .type = ParameterType::number,
-            .help = "Farther from the surface than this a wrong sign is a defect. When left out, ten times "
-                    "the RMS error near the surface.",
-            .unit = "world units",
-            .minimum = 0,
-            .minimumExcluded = true},
-           {.name = "worst",
-            .type = ParameterType::wholeNumber,
-            .help = "How many of the worst points to list.",
-            .defaultText = "10",
-            .minimum = 0,
-            .maximum = 100000},
-           {.name = "script",
-            .type = ParameterType::outputPath,
-            .help = "A script to write, *.hps, which flies the explorer to each of them; to be run from this folder.",
-            .valueName = "FILE"},
-           {.name = "any-mesh",
-            .type = ParameterType::flag,
-            .help = "Compare with a mesh that the field was not made from.",
-            .defaultText = "false"},
-           threadsParameter("The figures are")},
-      .action = runVerify};
-  for (const Threshold& threshold : thresholds())
-    command.parameters.push_back({.name = threshold.option,
-                                  .type = threshold.counts ? ParameterType::wholeNumber : ParameterType::number,
-                                  .help = fmt::format("Threshold: {}", threshold.help),
-                                  .minimum = 0,
-                                  .maximum = threshold.counts ? std::optional(1e9) : std::nullopt});
-  registry.add(std::move(command));
+  Parameter points = pointsParameter("Number of random points, uniform and near ones counted alike.", "1000000", 2);
+  Parameter seed = seedParameter();
+  points.group = seed.group = kSampledPoints;
+  registry.add(withParameters(kVerify, {{fieldParameter(), surfaceParameter(), points, seed},
+                                        kVerifyParameters,
+                                        thresholdParameters(),
+                                        {threadsParameter("The figures are")}}));
 }
 
 }  // namespace hpsdf::app

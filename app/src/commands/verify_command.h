@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds verify.
+/// Adds the command `verify`.
 void addVerifyCommand(Registry& registry);
 
 }  // namespace hpsdf::app

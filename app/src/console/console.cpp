@@ -2,6 +2,7 @@
 
 #include <ostream>
 
+#include "hpsdf/error.h"
 #include "text/printable.h"
 
 namespace hpsdf::app {
@@ -12,6 +13,10 @@ void note(const Console& console, std::string_view text) {
 
 void warn(const Console& console, std::string_view text) {
   console.err << "hpsdf: warning: " << printable(text) << std::endl;
+}
+
+void requireWritten(const std::ostream& out) {
+  if (!out) throw Error("cannot write to standard output: its reader has gone, or the disk is full");
 }
 
 }  // namespace hpsdf::app

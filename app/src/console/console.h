@@ -1,5 +1,5 @@
 #pragma once
-// Where the program reads and writes, and who watches its long work.
+// The program's input and output, and the observer of its long work.
 
 #include <filesystem>
 #include <iosfwd>
@@ -8,32 +8,35 @@
 
 namespace hpsdf::app {
 
-/// Watches long work and may end it.
+/// Observes long work and can cancel it.
 class WorkListener {
  public:
   virtual ~WorkListener() = default;
-  /// As `Progress` has it: from any thread, by one at a time.
+  /// Receives progress as `Progress::report` does: from any thread, one call at a time.
   virtual void report(std::string_view task, double fraction) = 0;
-  /// Asked often, from any thread.
+  /// Is called often, from any thread; once it returns true, the work ends with `Cancelled`.
   virtual bool wantsCancel() = 0;
-  /// The work is over, whatever came of it.
+  /// Is called when the work has succeeded, failed or been cancelled.
   virtual void ended() = 0;
 };
 
-/// Where the program reads and writes: the process's own streams, or a test's.
+/// The streams that the program uses: those of the process, or those of a test.
 struct Console {
   std::istream& in;
   std::ostream& out;             ///< results
   std::ostream& err;             ///< progress, notes and warnings
-  bool redrawsProgress = false;  ///< err is a terminal: one line, drawn again and again
+  bool redrawsProgress = false;  ///< true where err is a terminal, on which one line of progress is redrawn
   WorkListener* listener = nullptr;
-  std::filesystem::path meshReader =
-      {};                 ///< program that mesh files are read by (mesh_process.h); empty: by this process
-  std::string work = {};  ///< what progress is told of, in front of it, where that is one of many
+  /// Program that reads mesh files in a process of its own (mesh_process.h); empty: this process reads them.
+  std::filesystem::path meshReader = {};
+  std::string work = {};  ///< prefix of progress messages that names the current one of many pieces of work
 };
 
-/// A line for the user, on any terminal, whatever a stranger's file or name holds.
+/// Writes one line to `err`. Control characters, which names from other people's files may contain, become blanks.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
+
+/// Throws `Error` where standard output could not be written.
+void requireWritten(const std::ostream& out);
 
 }  // namespace hpsdf::app

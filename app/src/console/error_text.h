@@ -5,8 +5,11 @@
 
 namespace hpsdf::app {
 
-/// What went wrong, in words for people: an `Error` speaks for itself; of a file that was removed or cannot be written
-/// while it is in use, which; that there is not enough memory; and that all else is a fault of the program.
+/// Describes an exception for users. An `Error` has its own message; errors of the file system get the file's name and
+/// a remedy, and lack of memory a remedy. Any other exception is called a fault of the program.
 std::string errorText(const std::exception& error);
+
+/// Returns "SUBJECT: MESSAGE", or the message alone where it names the subject already.
+std::string withSubject(const std::string& subject, const std::string& message);
 
 }  // namespace hpsdf::app

@@ -7,10 +7,11 @@
 
 namespace hpsdf::app {
 
-constexpr int kExitFailed = 1;        ///< an expectation, a comparison
-constexpr int kExitPartlyFailed = 3;  ///< some of many meshes
+constexpr int kExitFailed = 1;        ///< an expectation or a comparison failed
+constexpr int kExitPartlyFailed = 3;  ///< some meshes of a batch failed
 
-/// The call was right, but for what was to be found out, or for some of many: an exit status of its own rather than 2.
+/// Thrown where the input was correct but the result is negative: a comparison failed, or some meshes of a batch did.
+/// The exit status is `status` rather than 2, that of bad input.
 class Failed : public Error {
  public:
   explicit Failed(const std::string& message, int status = kExitFailed) : Error(message), status_(status) {}
@@ -20,11 +21,11 @@ class Failed : public Error {
   int status_;
 };
 
-/// Cancelled when some of the results were there already.
+/// Thrown where work was cancelled after some of its results were kept.
 class CancelledPartway : public Cancelled {
  public:
   explicit CancelledPartway(std::string kept) : kept_(std::move(kept)) {}
-  /// What stays, and how to go on.
+  /// Describes what is kept, and how to continue.
   const std::string& kept() const { return kept_; }
 
  private:

@@ -12,12 +12,12 @@ namespace hpsdf::app {
 namespace {
 
 std::atomic<int> guards = 0;
-std::atomic<bool> flag = false;
+std::atomic<bool> interruptedFlag = false;
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free,
-              "a signal handler may touch nothing else");
+              "a signal handler may use lock-free atomics only");
 
 void onInterrupt(int signal) {
-  if (guards > 0 && !flag.exchange(true)) return;
+  if (guards > 0 && !interruptedFlag.exchange(true)) return;
   OutputFile::removeUnfinished();
   constexpr std::string_view kMessage = "hpsdf: cancelled; nothing is half-written\n";
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
@@ -30,7 +30,7 @@ void installInterruptHandlers() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before = {};
     sigaction(signal, nullptr, &before);
-    if (before.sa_handler == SIG_IGN) continue;  // nohup and the like
+    if (before.sa_handler == SIG_IGN) continue;  // the caller ignores the signal, as nohup does
     struct sigaction action = {};
     action.sa_handler = onInterrupt;
     action.sa_flags = SA_RESTART;
@@ -40,11 +40,11 @@ void installInterruptHandlers() {
 }
 
 InterruptGuard::InterruptGuard() {
-  if (guards++ == 0) flag = false;
+  if (guards++ == 0) interruptedFlag = false;
 }
 
 InterruptGuard::~InterruptGuard() { --guards; }
 
-bool InterruptGuard::interrupted() { return flag.load(std::memory_order_relaxed); }
+bool InterruptGuard::interrupted() { return interruptedFlag.load(std::memory_order_relaxed); }
 
 }  // namespace hpsdf::app

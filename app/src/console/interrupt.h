@@ -2,11 +2,12 @@
 
 namespace hpsdf::app {
 
-/// From now on Ctrl-C, a hang-up or a request to terminate ends the process with no file half-written; within an
-/// `InterruptGuard` the first of them only sets a flag. Signals that the caller chose to ignore stay ignored.
+/// Installs handlers of SIGINT, SIGTERM and SIGHUP. They remove unfinished files and end the process; while an
+/// `InterruptGuard` lives, the first signal only sets a flag. Signals that the caller ignores stay ignored.
 void installInterruptHandlers();
 
-/// While one lives (they may be nested), work goes on after the first interruption, so that it can end by itself.
+/// While a guard lives, the first interruption does not end the process, so that the work can end in order. Guards may
+/// be nested.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -14,7 +15,7 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  /// From any thread.
+  /// True once a signal has arrived. Any thread may call it.
   static bool interrupted();
 };
 

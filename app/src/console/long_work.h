@@ -11,8 +11,8 @@
 
 namespace hpsdf::app {
 
-/// Runs work(progress) with a progress line on the console; Ctrl-C or the console's listener cancels it. Throws
-/// `Cancelled` then.
+/// Runs work(progress) with a progress line on the console and returns its result. Throws `Cancelled` after Ctrl-C or
+/// on request of the console's listener.
 template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;
@@ -34,7 +34,7 @@ auto withProgress(const Console& console, const Work& work) {
           [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
   };
   auto result = work(progress);
-  progress.pause();  // asked for in the very last moment
+  progress.throwIfCancelled();  // the request may come after the last check within `work`
   return result;
 }
 

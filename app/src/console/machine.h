@@ -1,5 +1,5 @@
 #pragma once
-// What this program runs on, for `doctor`.
+// Describes the machine and the build for `doctor`.
 
 #include <string>
 #include <utility>
@@ -7,7 +7,8 @@
 
 namespace hpsdf::app {
 
-/// Instruction sets beyond the baseline, widest last, and whether this processor has them. Empty where it is not x86.
+/// Lists the instruction sets beyond the baseline, widest last, and whether this processor has them. The list is empty
+/// on other architectures than x86.
 std::vector<std::pair<std::string, bool>> simdOfCpu();
 
 std::string processorName();

@@ -7,11 +7,12 @@
 
 namespace hpsdf::app {
 
-/// Makes room for a message on a terminal that shows progress.
+/// Erases the line of progress on a terminal, before a message is written.
 constexpr std::string_view kEraseLine = "\r\x1b[K";
 
-/// Shows the progress of an operation, once it has taken a moment: on a terminal one line that is drawn again and again
-/// and erased at the end, elsewhere a line then, at every further quarter, and after ten quiet seconds.
+/// Shows the progress of an operation that is not over at once. A terminal shows one line, which is redrawn and erased
+/// at the end; a log gets one line at first, one at each further quarter of the work and one after ten seconds without
+/// any.
 class ProgressLine {
  public:
   using Clock = std::chrono::steady_clock;
@@ -34,7 +35,7 @@ class ProgressLine {
   int lastQuarter_ = 0;
 };
 
-/// "48 s", "3 min 07 s", "2 h 05 min".
+/// Formats a duration as "48 s", "3 min 07 s" or "2 h 05 min".
 std::string durationText(double seconds);
 
 }  // namespace hpsdf::app

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// "hpsdf 0.1.0"
+/// Returns name and version of the program: "hpsdf 0.2.0".
 std::string versionText();
 
 }  // namespace hpsdf::app

@@ -39,11 +39,11 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kCommand = "__read-mesh";  // in no list: FILE SECONDS BYTES follow
+constexpr const char* kCommand = "__read-mesh";  // hidden command; FILE SECONDS BYTES follow
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
-constexpr auto kTick = std::chrono::milliseconds(50);  // how long Ctrl-C may go unnoticed
-constexpr double kQuietSeconds = 2;                    // a busy machine takes a moment to start a process
+constexpr auto kTick = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
+constexpr double kQuietSeconds = 2;                    // a busy machine starts a process slowly
 
 // An idle machine reads 20 MB a second and takes 4 to 9 bytes of memory for one of the file (docs/meshes.md).
 constexpr double kSeconds = 60;
@@ -51,7 +51,7 @@ constexpr double kBytesASecond = 2e6;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 constexpr std::uint64_t kMemoryAByte = 32;
 
-/// What the variable asks for.
+/// The number in an environment variable; nothing where it is unset. Throws `Error` for other texts.
 std::optional<double> numberOf(const char* variable) {
   const char* text = std::getenv(variable);
   if (text == nullptr || *text == '\0') return std::nullopt;
@@ -61,7 +61,7 @@ std::optional<double> numberOf(const char* variable) {
   return number;
 }
 
-/// posix_spawn's settings: what the other process finds open, and which signals it leaves to us.
+/// Settings of posix_spawn: the standard streams of the reading process, and the signals that it ignores.
 class SpawnSettings {
  public:
   explicit SpawnSettings(int output) {
@@ -71,7 +71,7 @@ class SpawnSettings {
     posix_spawn_file_actions_addopen(&actions_, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     sigset_t ours;
     sigemptyset(&ours);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ours, signal);  // Ctrl-C reaches both
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ours, signal);  // Ctrl-C reaches both processes; this one reacts
     posix_spawnattr_init(&attributes_);
     posix_spawnattr_setsigmask(&attributes_, &ours);
     posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
@@ -91,7 +91,7 @@ class SpawnSettings {
   posix_spawnattr_t attributes_;
 };
 
-/// waitpid, and once more where a signal came between.
+/// Calls waitpid again where a signal interrupts it.
 pid_t await(pid_t id, int& status, int options) {
   for (;;) {
     const pid_t ended = waitpid(id, &status, options);
@@ -99,7 +99,7 @@ pid_t await(pid_t id, int& status, int options) {
   }
 }
 
-/// The other process and the pipe from its standard output. Ends with this, if not before.
+/// The reading process and the pipe from its standard output. The destructor kills it if it still runs.
 class ReadingProcess {
  public:
   ReadingProcess(const fs::path& program, const fs::path& file, const ReadingLimits& limits) {
@@ -129,13 +129,13 @@ class ReadingProcess {
   ReadingProcess(const ReadingProcess&) = delete;
   ReadingProcess& operator=(const ReadingProcess&) = delete;
 
-  /// Waits a while for output; whether there is some, or its end.
+  /// Waits at most `kTick`. Returns true if there is output, or its end.
   bool hasOutput() const {
     pollfd stream = {output_, POLLIN, 0};
     return poll(&stream, 1, kTick.count()) > 0;
   }
 
-  /// What is there now, into `buffer`; empty at the end.
+  /// Reads the available output into `buffer`; the result is empty at the end of the output.
   std::span<const std::byte> read(std::span<std::byte> buffer) const {
     for (;;) {
       const ssize_t count = ::read(output_, buffer.data(), buffer.size());
@@ -144,7 +144,7 @@ class ReadingProcess {
     }
   }
 
-  /// The status with which it ended, if it has.
+  /// The exit status; nothing while the process runs.
   std::optional<int> ended() {
     int status = 0;
     if (await(id_, status, WNOHANG) == 0) return std::nullopt;
@@ -180,7 +180,7 @@ std::string endText(int status) {
   }
 }
 
-/// One reading from its start to its reply.
+/// The reading of one file from the start of the process to its reply.
 class Reading {
  public:
   Reading(const fs::path& program, const fs::path& file, const ReadingLimits& limits, const Progress& progress)
@@ -219,21 +219,21 @@ class Reading {
     }
   }
 
-  /// The limit holds for us, too: a small mesh takes less in its reader than what that had when the limit was set.
+  /// Applies the limit of memory to this process too: a reply may be long although its sender needed little memory.
   void expectWhole() {
     expected_ = replyBytes(bytes_);
     if (expected_ > limits_.bytes) throw tooLarge();
     bytes_.reserve(expected_);
   }
 
-  /// Between two pieces of work.
+  /// Checks for cancellation and the limit of time, and reports progress.
   void pause() const {
-    progress_.pause();
+    progress_.throwIfCancelled();
     const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
     if (elapsed > limits_.seconds)
       throw Error(fmt::format("{}: reading it takes more than {} s; check or export the file again, or set {} above {}",
                               file_.string(), limits_.seconds, kSecondsVariable, limits_.seconds));
-    if (elapsed > kQuietSeconds && progress_.report) progress_.report(task_, 0);  // how far it is nobody knows
+    if (elapsed > kQuietSeconds && progress_.report) progress_.report(task_, 0);  // the fraction is unknown
   }
 
   Error died() {
@@ -252,21 +252,21 @@ class Reading {
   Clock::time_point start_ = Clock::now();
   ReadingProcess process_;
   std::vector<std::byte> bytes_;
-  std::uint64_t expected_ = 0;  ///< 0 until it is known
+  std::uint64_t expected_ = 0;  ///< length of the reply; 0 until its header has arrived
 };
 
-// The other end
+// The reading process
 
 void toStandardOutput(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = write(STDOUT_FILENO, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) _exit(1);  // nobody listens any more
+    if (count <= 0) _exit(1);  // the other process has ended
     bytes = bytes.subspan(std::size_t(count));
   }
 }
 
-/// assimp would catch bad_alloc and call it damage, or go on with what it did not get.
+/// Ends the process at once: assimp would catch bad_alloc and report damage, or continue without the memory.
 void onMemoryOut() {
   writeOutOfMemory(toStandardOutput);
   _exit(0);
@@ -283,11 +283,11 @@ void limit(decltype(RLIMIT_CORE) resource, double most) {
 void confine(double seconds, [[maybe_unused]] double bytes) {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  prctl(PR_SET_DUMPABLE, 0);  // a limit does not hold for cores that go to a program
+  prctl(PR_SET_DUMPABLE, 0);  // the limit of core files does not hold for cores that are piped to a program
 #endif
   limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_CPU, std::ceil(seconds) + 1);  // should nobody be there any more to look at the clock
-#ifndef HPSDF_SANITIZED                       // a sanitizer takes terabytes of addresses
+  limit(RLIMIT_CPU, std::ceil(seconds) + 1);  // ends the process if its parent died
+#ifndef HPSDF_SANITIZED                       // a sanitizer reserves terabytes of address space
   limit(RLIMIT_DATA, bytes);
 #endif
   std::set_new_handler(onMemoryOut);
@@ -307,7 +307,7 @@ ReadingLimits readingLimits(const fs::path& file) {
 }
 
 fs::path ownProgram() {
-  constexpr const char* kLink = "/proc/self/exe";  // also when the file was replaced meanwhile
+  constexpr const char* kLink = "/proc/self/exe";  // it is valid even when the file has been replaced
   return access(kLink, X_OK) == 0 ? fs::path(kLink) : fs::path();
 }
 
@@ -334,11 +334,11 @@ int readForOtherProcess(std::span<const std::string> words) {
   if (!seconds || !bytes) return 2;
   confine(*seconds, *bytes);
   try {
-    // a thread's stack would count as memory
+    // The stacks of threads would count as memory.
     writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
   } catch (const Error& error) {
     writeRefusal(error.what(), toStandardOutput);
-  } catch (const std::bad_alloc&) {  // of who asks malloc, as Eigen does, past `onMemoryOut`
+  } catch (const std::bad_alloc&) {  // thrown by code that calls malloc, as Eigen does, and bypasses `onMemoryOut`
     writeOutOfMemory(toStandardOutput);
   } catch (const std::exception& error) {
     writeRefusal(fmt::format("{}: {} (this is a fault of the program)", words[1], error.what()), toStandardOutput);

@@ -1,6 +1,6 @@
 #pragma once
-// Mesh files are read by a process of their own, this program once more: what brings assimp down, or keeps it busy, is
-// an error of one line here.
+// Mesh files are read in a separate process, which is this program with another command: a file that crashes assimp, or
+// keeps it busy for too long, becomes an error of one line.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,29 +12,30 @@
 
 namespace hpsdf::app {
 
-/// What the reading of a file may take.
+/// Time and memory that reading a file may take.
 struct ReadingLimits {
-  double seconds = 0;       ///< by the clock on the wall
+  double seconds = 0;       ///< wall-clock time
   std::uint64_t bytes = 0;  ///< of memory
 };
 
-/// By the file's size (docs/meshes.md), or what HPSDF_IMPORT_SECONDS and HPSDF_IMPORT_BYTES ask for. Throws `Error` for
-/// values of these that are none.
+/// The limits for a file: by its size (docs/meshes.md), unless the environment variables HPSDF_IMPORT_SECONDS and
+/// HPSDF_IMPORT_BYTES set others. Throws `Error` where these are no numbers above 0.
 ReadingLimits readingLimits(const std::filesystem::path& file);
 
-/// What to run for this program itself; empty where the system does not tell.
+/// The file of the running program; empty where the system does not tell it.
 std::filesystem::path ownProgram();
 
-/// `importMesh` in a process of its own, which `program` (of this same build) is started as. Throws `Error` naming the
-/// file, also when that process dies, answers nonsense or passes a limit, and `Cancelled`. No process is left behind.
+/// Calls `importMesh` in a separate process of `program`, which must be of this same build. Throws `Error` naming the
+/// file, also when that process dies, sends a damaged reply or exceeds a limit, and `Cancelled`. No process is left
+/// behind.
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 
-/// Whether these words, the program's, ask for the other end of `importInSubprocess`.
+/// Tells whether the words of the command line start the reading process of `importInSubprocess`.
 bool asksForReading(std::span<const std::string> words);
 
-/// The other end: reads the mesh file that the words name, within their limits, and answers on standard output
-/// (mesh_reply.h). The exit status.
+/// Runs the reading process: reads the mesh file that the words name, within their limits, and replies on standard
+/// output (mesh_reply.h). Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

@@ -15,23 +15,23 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', 'm', 's', 'h'};
-constexpr std::uint64_t kMostVertices = std::uint64_t{1} << 32;  // by their indices
+constexpr std::uint64_t kMostVertices = std::uint64_t{1} << 32;  // indices have 32 bits
 constexpr std::uint64_t kMostTriangles = std::uint64_t{1} << 40;
 constexpr std::uint64_t kLongestText = 1 << 16;
 
 using Triangle = std::array<std::uint32_t, 3>;
 static_assert(sizeof(Vector3) == 3 * sizeof(double) && sizeof(Triangle) == 12, "arrays are sent as they lie in memory");
 
-/// Then follow the vertices, the triangles and the text. Both ends are one program on one machine: no version, no order
-/// of bytes.
+/// The beginning of a reply; vertices, triangles and text follow. It needs neither a version nor a byte order, since one
+/// program on one machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
-  std::uint64_t checksum = 0;  ///< of all that follows
+  std::uint64_t checksum = 0;  ///< of all bytes after it
   std::uint64_t kind = 0;
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   std::uint64_t textBytes = 0;
-  // of the report, what the mesh does not tell
+  // The following members of the report cannot be derived from the mesh.
   std::uint64_t parts = 0;
   std::uint64_t boundaryEdges = 0;
   std::uint64_t nonManifoldEdges = 0;
@@ -48,8 +48,8 @@ struct Header {
   double volume = 0;
   double area = 0;
 };
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 25 * 8, "no padding: every byte is told");
-static_assert(sizeof(MeshReport) == 27 * 8, "what is new in the report has to be sent, too");
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 25 * 8, "padding would be sent uninitialised");
+static_assert(sizeof(MeshReport) == 27 * 8, "a new member of the report must be sent too");
 
 constexpr std::size_t kUnsummedBytes = offsetof(Header, kind);
 
@@ -57,7 +57,7 @@ std::uint64_t checksumOf(std::uint64_t before, std::span<const std::byte> bytes)
   return XXH3_64bits_withSeed(bytes.data(), bytes.size(), before);
 }
 
-/// Piece after piece, so that nobody has to put them together first.
+/// Sums up piece by piece, so that the pieces need not be copied into one array.
 std::uint64_t checksumOf(const Header& header, std::span<const std::byte> vertices,
                          std::span<const std::byte> triangles, std::span<const std::byte> text) {
   std::uint64_t sum = checksumOf(0, std::as_bytes(std::span(&header, 1)).subspan(kUnsummedBytes));
@@ -98,7 +98,7 @@ MeshReport reportOf(const Header& header) {
     throw DamagedReply("a figure is not finite");
   return {.vertices = header.vertices,
           .faces = header.triangles,
-          .parts = header.parts,
+          .components = header.parts,
           .boundaryEdges = header.boundaryEdges,
           .nonManifoldEdges = header.nonManifoldEdges,
           .inconsistentEdges = header.inconsistentEdges,
@@ -110,7 +110,7 @@ MeshReport reportOf(const Header& header) {
           .duplicateFaces = header.duplicateFaces,
           .degeneratePosition = vectorOf(header.degeneratePosition),
           .duplicatePosition = vectorOf(header.duplicatePosition),
-          .turned = header.turned == 1,
+          .reversed = header.turned == 1,
           .volume = header.volume,
           .area = header.area,
           .box = {}};
@@ -169,7 +169,7 @@ void writeMesh(const ImportedMesh& imported, const ReplySink& sink) {
   header.kind = std::uint64_t(MeshReply::Kind::mesh);
   header.vertices = mesh.vertices.size();
   header.triangles = mesh.triangles.size();
-  header.parts = report.parts;
+  header.parts = report.components;
   header.boundaryEdges = report.boundaryEdges;
   header.nonManifoldEdges = report.nonManifoldEdges;
   header.inconsistentEdges = report.inconsistentEdges;
@@ -181,7 +181,7 @@ void writeMesh(const ImportedMesh& imported, const ReplySink& sink) {
   header.duplicateFaces = report.duplicateFaces;
   header.degeneratePosition = numbersOf(report.degeneratePosition);
   header.duplicatePosition = numbersOf(report.duplicatePosition);
-  header.turned = report.turned;
+  header.turned = report.reversed;
   header.volume = report.volume;
   header.area = report.area;
   write(header, std::as_bytes(std::span(mesh.vertices)), std::as_bytes(std::span(mesh.triangles)), {}, sink);

@@ -1,6 +1,6 @@
 #pragma once
-// What the process that reads a mesh file answers, as bytes (docs/meshes.md says why it is one of its own). Whoever
-// reads them trusts none: the file may have had its way with that process.
+// The reply of the process that reads a mesh file, as bytes; docs/meshes.md explains why it is a separate process. Its
+// reader trusts none of them, since the file may have corrupted that process.
 
 #include <cstddef>
 #include <cstdint>
@@ -17,33 +17,33 @@ namespace hpsdf::app {
 struct MeshReply {
   enum class Kind : std::uint64_t { mesh, refusal, outOfMemory };
   Kind kind = Kind::mesh;
-  ImportedMesh imported;  ///< of `mesh`; without a name
-  std::string refusal;    ///< of `refusal`: why, one line
+  ImportedMesh imported;  ///< for `mesh`: the mesh, without a name
+  std::string refusal;    ///< for `refusal`: the reason in one line
 };
 
-/// Bytes that are no reply. The message says how.
+/// Thrown for bytes that are no reply. The message tells why.
 class DamagedReply : public Error {
  public:
   using Error::Error;
 };
 
-/// Of every reply, at its beginning.
+/// Length of the header with which every reply begins.
 extern const std::size_t kReplyHeaderBytes;
 
-/// How long the reply is as a whole, by its first `kReplyHeaderBytes` or more. Throws `DamagedReply` when they are
-/// fewer, or belong to none.
+/// Length of the whole reply, by its first `kReplyHeaderBytes` bytes or more. Throws `DamagedReply` when there are fewer,
+/// or when they are no header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
-/// The reply that is all of `bytes`. Memory is taken only for what is there; a mesh has the indices, the finite
-/// coordinates, the box and the checksum that it should. Throws `DamagedReply`.
+/// Parses a whole reply. It allocates memory only for elements that are there, and checks a mesh's indices, coordinates,
+/// box and checksum. Throws `DamagedReply`.
 MeshReply parseReply(std::span<const std::byte> bytes);
 
-/// Takes the bytes of a reply, piece by piece.
+/// Receives the bytes of a reply in pieces.
 using ReplySink = std::function<void(std::span<const std::byte>)>;
 
-/// These take no memory, so that they can tell that there is none.
+/// Write a reply. They allocate no memory, so that they work when none is left.
 void writeMesh(const ImportedMesh& imported, const ReplySink& sink);
-void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< cut off where it is very long
+void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< a very long reason is cut off
 void writeOutOfMemory(const ReplySink& sink);
 
 }  // namespace hpsdf::app

@@ -41,7 +41,7 @@ Json meshJson(const std::string& name, const MeshReport& report) {
   return {{"name", name},
           {"vertices", report.vertices},
           {"faces", report.faces},
-          {"parts", report.parts},
+          {"parts", report.components},
           {"closed", report.closed()},
           {"boundary_edges", report.boundaryEdges},
           {"non_manifold_edges", report.nonManifoldEdges},
@@ -54,7 +54,7 @@ Json meshJson(const std::string& name, const MeshReport& report) {
           {"duplicate_faces", report.duplicateFaces},
           {"degenerate_at", report.degenerateFaces > 0 ? vectorJson(report.degeneratePosition) : Json()},
           {"duplicate_at", report.duplicateFaces > 0 ? vectorJson(report.duplicatePosition) : Json()},
-          {"turned", report.turned},
+          {"turned", report.reversed},
           {"volume", report.volume},
           {"area", report.area},
           {"box", boxJson(report.box)}};
@@ -63,7 +63,7 @@ Json meshJson(const std::string& name, const MeshReport& report) {
 std::string meshText(const std::string& name, const MeshReport& report) {
   std::string text = name + "\n";
   text += summaryRow("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
-  text += summaryRow("parts", grouped(report.parts));
+  text += summaryRow("parts", grouped(report.components));
   text += summaryRow("surface", closednessText(report));
   text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
   text += summaryRow("box", boxText(report.box));
@@ -81,12 +81,12 @@ std::string meshText(const std::string& name, const MeshReport& report) {
     text += summaryRow("flipped", countOf(report.flippedFaces, "edge of a face without area that holds its neighbours",
                                           "edges of faces without area that hold their neighbours"));
   dropped("duplicate", report.duplicateFaces, report.duplicatePosition);
-  if (report.turned) text += summaryRow("turned", "the whole mesh: its faces looked inward");
+  if (report.reversed) text += summaryRow("turned", "the whole mesh: its faces looked inward");
   return text;
 }
 
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh) {
-  return choice.place ? choice.reason + ", as at " + vectorText(*choice.place, mesh) : choice.reason;
+  return choice.position ? choice.reason + ", as at " + vectorText(*choice.position, mesh) : choice.reason;
 }
 
 std::string unsureSigns(const std::string& name, const MeshReport& report) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "hpsdf/detail/build_settings.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/field_summary.h"
@@ -15,14 +16,14 @@ namespace {
 
 constexpr double kBarHeight = 30, kReadoutHeight = 46, kColumnWidth = 268;
 constexpr double kSmallestCanvas = 160;
-constexpr double kDegreesAPixel = 0.4;
+constexpr double kDegreesPerPixel = 0.4;
 
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
 
-/// What a line sets, without the values, where it sets the same whatever was set before: two lines of one kind do what
-/// the second does alone. Empty for all others.
+/// The words of a line without their values. Of two lines of the same kind the second alone has the effect of both.
+/// Empty for a line whose effect depends on the state before.
 std::string kindOf(const std::string& line) {
   constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
                                    "arrows", "color",  "panel",   "worst", "settings"};
@@ -37,6 +38,7 @@ std::string kindOf(const std::string& line) {
   return kind;
 }
 
+/// `view` with the frame's size and the renderer of `frame`.
 ViewState withFrameOf(const ViewState& frame, ViewState view) {
   view.width = frame.width;
   view.height = frame.height;
@@ -44,7 +46,7 @@ ViewState withFrameOf(const ViewState& frame, ViewState view) {
   return view;
 }
 
-/// Each sample of a small picture as a square of the large one.
+/// Enlarges a picture by repeating its pixels.
 render::Image enlarged(const render::Image& image, int width, int height) {
   render::Image result(width, height, {});
   for (int y = 0; y < height; ++y)
@@ -83,7 +85,7 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  // a line that takes another's place leaves the history that it would have left alone
+  // A line that replaces the previous one starts from the history before the gesture.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
   undone_.resize(before_.undone);
   redone_ = before_.redone;
@@ -110,44 +112,31 @@ bool Explorer::redo() {
 std::map<std::string, std::string> Explorer::settingsOfField() const {
   const CurrentField& current = session_.current();
   const Field& field = current.field;
-  const FieldMetadata& made = field.metadata();
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
-  std::map<std::string, std::string> settings = {
-      {"target-error", fmt::format("{}", made.targetError)},
-      {"grid", fmt::format("{},{},{}", field.grid()[0], field.grid()[1], field.grid()[2])},
-      {"nearness", fmt::format("{}", made.nearness)},
-      {"nearness-kind", nearnessName(made.nearnessKind)},
-      {"estimator", estimatorName(made.estimator)},
-      {"criterion", criterionName(made.criterion)},
-      {"max-degree", fmt::format("{}", made.maxDegree)},
-      {"max-depth", fmt::format("{}", made.maxDepth)},
-      {"strategy", strategyName(made.strategy)},
-      {"quadrature", fmt::format("{}", made.quadrature)},
-      {"band", fmt::format("{}", made.band)}};
-  if (made.maxError > 0) settings["max-error"] = fmt::format("{}", made.maxError);
-  if (made.targetError == 0) {  // it ended at something else: at what was reached then
-    settings.erase("target-error");
-    if (made.maxError == 0) settings["target-error"] = fmt::format("{}", made.totalError);
+  BuildOptions built = settingsOf(field.data());
+  // A field without target ended by something else: then the error that it reached is the target.
+  if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
+  std::map<std::string, std::string> settings;
+  for (const BuildSetting& setting : buildSettings()) {
+    const std::string text = settingText(setting, built);
+    const bool isStored = setting.storedAt > 0 || setting.name == "grid";
+    if (setting.isOffered && !text.empty() && (isStored || text != defaultText(setting)))
+      settings[std::string(setting.name)] = text;
   }
-  if (!field.singlePrecision()) settings["coefficients"] = "double";
-  if (made.enriched) settings["enrich"] = "true";
-  if (!field.data().bounds.empty()) settings["bounds"] = "true";
-  const double width = field.data().blend;
-  settings["continuity"] = continuityName(field);
-  if (made.continuityWeight > 0) settings["continuity-weight"] = fmt::format("{}", made.continuityWeight);
-  if (width > 0) settings["blend-width"] = fmt::format("{}", width);
   const auto mesh = settings_.find("mesh");
   if (mesh != settings_.end() && mesh->second != current.madeFrom()) return settings;
   settings["domain"] = corner(field.domain().min()) + "," + corner(field.domain().max());
-  if (!made.source.normalization.isIdentity()) settings["normalize"] = "true";
+  if (!field.metadata().source.normalization.isIdentity()) settings["normalize"] = "true";
   return settings;
 }
 
 void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+  for (const BuildSetting& setting : buildSettings())
+    if (settings_.contains(std::string(setting.name))) settings.erase(std::string(setting.exclusive));
   for (const auto& [name, value] : settings_) settings[name] = value;
-  // chosen by name, a kind of continuity leaves out what belongs to the other
+  // A kind of continuity that was chosen by name drops the parameters of the other kind.
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
@@ -176,7 +165,7 @@ void Explorer::fieldChanged() {
   worst_.clear();
   const auto steps = session_.current().field.metadata().steps;
   if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
-  if (rebuilding_ == Rebuilding::no) settings_.clear();  // they were meant for another field
+  if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
   ++fields_;
 }
 
@@ -184,7 +173,7 @@ void Explorer::run(const std::string& line) {
   message.clear();
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
-  lastKind_.clear();  // no line takes the place of one that fails
+  lastKind_.clear();  // a line that fails is not replaced by the next
   running_ = true;
   try {
     runScript(session_, parseScript(session_.registry(), "panel", line, {}));
@@ -203,17 +192,17 @@ void Explorer::runAll(const std::vector<std::string>& commands) {
 }
 
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
-  // beforehand: whoever listens to long work may draw panels
+  // Long work must not start within a frame of the panels, because its listener draws frames too.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
   if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
-/// Until the panels show the present state: what they hold may depend on where things came to stand.
-void Explorer::settle() {
+/// Draws the panels until they show the present state: scroll positions, for instance, depend on the previous frame.
+void Explorer::settlePanels() {
   for (int i = 0; i < 3; ++i) {
-    std::vector<std::string> ignored;  // scrolling as far as there is something to scroll
+    std::vector<std::string> ignored;  // the panels ask to scroll back where a column became shorter
     drawPanels(nullptr, ignored);
   }
 }
@@ -225,7 +214,7 @@ void Explorer::inputWhileWorking(const Input& event) {
   if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
 }
 
-void Explorer::letGo() {
+void Explorer::releaseInput() {
   const auto act = [this](const Input& event) {
     try {
       input(event);
@@ -235,7 +224,7 @@ void Explorer::letGo() {
   for (int button = 0; button < 3; ++button)
     if (ui_.holds(button)) act({.kind = Input::Kind::release, .button = button});
   const auto pointer = ui_.pointer();
-  // a click on nothing
+  // A click outside of the frame closes open lists and text fields.
   act({.kind = Input::Kind::move, .at = {-1, -1}});
   act({.kind = Input::Kind::press});
   act({.kind = Input::Kind::release});
@@ -249,7 +238,7 @@ void Explorer::input(const Input& event) {
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
   runAll(commands);
-  // a list that opens needs to be drawn once before it takes input
+  // An open list must be drawn once before it takes input.
   std::vector<std::string> late;
   drawPanels(nullptr, late);
   runAll(late);
@@ -257,11 +246,44 @@ void Explorer::input(const Input& event) {
 }
 
 const std::map<std::string, Widget>& Explorer::widgets() {
-  settle();
+  settlePanels();
   return ui_.widgets();
 }
 
-/// What the mouse does over the picture, and keys that no field takes.
+/// The zoom of the slice, or the camera's distance, after the wheel was turned by notches away from the person.
+std::string Explorer::wheelCommand(double notches) const {
+  if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, notches));
+  const render::OrbitCamera& c = view_.camera;
+  return fmt::format("camera {},{},{:.5g}", c.azimuthDegrees, c.elevationDegrees,
+                     c.distance * std::pow(1.15, -notches));
+}
+
+/// The view after the mouse was dragged by dx and dy pixels.
+std::string Explorer::dragCommand(double dx, double dy) const {
+  const UiRect canvas = layoutOf(view_).canvas;
+  const double width = canvas.width(), height = canvas.height();
+  const Field& field = session_.current().field;
+  if (view_.slice) {
+    const render::SliceView plane =
+        render::sliceView(field, slicePicture(viewAtPress_, field), int(width), int(height));
+    const Vector3 target = plane.origin - plane.right * (dx / width) + plane.up * (dy / height);
+    return "plane target=" + vectorWord(target);
+  }
+  const render::OrbitCamera& c = viewAtPress_.camera;
+  if (*dragged_ == 0)
+    return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesPerPixel * dx, 0.1),
+                       std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
+  // Another button than the left one moves the target with the mouse. `scale` is half the picture's extent in the plane
+  // of the target, in world units.
+  const auto camera = render::cameraOf(c, field.domain(), int(width), int(height));
+  const double scale =
+      c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
+  const Vector3 target = c.target.value_or(field.domain().center()) +
+                         scale * (-camera.right * (2 * dx / width) + camera.up * (2 * dy / height));
+  return "camera target=" + vectorWord(target);
+}
+
+/// The command for the mouse over the picture, or for a key that no text field takes.
 std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
@@ -277,39 +299,13 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
     viewAtPress_ = view_;
   }
   if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
-  const double height = layout.canvas.height();
-  if (event.kind == Input::Kind::wheel && overPicture) {
-    if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, event.turn));
-    const render::OrbitCamera& c = view_.camera;
-    return fmt::format("camera {},{},{:.5g}", c.azimuthDegrees, c.elevationDegrees,
-                       c.distance * std::pow(1.15, -event.turn));
-  }
+  if (event.kind == Input::Kind::wheel && overPicture) return wheelCommand(event.turn);
   if (event.kind != Input::Kind::move || !dragged_) return std::nullopt;
-  const double dx = x - dragFrom_[0], dy = y - dragFrom_[1];
-  const Field& field = session_.current().field;
-  const ViewState& from = viewAtPress_;
-  if (view_.slice) {
-    const render::SliceView plane =
-        render::sliceView(field, slicePicture(from, field), int(layout.canvas.width()), int(height));
-    const Vector3 target = plane.origin - plane.right * (dx / layout.canvas.width()) + plane.up * (dy / height);
-    return "plane target=" + vectorWord(target);
-  }
-  const render::OrbitCamera& c = from.camera;
-  if (*dragged_ != 0) {  // the target moves with the mouse
-    const auto camera = render::cameraOf(c, field.domain(), int(layout.canvas.width()), int(height));
-    // half the picture at the target, world units
-    const double scale =
-        c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
-    const Vector3 target = c.target.value_or(field.domain().center()) +
-                           scale * (-camera.right * (2 * dx / layout.canvas.width()) + camera.up * (2 * dy / height));
-    return "camera target=" + vectorWord(target);
-  }
-  return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesAPixel * dx, 0.1),
-                     std::clamp(rounded(c.elevationDegrees + kDegreesAPixel * dy, 0.1), -90.0, 90.0), c.distance);
+  return dragCommand(x - dragFrom_[0], y - dragFrom_[1]);
 }
 
 std::string Explorer::pictureKey() const {
-  ViewState shown = view_;  // without what is not in the picture
+  ViewState shown = view_;  // the picture does not depend on the parts that are reset here
   const Layout layout = layoutOf(view_);
   shown.open = {};
   shown.scroll = {};
@@ -328,10 +324,20 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.scale = scale;
     return picture;
   };
-  // planes and cameras are those of the current field, so that both show the same part of space
+  // Plane and camera refer to the current field, so that both pictures show the same part of space.
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
                      : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), reference);
+}
+
+render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData reference,
+                                   const render::ScaleOptions& scale, int shrink) {
+  if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
+  try {
+    return drawn(session_.otherRenderer(view_.beside, view_.backend), other, reference, scale, shrink);
+  } catch (const Error& error) {
+    throw Error(view_.beside + ": " + error.what());
+  }
 }
 
 void Explorer::drawPicture(int shrink) {
@@ -353,15 +359,9 @@ void Explorer::drawPicture(int shrink) {
   }
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
-  if (other != nullptr) {
-    if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
-    try {
-      beside = drawn(session_.otherRenderer(view_.beside, view_.backend), *other, reference, picture.scale, shrink);
-    } catch (const Error& error) {
-      throw Error(view_.beside + ": " + error.what());
-    }
-  }
-  picture_ = std::move(picture);  // both or none: what is kept is what drawnFor_ says
+  if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
+  // Both pictures change, or none: an error above keeps the pair that drawnFor_ describes.
+  picture_ = std::move(picture);
   beside_ = std::move(beside);
   shown_ = {picture_->image};
   if (beside_) shown_.push_back(beside_->image);
@@ -372,17 +372,17 @@ void Explorer::drawPicture(int shrink) {
 render::Image Explorer::frame(int shrink) {
   if (session_.forgetChangedOthers()) drawnFor_.clear();
   if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
-  settle();
+  settlePanels();
   render::Image image(view_.width, view_.height, {250, 250, 248});
   const Layout layout = layoutOf(view_);
-  const auto place = [&](const render::Image& drawn, const UiRect& rect) {
+  const auto paste = [&](const render::Image& drawn, const UiRect& rect) {
     const int width = int(rect.width()), height = int(rect.height());
     const bool fits = drawn.width == width && drawn.height == height;
     const render::Image view = fits ? drawn : enlarged(drawn, width, height);
     for (int y = 0; y < height; ++y) std::copy_n(&view.at(0, y), width, &image.at(int(rect.x0), int(rect.y0) + y));
   };
   const std::array rects = {layout.canvas, layout.beside};
-  for (std::size_t i = 0; i < shown_.size(); ++i) place(shown_[i], rects[i]);
+  for (std::size_t i = 0; i < shown_.size(); ++i) paste(shown_[i], rects[i]);
   ui_.paint(image);
   return image;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The explorer: a picture of the current field with panels around it. It draws its frame without a window, the same
-// whether a script or a person leads it; whatever a widget does is a command of the registry.
+// The explorer: a picture of the current field with panels around it. It draws its frame without a window, so that a
+// script and a person get the same pixels. Every widget does its work by running a command of the registry.
 
 #include <functional>
 #include <map>
@@ -15,13 +15,14 @@
 
 namespace hpsdf::app {
 
-/// Where the parts of a frame stand; follows from the state alone. A part that is closed, or for which there is no
-/// room, is empty.
+/// The rectangles of a frame's parts, in pixels. A part is empty where it is closed or has no room.
 struct Layout {
   UiRect bar, left, right, readout;
-  UiRect canvas;  ///< of the picture
-  UiRect beside;  ///< of the other field's
+  UiRect canvas;  ///< the picture of the current field
+  UiRect beside;  ///< the picture of the other field
 };
+
+/// The layout depends on the state alone.
 Layout layoutOf(const ViewState& view);
 
 class Explorer final : public SessionExtension {
@@ -29,126 +30,131 @@ class Explorer final : public SessionExtension {
   explicit Explorer(Session& session);
 
   const ViewState& view() const { return view_; }
-  /// What was shown before can be had back by `undo`; changes of one gesture by one. The frame's size and the renderer
-  /// are not: they stay.
+  /// Shows another state. `undo` returns to the state before, and counts the changes of one mouse gesture as one. Undo
+  /// never changes the frame's size and the renderer.
   void change(ViewState next);
-  /// False where nothing is left to undo or to do again.
+  /// `undo` and `redo` return false when there is no state to go to.
   bool undo();
   bool redo();
   bool canUndo() const { return !undone_.empty(); }
   bool canRedo() const { return !redone_.empty(); }
 
-  /// Settings for the next construction, by names and texts of `build`'s parameters; `mesh` among them.
+  /// The settings of the next construction: texts by the names of `build`'s parameters, with `mesh` for the surface.
   const std::map<std::string, std::string>& settings() const { return settings_; }
   void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
-  /// Builds with them, up to so many steps of the refinement, if that is given. Throws `Error` where no mesh is known.
+  /// Builds the field again with these settings, and ends after `maxSteps` refinement steps where that is given. Throws
+  /// `Error` when neither the settings nor the field name a surface.
   void rebuild(std::optional<int> maxSteps);
-  /// Steps of the whole refinement, of which the field may be an earlier state; nothing where they are not known.
+  /// The number of refinement steps of the complete construction, if known; the current field may have fewer.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// What a person does: a frame of the panels, then the commands that they ask for. Throws what those throw. While
-  /// work is under way, all that can be done is to cancel it.
+  /// Handles one event of mouse or keyboard: draws the panels, then runs the commands that their widgets ask for, and
+  /// throws what those throw. During long work the only effect of an event is to cancel the work.
   void input(const Input& event);
-  /// Lets go of the mouse's buttons, closes lists, gives up a text that is being typed: what no script leads to. The
-  /// pointer stays where it is. Mistakes in what is given up are passed over.
-  void letGo();
+  /// Ends what a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards a text
+  /// that is being typed. The pointer keeps its position. Errors of the commands that this ends are ignored.
+  void releaseInput();
 
-  /// Of the panels as they stand now.
+  /// The widgets of the present frame, by their paths.
   const std::map<std::string, Widget>& widgets();
   const Ui& ui() const { return ui_; }
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
-  /// Draws the picture, if anything changed, and the panels. `shrink` draws the picture at so many times fewer pixels
-  /// along each axis: for the moment while the mouse moves. While work is under way the picture stays as it was.
+  /// Draws the panels, and the picture if it has changed. `shrink` divides the picture's resolution along each axis, so
+  /// that it keeps up with a moving mouse. During long work the last picture is shown again.
   render::Image frame(int shrink = 1);
-  /// Whether the last frame's picture was shrunk, or no longer is what `view` says.
+  /// True when the last picture was drawn with fewer pixels, or for another state than `view`.
   bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
 
-  /// Runs a line of script as a widget does.
+  /// Runs one line of script, as widgets do.
   void run(const std::string& line);
-  /// Called with each such line, and whether it takes the place of the one before, of the same gesture: then running
-  /// the last alone has the same effect.
+  /// Called after each line that `run` ran. `replaces` is true when the line has the effect of the previous line and
+  /// itself, so that a recording may drop the previous line: during one drag of a slider, for instance.
   std::function<void(const std::string& line, bool replaces)> onCommand;
-  /// Whether such a line is running.
+  /// True while `run` runs a line.
   bool running() const { return running_; }
 
-  /// The field is another one.
   void fieldChanged() override;
 
-  /// Long work under way: shown by the panels, which take no other input meanwhile.
+  /// Long work that is running. The panels show it and take no input but its cancellation.
   struct Work {
     std::string task;
-    double fraction = 0;
+    double fraction = 0;  ///< done, 0 to 1
     bool cancellable = false;
   };
   std::optional<Work> work;
-  /// Set by the panels when a person wants it to end.
+  /// Set by the panels when a person cancels the work.
   bool cancelWanted = false;
 
-  std::string message;  ///< shown below until the next command: what went wrong, or what was done
+  std::string message;  ///< error or result, shown in the readout panel until the next command
   Session& session() const { return session_; }
-  /// As it was drawn last: the view alone.
+  /// The last picture, without panels.
   const std::optional<render::Drawn>& picture() const { return picture_; }
-  /// Of the current field; kept.
+  /// Statistics of the current field, computed at the first call.
   const FieldStatistics& figures();
-  /// The worst interfaces by the view's measure, at least `count` of them where there are so many.
+  /// Indices of the interfaces with the greatest jumps, the greatest first: `count` of them or more, unless the field
+  /// has fewer.
   const std::vector<std::size_t>& worst(std::size_t count);
-  /// What the pointer is over, if that is part of the field.
+  /// The values at the pointer, if it is over the field.
   std::optional<Readout> readout();
 
  private:
   std::string pictureKey() const;
-  /// `build`'s parameters that made the current field, as far as it tells.
+  /// The parameters of `build` that made the current field, as far as its metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
                       const render::ScaleOptions& scale, int shrink) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
-  void settle();
+  void settlePanels();
   void inputWhileWorking(const Input& event);
   void runAll(const std::vector<std::string>& commands);
   std::optional<std::string> canvasCommand(const Input& event);
+  std::string wheelCommand(double notches) const;
+  std::string dragCommand(double dx, double dy) const;
+  render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
+                           int shrink);
 
   Session& session_;
   Ui ui_;
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
-  /// As it was before the last line that took no other's place.
+  /// The state and the history before the gesture, to which a line that replaces the previous one returns.
   struct History {
     ViewState view;
-    std::size_t undone = 0;
+    std::size_t undone = 0;  ///< size of undone_
     std::vector<ViewState> redone;
   };
   History before_;
   std::map<std::string, std::string> settings_;
-  std::string lastKind_;  ///< of the gesture's last line, see `run`
+  std::string lastKind_;  ///< kind of the gesture's last line, see `kindOf`
   bool running_ = false;
-  bool replaces_ = false;  ///< the line that is running takes the place of the one before
+  bool replaces_ = false;  ///< the running line replaces the previous one, see onCommand
 
   std::optional<std::uint64_t> allSteps_;
-  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: the field becomes another state of itself
+  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: a construction that ends early
   Rebuilding rebuilding_ = Rebuilding::no;
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;
-  std::optional<JumpKind> worstBy_;  ///< of worst_
+  std::optional<JumpKind> worstBy_;  ///< measure by which worst_ is sorted
 
   std::optional<render::Drawn> picture_;
-  std::optional<render::Drawn> beside_;  ///< of the other field
-  std::vector<render::Image> shown_;     ///< what they looked like last
+  std::optional<render::Drawn> beside_;  ///< picture of the other field
+  std::vector<render::Image> shown_;     ///< images of picture_ and beside_
   std::string drawnFor_;
   int shrunk_ = 1;
-  std::size_t fields_ = 0;  ///< counts the fields there have been
+  std::size_t fields_ = 0;  ///< number of fields so far, which tells one from the next
 
-  std::optional<int> dragged_;  ///< button that was pressed over the canvas
-  std::array<double, 2> dragFrom_ = {};
+  std::optional<int> dragged_;           ///< mouse button that was pressed over the picture and is held
+  std::array<double, 2> dragFrom_ = {};  ///< pointer when the button was pressed, pixels
   ViewState viewAtPress_;
 };
 
-/// The session's explorer, made when first asked for.
+/// The session's explorer, which is made at the first call.
 inline Explorer& explorerOf(Session& session) { return session.extension<Explorer>(); }
 
-/// The panels; adds the commands that the person asks for.
+/// Draws the panels and appends the lines of script that their widgets ask for. Called within `Ui::frame`.
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands);
 
 }  // namespace hpsdf::app

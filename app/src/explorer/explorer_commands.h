@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds the commands of the explorer: show, camera, plane, color, panel, ….
-void addViewCommands(Registry& registry);
+/// Adds all commands of the explorer but `ui`: show, camera, plane, color, panel, ….
+void addExplorerCommands(Registry& registry);
 
 }  // namespace hpsdf::app

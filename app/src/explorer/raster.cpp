@@ -43,8 +43,9 @@ float edge(const ImVec2& a, const ImVec2& b, const ImVec2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-/// Of two triangles that share an edge one takes the pixels whose centres lie on it.
-bool takesItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
+/// True for one of the two directions of an edge. Two triangles run along a shared edge in opposite directions, so that
+/// only one of them covers the pixels whose centres lie on it (top-left rule).
+bool coversItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
 
 void paintTriangle(render::Image& image, const Coverage& texture, const Clip& clip, const ImDrawVert* a,
                    const ImDrawVert* b, const ImDrawVert* c) {
@@ -60,11 +61,12 @@ void paintTriangle(render::Image& image, const Coverage& texture, const Clip& cl
   const int x1 = std::min(clip.x1, high(a->pos.x, b->pos.x, c->pos.x));
   const int y0 = std::max(clip.y0, low(a->pos.y, b->pos.y, c->pos.y));
   const int y1 = std::min(clip.y1, high(a->pos.y, b->pos.y, c->pos.y));
-  const bool plainTexture = a->uv.x == b->uv.x && a->uv.x == c->uv.x && a->uv.y == b->uv.y && a->uv.y == c->uv.y;
-  const float plain = plainTexture ? coverageAt(texture, a->uv.x, a->uv.y) : 0;
+  const bool oneTexel = a->uv.x == b->uv.x && a->uv.x == c->uv.x && a->uv.y == b->uv.y && a->uv.y == c->uv.y;
+  const float constantCoverage = oneTexel ? coverageAt(texture, a->uv.x, a->uv.y) : 0;
   const Channels colorA = channelsOf(a->col), colorB = channelsOf(b->col), colorC = channelsOf(c->col);
-  const bool plainColor = a->col == b->col && a->col == c->col;
-  const std::array edges = {takesItsEdge(b->pos, c->pos), takesItsEdge(c->pos, a->pos), takesItsEdge(a->pos, b->pos)};
+  const bool oneColor = a->col == b->col && a->col == c->col;
+  const std::array edges = {coversItsEdge(b->pos, c->pos), coversItsEdge(c->pos, a->pos),
+                            coversItsEdge(a->pos, b->pos)};
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) {
       const ImVec2 p(float(x) + 0.5F, float(y) + 0.5F);
@@ -72,11 +74,11 @@ void paintTriangle(render::Image& image, const Coverage& texture, const Clip& cl
       const auto inside = [&](int i) { return weights[i] > 0 || (weights[i] == 0 && edges[i]); };
       if (!inside(0) || !inside(1) || !inside(2)) continue;
       const float wa = weights[0] / area, wb = weights[1] / area, wc = weights[2] / area;
-      const float coverage = plainTexture ? plain
-                                          : coverageAt(texture, wa * a->uv.x + wb * b->uv.x + wc * c->uv.x,
-                                                       wa * a->uv.y + wb * b->uv.y + wc * c->uv.y);
+      const float coverage = oneTexel ? constantCoverage
+                                      : coverageAt(texture, wa * a->uv.x + wb * b->uv.x + wc * c->uv.x,
+                                                   wa * a->uv.y + wb * b->uv.y + wc * c->uv.y);
       Channels color = colorA;
-      if (!plainColor)
+      if (!oneColor)
         for (int channel = 0; channel < 4; ++channel)
           color[channel] = wa * colorA[channel] + wb * colorB[channel] + wc * colorC[channel];
       blend(image.at(x, y), color, coverage);

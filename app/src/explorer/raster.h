@@ -1,6 +1,6 @@
 #pragma once
-// Panels as pixels: triangles of Dear ImGui painted into a picture on the CPU, so that they look the same on every
-// machine, with any renderer or none.
+// Paints the triangles of Dear ImGui into a picture on the CPU, so that panels have the same pixels on every machine
+// and with every renderer.
 
 #include <imgui.h>
 
@@ -11,14 +11,14 @@
 
 namespace hpsdf::app {
 
-/// The one texture of the panels: glyphs, lines and a white spot, as coverage.
+/// The only texture of the panels: the coverage of glyphs, lines and a white spot, 0 to 255.
 struct Coverage {
   int width = 0, height = 0;
   std::vector<std::uint8_t> texels;
 };
 
 /// Blends the triangles over the picture in their order, as a graphics card does: a pixel belongs to the triangle that
-/// holds its centre, colours and texture (bilinear) are interpolated.
+/// contains its centre; colours and texture coordinates are interpolated, and the texture is sampled bilinearly.
 void paint(render::Image& image, const ImDrawData& data, const Coverage& texture);
 
 }  // namespace hpsdf::app

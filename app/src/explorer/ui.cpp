@@ -13,8 +13,8 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr float kTextSize = 13;     // pixels an em
-constexpr float kStep = 1.0F / 60;  // seconds a frame, whatever the clock says
+constexpr float kTextSize = 13;     // pixels per em
+constexpr float kStep = 1.0F / 60;  // seconds per frame; the clock is never read
 
 struct NamedKey {
   std::string_view name;
@@ -103,7 +103,7 @@ struct Ui::State {
   bool frozen = false;
   std::string clipboard;
   std::string idText;
-  std::pair<std::string, double> held;  ///< a slider that asks once it is let go, and where it stands until then
+  std::pair<std::string, double> held;  ///< path and value of a `When::released` slider that is held
 };
 
 Ui::Ui() : state_(std::make_unique<State>()) {
@@ -113,7 +113,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.IniFilename = nullptr;
   io.LogFilename = nullptr;
   io.ConfigInputTextCursorBlink = false;
-  io.MouseDoubleClickTime = 0;  // two clicks are two clicks, however fast a script is
+  io.MouseDoubleClickTime = 0;  // a script's fast clicks must not become double clicks
   io.MouseDrawCursor = false;
   for (const NamedKey& known : kKeys) io.KeyMap[known.code] = static_cast<int>(known.key);
   io.ClipboardUserData = &state_->clipboard;
@@ -121,7 +121,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.GetClipboardTextFn = [](void* clipboard) { return static_cast<std::string*>(clipboard)->c_str(); };
   setStyle();
 
-  // Latin, Greek, dashes, dots, arrows, ∇, −, ≤, ≥
+  // Glyphs: Latin, Greek, dashes, dots, arrows, ∇, −, ≤, ≥.
   static const ImWchar ranges[] = {0x20,   0x7e,   0xa0,   0xff,   0x391,  0x3c9,  0x2013, 0x2014, 0x2026, 0x2026,
                                    0x2190, 0x2193, 0x2207, 0x2207, 0x2212, 0x2212, 0x2264, 0x2265, 0};
   ImFontConfig config;
@@ -129,7 +129,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   config.OversampleH = 1;
   config.PixelSnapH = true;
   const auto font = render::dejavuSans();
-  // only read, though the atlas takes it as if it were not
+  // The const_cast is safe: the atlas only reads the font, which it does not own.
   io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font.data()), static_cast<int>(font.size()), kTextSize,
                                  &config, ranges);
   unsigned char* texels = nullptr;
@@ -169,7 +169,7 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     widgets();
   } catch (...) {
     state_->disabled = false;
-    ImGui::ErrorCheckEndFrameRecover(nullptr);  // ends what was begun, or the next frame would stand within it
+    ImGui::ErrorCheckEndFrameRecover(nullptr);  // closes open windows and groups, which would contain the next frame
     end();
     throw;
   }

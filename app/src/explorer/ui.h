@@ -1,5 +1,5 @@
 #pragma once
-// The panels' widgets: Dear ImGui without a window, its input written down event by event, every widget with a path by
+// The panels' widgets: Dear ImGui without a window. It takes its input as single events, and every widget has a path by
 // which scripts find it. Nothing depends on the clock.
 
 #include <array>
@@ -18,23 +18,23 @@ namespace hpsdf::app {
 
 enum class Key : std::uint8_t { enter, escape, backspace, remove, left, right, home, end, tab, a, c, v, x, y, z };
 
-/// "enter", "escape", …, as scripts spell them.
+/// The names of all keys as scripts spell them: "enter", "escape", ….
 std::vector<std::string> keyNames();
 std::optional<Key> keyNamed(std::string_view name);
 
-/// What a person does with mouse or keyboard.
+/// One event of mouse or keyboard.
 struct Input {
   enum class Kind : std::uint8_t { move, press, release, wheel, type, key } kind = Kind::move;
-  std::array<double, 2> at = {};  ///< of move: pixels from the upper left
-  int button = 0;                 ///< of press and release: 0 left, 1 right, 2 middle
-  double turn = 0;                ///< of wheel: notches, away from the person
-  std::string text = {};          ///< of type: UTF-8
-  Key key = Key::enter;           ///< of key: pressed and let go
-  bool control = false;           ///< held down; of press, release, wheel and key
-  bool shift = false;
+  std::array<double, 2> at = {};  ///< new position for move, pixels from the upper left
+  int button = 0;                 ///< for press and release: 0 left, 1 right, 2 middle
+  double turn = 0;                ///< for wheel: notches, positive away from the person
+  std::string text = {};          ///< for type, UTF-8
+  Key key = Key::enter;           ///< for key, which is pressed and released
+  bool control = false;           ///< Ctrl is held; for press, release, wheel and key
+  bool shift = false;             ///< Shift is held; for the same events
 };
 
-/// Pixels of a frame, half-open.
+/// A rectangle of a frame in pixels: x in [x0, x1), y in [y0, y1).
 struct UiRect {
   double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   bool contains(double x, double y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
@@ -42,14 +42,14 @@ struct UiRect {
   double height() const { return y1 - y0; }
 };
 
-/// Where a widget stands in the last frame.
+/// A widget of the last frame.
 struct Widget {
-  UiRect rect;             ///< the part of it that is not scrolled away or covered by its column's ends
-  bool enabled = true;     ///< takes input
-  bool takesText = false;  ///< a field or a slider
+  UiRect rect;             ///< visible part: empty where the widget is scrolled out of its column
+  bool enabled = true;     ///< false while the widget takes no input
+  bool takesText = false;  ///< true for text fields and sliders
 };
 
-/// When a slider asks: at each movement, or once it is let go.
+/// When a slider returns its value: at each movement, or once it is released.
 enum class When : std::uint8_t { moved, released };
 
 class Ui {
@@ -59,29 +59,30 @@ class Ui {
   Ui(const Ui&) = delete;
   Ui& operator=(const Ui&) = delete;
 
-  /// One frame of width × height pixels: `input` happens, then `widgets` calls the functions below. What it throws
-  /// goes on, with the frame ended.
+  /// Makes one frame of width × height pixels: takes `input`, if any, then calls `widgets`, which calls the functions
+  /// below. An exception of `widgets` is passed on after the frame has been ended.
   void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
 
   /// Paints the last frame over a picture of its size.
   void paint(render::Image& image) const;
 
-  /// Of the last frame.
+  /// The widgets of the last frame, by their paths.
   const std::map<std::string, Widget>& widgets() const { return widgets_; }
   std::array<double, 2> pointer() const { return pointer_; }
-  /// Whether the pointer is over a panel, or a widget holds the mouse.
+  /// True when the pointer is over a panel, or a widget holds the mouse.
   bool wantsMouse() const;
-  /// Whether a button is down or a widget is being edited: changes belong to one gesture.
+  /// True while a mouse button is down or a widget is being edited: changes then belong to one gesture.
   bool busy() const;
   bool holds(int button) const;
   bool editing() const;
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
-  // Within `widgets`. A path is panel/name; the label may be empty. Each gives what the person asked for in this frame.
+  // The following functions are called by `widgets`. A path is panel/name; a label may be empty. Each returns what the
+  // person changed in this frame.
 
-  /// A panel's background at a fixed place; calls `content` within. `scroll`: how far it is scrolled, pixels; nothing
-  /// where it never is. Gives how far it is scrolled now.
+  /// Draws a panel's background and calls `content` within. `scroll` is the scroll position in pixels, or nothing for a
+  /// panel that never scrolls. Returns the new scroll position.
   double column(const char* name, const UiRect& rect, std::optional<double> scroll,
                 const std::function<void()>& content);
   bool heading(const std::string& path, const char* label);
@@ -90,18 +91,19 @@ class Ui {
   std::optional<int> combo(const std::string& path, const char* label, std::span<const std::string> items, int current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
                                const char* format = "%.4g", When when = When::moved);
-  /// A text that counts when Enter is pressed.
+  /// A text field, which returns its text when Enter is pressed.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
   bool row(const std::string& path, std::span<const std::string> cells, double cellWidth);
   void text(const std::string& line, bool soft = false);
   void facts(std::span<const std::pair<std::string, std::string>> rows);
   void progress(const std::string& path, const std::string& task, double fraction);
-  void enable(bool enabled);  ///< until the next call
-  /// From now on nothing is enabled, whatever `enable` says.
+  /// Enables or disables the widgets that follow.
+  void enable(bool enabled);
+  /// While frozen, `enable` cannot enable widgets.
   void freeze(bool frozen);
 
-  /// Of a place that is drawn by other means.
-  void place(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
+  /// Gives a path to a rectangle that no widget draws, such as the picture.
+  void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:
   void note(const std::string& path, bool takesText = false);

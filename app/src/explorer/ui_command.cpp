@@ -1,7 +1,5 @@
 #include "explorer/ui_command.h"
 
-// ui: a real mouse and keyboard on the explorer's widgets.
-
 #include <fmt/format.h>
 
 #include "explorer/explorer.h"
@@ -14,7 +12,8 @@ constexpr int kDragSteps = 4;
 
 using Point = std::array<double, 2>;
 
-std::optional<Point> pointIn(const std::string& text) {
+/// The numbers of "X,Y".
+std::optional<Point> parsePoint(const std::string& text) {
   const std::size_t comma = text.find(',');
   if (comma == std::string::npos) return std::nullopt;
   const auto x = parseNumber(text.substr(0, comma)), y = parseNumber(text.substr(comma + 1));
@@ -22,9 +21,10 @@ std::optional<Point> pointIn(const std::string& text) {
   return Point{*x, *y};
 }
 
-/// The middle of a widget, or the pixel itself.
-Point placeOf(Explorer& explorer, const std::string& target, bool types) {
-  if (const auto pixel = pointIn(target)) return *pixel;
+/// The pixel that `target` names: X,Y, or the middle of a widget. Throws `Error` for a widget that takes no input, and
+/// where `types` is true for one that takes no text.
+Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
+  if (const auto pixel = parsePoint(target)) return *pixel;
   const auto& widgets = explorer.widgets();
   const auto found = widgets.find(target);
   if (found == widgets.end()) {
@@ -43,7 +43,7 @@ Point placeOf(Explorer& explorer, const std::string& target, bool types) {
   return {std::floor((rect.x0 + rect.x1) / 2), std::floor((rect.y0 + rect.y1) / 2)};
 }
 
-void moveTo(Explorer& explorer, const Point& place) { explorer.input({.kind = Input::Kind::move, .at = place}); }
+void moveTo(Explorer& explorer, const Point& pixel) { explorer.input({.kind = Input::Kind::move, .at = pixel}); }
 
 void runUi(Session& session, const Arguments& arguments) {
   session.current();
@@ -53,9 +53,9 @@ void runUi(Session& session, const Arguments& arguments) {
   const std::string value = arguments.textOr("value", "");
   const int button = arguments.text("button") == "right" ? 1 : 0;
   try {
-    explorer.frame();  // what lies over the picture depends on it
+    explorer.frame();  // the readout and the colour panel depend on the picture
   } catch (const Error&) {
-    // the widgets are there all the same, to give what the picture lacks; 'shot' says what that is
+    // The widgets work without a picture, and may be needed to make it drawable. `shot` reports the error.
   }
   if (action == "list") {
     for (const auto& [path, widget] : explorer.widgets())
@@ -66,7 +66,7 @@ void runUi(Session& session, const Arguments& arguments) {
     explorer.input({.kind = Input::Kind::key, .key = *keyNamed(target), .control = arguments.flag("control")});
     return;
   }
-  const Point at = placeOf(explorer, target, action == "type");
+  const Point at = targetPixel(explorer, target, action == "type");
   const bool control = arguments.flag("control") || action == "type";
   const auto press = [&] { explorer.input({.kind = Input::Kind::press, .button = button, .control = control}); };
   const auto release = [&] { explorer.input({.kind = Input::Kind::release, .button = button}); };
@@ -75,7 +75,7 @@ void runUi(Session& session, const Arguments& arguments) {
     explorer.input({.kind = Input::Kind::wheel, .turn = *parseNumber(value)});
   } else if (action == "drag") {
     press();
-    const Point by = *pointIn(value);
+    const Point by = *parsePoint(value);
     for (int step = 1; step <= kDragSteps; ++step)
       moveTo(explorer, {at[0] + by[0] * step / kDragSteps, at[1] + by[1] * step / kDragSteps});
     release();
@@ -84,7 +84,7 @@ void runUi(Session& session, const Arguments& arguments) {
     release();
   }
   if (action != "type") return;
-  // a slider turns into a field that holds its number marked; what is typed takes its place
+  // The Ctrl+click has turned a slider into a text field with its number selected, which the typed text replaces.
   explorer.input({.kind = Input::Kind::type, .text = value});
   explorer.input({.kind = Input::Kind::key, .key = Key::enter});
 }
@@ -92,11 +92,11 @@ void runUi(Session& session, const Arguments& arguments) {
 void checkUi(const Arguments& arguments) {
   const std::string action = arguments.text("action");
   if (action == "list") return;
-  if (!arguments.has("target")) throw Error(fmt::format("ui {}: say on which widget, or X,Y for a pixel", action));
+  if (!arguments.has("target")) throw Error(fmt::format("ui {}: give a widget, or X,Y for a pixel", action));
   const bool takesValue = action == "drag" || action == "type" || action == "wheel";
   if (takesValue != arguments.has("value"))
     throw Error(fmt::format("ui {}: {}", action, takesValue ? "a value is missing" : "takes no value"));
-  if (action == "drag" && !pointIn(arguments.text("value")))
+  if (action == "drag" && !parsePoint(arguments.text("value")))
     throw Error(fmt::format("ui drag: expected DX,DY pixels, found '{}'", arguments.text("value")));
   if (action == "wheel" && !parseNumber(arguments.text("value")))
     throw Error(fmt::format("ui wheel: expected a number of notches, found '{}'", arguments.text("value")));

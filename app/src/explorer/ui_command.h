@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds ui.
+/// Adds `ui`, by which a script uses mouse and keyboard on the explorer.
 void addUiCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -10,7 +10,7 @@
 namespace hpsdf::app {
 namespace {
 
-// {} of a double is the shortest text that reads as the same number
+/// The coordinates as {} formats them: the shortest texts that read as the same numbers.
 std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
 
 std::string planeLine(const ViewState& view) {
@@ -58,20 +58,16 @@ std::string panelLine(const ViewState& view) {
   return line + fmt::format(" left-scroll={} right-scroll={}\n", view.scroll[0], view.scroll[1]);
 }
 
-}  // namespace
-
-std::string levelText(const std::vector<int>& levels) {
-  return levels.empty() ? "all" : fmt::format("{}", fmt::join(levels, ","));
-}
-
-namespace {
-
 render::Plane planeOf(const ViewState& view, const Field& field) {
   if (view.plane) return *view.plane;
   return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
 }
 
 }  // namespace
+
+std::string levelText(const std::vector<int>& levels) {
+  return levels.empty() ? "all" : fmt::format("{}", fmt::join(levels, ","));
+}
 
 render::SlicePicture slicePicture(const ViewState& view, const Field& field) {
   render::SlicePicture picture;

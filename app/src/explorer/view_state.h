@@ -1,5 +1,5 @@
 #pragma once
-// What the explorer shows: equal states draw equal pictures.
+// The state of the explorer. Equal states of equal fields draw equal frames.
 
 #include <array>
 #include <optional>
@@ -12,75 +12,75 @@
 
 namespace hpsdf::app {
 
-/// The parts of the explorer's frame around its picture; each may be closed.
+/// The parts of the explorer's frame around its picture, each of which may be closed.
 enum class Panel : std::uint8_t { bar, view, build, legend, histograms, statistics, worst, readout };
 constexpr std::array kPanelNames = {"bar", "view", "build", "legend", "histograms", "statistics", "worst", "readout"};
 constexpr std::size_t kPanels = kPanelNames.size();
 
-/// What colours mean.
+/// The quantity that colours show, and their scale.
 struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
-  std::string other = {};  ///< of difference: the other field's file
-  std::string mesh = {};   ///< of error: what the field was made from; empty where that is known
+  std::string other = {};  ///< file of the field to compare with, for `ColorBy::difference`
+  std::string mesh = {};   ///< surface that the field was made from, for `ColorBy::error`; empty: the field knows it
 };
 
 struct ViewState {
-  bool slice = false;  ///< the flat picture of a plane, rather than the surface in space
+  bool slice = false;  ///< shows a plane from the front instead of the surface in space
 
-  int axis = 2;                            ///< of the plane
-  std::optional<double> planeOffset;       ///< 0, or the middle of the domain, when not given
-  std::optional<render::FreePlane> plane;  ///< instead of axis and offset
-  bool planeInSpace = false;               ///< drawn beside the surface too
-  double zoom = 1;
-  std::optional<Vector3> sliceTarget;
+  int axis = 2;                            ///< axis that the plane is perpendicular to
+  std::optional<double> planeOffset;       ///< world units along the axis; by default 0 or the domain's middle
+  std::optional<render::FreePlane> plane;  ///< used instead of axis and offset if set
+  bool planeInSpace = false;               ///< draws the plane in the surface's picture
+  double zoom = 1;                         ///< magnification of the slice; 1 shows the whole section
+  std::optional<Vector3> sliceTarget;      ///< middle of the slice's picture; by default the section's middle
 
   render::OrbitCamera camera;
-  double surfaceOffset = 0;
+  double surfaceOffset = 0;  ///< value of the level set that is drawn, world units
   std::optional<render::ClipPlane> clip;
-  bool cracks = false;
-  std::string defects = {};  ///< the mesh whose defects are marked, or "own"; empty for none
-  bool surface = true;       ///< drawn
+  bool cracks = false;       ///< marks cracks
+  std::string defects = {};  ///< mesh whose defects are marked, "own" for the field's own mesh, or empty
+  bool surface = true;       ///< draws the surface
   render::ShownCells cells;
-  int arrows = 0;  ///< pixels apart; 0: none
+  int arrows = 0;  ///< distance of gradient arrows in pixels; 0 for none
 
-  std::string beside;  ///< file of another field, seen beside the current one in the same way; or empty
+  std::string beside;  ///< file of another field, drawn beside the current one with the same settings, or empty
 
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
-  JumpKind worstBy = JumpKind::value;  ///< of the list of interfaces
-  int worstPage = 0;
+  JumpKind worstBy = JumpKind::value;  ///< jump that sorts the list of interfaces
+  int worstPage = 0;                   ///< page of that list, from 0
 
   std::array<bool, kPanels> open = {true, true, true, true, true, true, true, true};
-  std::array<double, 2> scroll = {0, 0};  ///< of the left and the right column, pixels
-  int width = 1280;                       ///< of the whole frame, pixels
+  std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels
+  int width = 1280;                       ///< size of the whole frame, pixels
   int height = 720;
-  int samples = 1;
+  int samples = 1;  ///< per pixel, along each axis
   Backend backend;
 
   bool isOpen(Panel panel) const { return open[static_cast<std::size_t>(panel)]; }
   const Coloring& colors() const { return slice ? sliceColors : surfaceColors; }
 };
 
-/// What render draws of it; sizes and samples are not set.
+/// The state as the renderer's settings, without size and samples.
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
 render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
 
-/// "2,4"; "all" for none.
+/// "2,4" for a list of levels, "all" for an empty one.
 std::string levelText(const std::vector<int>& levels);
 
-/// Script lines, each ending in a newline, that lead from any state to this one.
+/// Lines of script, each ending in a newline, that set every part of the state.
 std::string scriptOf(const ViewState& view);
 
-/// By their script lines, which hold everything.
+/// Compares the script lines of two states, which hold every part of them.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
-/// `show`'s word for it.
+/// The renderer as an argument of `show`: "cpu=true" or "gl=software", for instance.
 std::string backendText(const Backend& backend);
 
-/// A word of a script, in quotes where it needs them.
+/// A word as a script spells it, with quotes where it needs them.
 std::string scriptWord(const std::string& word);
-/// The same; none in the place of an empty one.
+/// The word as a script spells it, or "none" for an empty word.
 std::string wordOrNone(const std::string& word);
 
 }  // namespace hpsdf::app

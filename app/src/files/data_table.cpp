@@ -17,18 +17,18 @@
 namespace hpsdf::app {
 namespace {
 
-/// The numbers of a line, NaN and infinity included; nothing where one of its cells is none.
+/// Parses the numbers of a line, NaN and infinity included. Returns nothing where a cell is not a number.
 std::optional<std::vector<double>> numbersOf(const std::string& line) {
   std::vector<double> numbers;
-  for (const char* at = line.data();; ++at) {
+  for (const char* cell = line.data();; ++cell) {
     const char* const end = line.data() + line.size();
     double number = 0;
-    const auto [after, error] = std::from_chars(at, end, number);
+    const auto [after, error] = std::from_chars(cell, end, number);
     if (error != std::errc()) return std::nullopt;
     numbers.push_back(number);
     if (after == end) return numbers;
     if (*after != ',') return std::nullopt;
-    at = after;
+    cell = after;
   }
 }
 
@@ -52,7 +52,7 @@ DataTable readCsv(const std::string& file, const std::string& text) {
   return table;
 }
 
-/// As `hpsdf slice` writes it: one channel, little-endian.
+/// Reads a portable float map of one little-endian channel, as `hpsdf slice` writes it.
 DataTable readPfm(const std::string& file, const std::string& text) {
   std::istringstream stream(text);
   std::string kind;
@@ -60,12 +60,12 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   double scale = 0;
   stream >> kind >> table.columns >> table.rows >> scale;
   const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
-  // more of either than bytes: their product may be anything
+  // A larger number of rows or columns than bytes is wrong, and the product below might overflow.
   const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
   const std::size_t count = table.columns * table.rows;
   if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||
       (text.size() - begin) / sizeof(float) != count || (text.size() - begin) % sizeof(float) != 0)
-    throw Error(file + ": is no whole .pfm file of one little-endian channel; write it anew with 'hpsdf slice'");
+    throw Error(file + ": is not a complete .pfm file of one little-endian channel; write it again with 'hpsdf slice'");
   table.values.resize(count);
   for (std::size_t n = 0; n < count; ++n) {
     float value = 0;
@@ -75,11 +75,11 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   return table;
 }
 
-/// Two that are no numbers agree, and so do equal infinities.
+/// Returns |a − b|. Two NaN count as equal, and so do equal infinities; NaN and a number differ infinitely.
 double difference(double a, double b) {
   if (a == b || (std::isnan(a) && std::isnan(b))) return 0;
-  const double apart = std::abs(a - b);
-  return std::isnan(apart) ? std::numeric_limits<double>::infinity() : apart;
+  const double distance = std::abs(a - b);
+  return std::isnan(distance) ? std::numeric_limits<double>::infinity() : distance;
 }
 
 }  // namespace
@@ -100,10 +100,10 @@ DataComparison compare(const DataTable& baseline, const DataTable& actual, doubl
   result.compared = baseline.values.size();
   std::vector<DataDifference> beyond;
   for (std::size_t n = 0; n < baseline.values.size(); ++n) {
-    const double here = difference(baseline.values[n], actual.values[n]);
-    result.largest = std::max(result.largest, here);
-    if (here > bound)
-      beyond.push_back({n / baseline.columns, n % baseline.columns, baseline.values[n], actual.values[n], here});
+    const double found = difference(baseline.values[n], actual.values[n]);
+    result.largest = std::max(result.largest, found);
+    if (found > bound)
+      beyond.push_back({n / baseline.columns, n % baseline.columns, baseline.values[n], actual.values[n], found});
   }
   result.differing = beyond.size();
   std::ranges::stable_sort(beyond, std::ranges::greater(), &DataDifference::difference);

@@ -1,5 +1,5 @@
 #pragma once
-// Raw values that commands write, read back to be compared: .csv and .pfm.
+// Reads raw values from .csv and .pfm files, which commands write, and compares them.
 
 #include <cstddef>
 #include <filesystem>
@@ -9,16 +9,16 @@
 namespace hpsdf::app {
 
 struct DataTable {
-  std::string header = {};  ///< names of the columns; "" where there are none
+  std::string header = {};  ///< first line of a .csv that holds names of columns; "" without one
   std::size_t columns = 0;
-  std::size_t rows = 0;  ///< of a .pfm: bottom to top, as they lie in the file
+  std::size_t rows = 0;  ///< number of rows; those of a .pfm run from bottom to top, as in the file
   std::vector<double> values = {};
 };
 
 bool isDataFile(const std::filesystem::path& file);
 
-/// Numbers separated by commas, a row a line, with or without names in the first; or a portable float map of one
-/// channel. Throws `Error` naming the file.
+/// Reads a .csv of numbers, with or without names of columns in its first line, or a .pfm of one channel. Throws
+/// `Error` naming the file.
 DataTable loadData(const std::filesystem::path& file);
 
 struct DataDifference {
@@ -26,24 +26,25 @@ struct DataDifference {
   std::size_t column;
   double baseline;
   double actual;
-  double difference;  ///< infinite where only one of them is a number
+  double difference;  ///< |actual − baseline|; infinite where only one of the values is a number
 };
 
 struct DataComparison {
-  bool sameShape = false;     ///< as many rows, and columns of the same names
-  std::size_t compared = 0;   ///< values
-  std::size_t differing = 0;  ///< by more than the bound
+  bool sameShape = false;     ///< true where numbers of rows and names of columns agree
+  std::size_t compared = 0;   ///< number of compared values
+  std::size_t differing = 0;  ///< number of values that differ by more than the bound
   double largest = 0;
-  std::vector<DataDifference> worst = {};  ///< the worst first, `kWorstData` at most
+  std::vector<DataDifference> worst = {};  ///< largest differences in descending order, at most `kWorstData`
 };
 
-/// How much a value may differ: two or three low bits of a float near 1.
+/// Default bound of a difference: two or three low bits of a float near 1.
 constexpr double kDataBound = 1e-6;
 constexpr std::size_t kWorstData = 10;
 
 DataComparison compare(const DataTable& baseline, const DataTable& actual, double bound);
 
-/// What is wrong, in one line; empty where the shape is the same and at most a share of `budget` of the values differs.
+/// Describes the failed comparison in one line. The result is empty where the shapes agree and at most the share
+/// `budget` of the values differs.
 std::string problem(const DataComparison& comparison, double bound, double budget);
 
 }  // namespace hpsdf::app

@@ -16,15 +16,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAbout = "frames.json";  // by which a folder of frames is known again
+constexpr const char* kAbout = "frames.json";  // marks a folder as one of frames
 constexpr const char* kMovie = "film.mp4";
 constexpr const char* kLog = "ffmpeg.txt";
 
 bool isFrameName(std::string_view name) {
-  constexpr std::string_view kBefore = "frame-", kAfter = ".png";
-  if (!name.starts_with(kBefore) || !name.ends_with(kAfter) || name.size() < kBefore.size() + 4 + kAfter.size())
+  constexpr std::string_view kPrefix = "frame-", kSuffix = ".png";
+  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix) || name.size() < kPrefix.size() + 4 + kSuffix.size())
     return false;
-  const auto digits = name.substr(kBefore.size(), name.size() - kBefore.size() - kAfter.size());
+  const auto digits = name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size());
   return std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; });
 }
 
@@ -32,7 +32,7 @@ void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, read
 
 fs::path requireFfmpeg(const std::string& output) {
   if (const auto found = findProgram("ffmpeg")) return *found;
-  throw Error(output + ": an MP4 takes the program ffmpeg, which PATH does not have; install it, or give a folder");
+  throw Error(output + ": an MP4 needs the program ffmpeg, which is not in PATH; install it, or give a folder");
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ void Film::add(const render::Image& image) { savePng(image, work_.path() / frame
 void Film::encode(double framesPerSecond, const Progress& progress) {
   if (folder_) return;
   if (progress.report) progress.report("encoding", 0);
-  // the usual 4:2:0 colours, which every player knows, come in pairs of pixels
+  // Every player supports 4:2:0 colours; they require even numbers of pixels.
   const int status =
       runOtherProgram(ffmpeg_,
                       {"-hide_banner", "-loglevel", "error", "-y", "-framerate", fmt::format("{}", framesPerSecond),

@@ -13,27 +13,28 @@
 
 namespace hpsdf::app {
 
-/// Pictures in order, as frame-0000.png, frame-0001.png … in a folder or as an MP4 that ffmpeg makes of them. Until it
-/// is published nothing can be seen of it, and what was there before stays as it was.
+/// A sequence of pictures, written to a folder as frame-0000.png, frame-0001.png … or encoded as an MP4 by ffmpeg.
+/// Before `publish` the output is not touched, so that an older film stays intact.
 class Film {
  public:
-  /// `output` is an MP4 where it ends in .mp4, else a folder. Throws `Error` when it cannot be written, when other
-  /// things lie in the folder, or when there is no ffmpeg for an MP4.
+  /// `output` is an MP4 where it ends in .mp4, else a folder. Throws `Error` where it cannot be written, where the
+  /// folder holds files that are not an earlier film, or where an MP4 is wanted and ffmpeg is not installed.
   explicit Film(const std::string& output);
 
   void add(const render::Image& image);
   std::size_t frames() const { return frames_; }
 
-  /// After the last frame: makes the MP4, if it is to be one. Throws `Error` with ffmpeg's last line when that fails.
+  /// Encodes the MP4 after the last frame; does nothing for a folder. Throws `Error` with ffmpeg's last line on
+  /// failure.
   void encode(double framesPerSecond, const Progress& progress);
 
-  /// What is told of it: each frame has a row of `rows`, whose "file" is filled in; `last` is any of the frames.
+  /// Describes the film as JSON. `rows` holds one object a frame, whose "file" is filled in here; `last` is any frame.
   Json about(const render::Image& last, const std::string& renderer, Json rows) const;
 
-  /// The same in a line, of what `about` returned.
+  /// Describes the film in one line, from the result of `about`.
   static std::string line(const Json& about);
 
-  /// Puts everything in its place; beside the frames of a folder a file frames.json that tells what they show.
+  /// Moves the film to its output. A folder also receives frames.json, which holds `about`.
   void publish(const Json& about);
 
  private:
@@ -41,7 +42,7 @@ class Film {
   void publishFolder(const Json& about);
 
   std::filesystem::path output_;
-  std::filesystem::path ffmpeg_;          // empty where none is needed
+  std::filesystem::path ffmpeg_;          // empty for a folder
   std::unique_ptr<OutputFolder> folder_;  // null for an MP4
   TemporaryFolder work_;
   std::size_t frames_ = 0;

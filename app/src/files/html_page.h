@@ -1,5 +1,5 @@
 #pragma once
-// The report's page: one HTML file beside its pictures = {}; no script, no network.
+// The page of a report: one HTML file beside its pictures, without scripts and without network access.
 
 #include <string>
 #include <string_view>
@@ -9,15 +9,15 @@
 namespace hpsdf::app {
 
 struct ReportPicture {
-  std::string file;  ///< relative to the page
+  std::string file;  ///< name relative to the page
   std::string title;
   std::string caption;
-  std::string command;  ///< that makes it
+  std::string command;  ///< command that draws the picture
 };
 
 struct ReportBar {
   int level;
-  double share;  ///< of the domain's volume, 0 to 1
+  double share;  ///< share of the domain's volume, 0 to 1
 };
 
 struct ReportPage {
@@ -27,20 +27,20 @@ struct ReportPage {
   std::vector<ReportBar> degrees = {};
   std::vector<ReportBar> depths = {};
   std::vector<ReportPicture> pictures = {};
-  std::string buildCommand = {};  ///< "" where it is not known
+  std::string buildCommand = {};  ///< "" where the command is unknown
   std::string footer = {};
 };
 
 std::string reportHtml(const ReportPage& page);
 
-/// A page's beginning, in the report's style and some more of its own, and its end.
+/// Return the beginning and the end of a page. `moreStyle` is CSS that is added to that of reports.
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
 
-/// The bytes of a PNG file as the source of an <img>, so that it lies in the page.
+/// Encodes a PNG file as the source of an <img>, so that the page contains it.
 std::string htmlPng(std::string_view bytes);
 
-/// Text that is safe between tags and in quoted attributes.
+/// Escapes text for use between tags and in quoted attributes.
 std::string htmlEscaped(const std::string& text);
 
 }  // namespace hpsdf::app

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the other program finds open, and where it starts.
+/// Sets the standard streams and the working folder of a new process.
 class SpawnActions {
  public:
   SpawnActions(const fs::path& folder, const fs::path& log) {
@@ -55,7 +55,7 @@ pid_t start(const fs::path& program, const std::vector<std::string>& arguments, 
   return id;
 }
 
-/// waitpid, and once more where a signal came between.
+/// Calls waitpid, again where a signal interrupts it.
 pid_t await(pid_t id, int& status, int options) {
   for (;;) {
     const pid_t ended = waitpid(id, &status, options);
@@ -88,7 +88,7 @@ int runOtherProgram(const fs::path& program, const std::vector<std::string>& arg
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  if (cancelled && cancelled()) throw Cancelled();  // Ctrl-C reaches both
+  if (cancelled && cancelled()) throw Cancelled();  // Ctrl-C ends the other program too
   return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
 }
 

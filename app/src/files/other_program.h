@@ -1,5 +1,5 @@
 #pragma once
-// Other programs of the machine, run without a shell.
+// Runs other programs without a shell.
 
 #include <filesystem>
 #include <functional>
@@ -9,12 +9,12 @@
 
 namespace hpsdf::app {
 
-/// Where PATH has a program of this name.
+/// Searches PATH for an executable file of this name.
 std::optional<std::filesystem::path> findProgram(const std::string& name);
 
-/// Runs it in `folder` with nothing to read, what it writes going to `log`. The exit status, or 128 + the signal that
-/// ended it. Once `cancelled` answers true it is ended, and `Cancelled` thrown. Throws `Error` when it cannot be
-/// started.
+/// Runs the program in `folder` with an empty standard input; standard output and standard error go to `log`. Returns
+/// the exit status, or 128 + the signal that ended it. Throws `Error` where the program cannot be started, and
+/// `Cancelled` after ending it once `cancelled` returns true.
 int runOtherProgram(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                     const std::filesystem::path& folder, const std::filesystem::path& log,
                     const std::function<bool()>& cancelled);

@@ -26,7 +26,7 @@ OutputFolder::OutputFolder(const fs::path& folder) : path_(folder) {
 }
 
 OutputFolder::~OutputFolder() {
-  files_.clear();  // theirs are removed with them
+  files_.clear();  // removes the temporary files
   removeCreated();
 }
 
@@ -37,13 +37,13 @@ void OutputFolder::write(const std::string& name, std::string_view bytes) {
 }
 
 void OutputFolder::commit() {
-  const InterruptGuard guard;  // until all have their names
+  const InterruptGuard guard;  // all files are renamed, or none
   for (const auto& file : files_) file->commit();
   files_.clear();
   keep();
 }
 
-/// One that is not empty stays.
+/// Folders that are not empty stay.
 void OutputFolder::removeCreated() {
   std::error_code ignored;
   for (const fs::path& part : created_) fs::remove(part, ignored);
@@ -51,7 +51,7 @@ void OutputFolder::removeCreated() {
 
 void OutputFolder::requireOwn(const std::string& marker) const {
   if (!fs::is_empty(path_) && !fs::exists(path_ / marker))
-    throw Error(fmt::format("{}: holds other things than earlier results; name another folder", path_.string()));
+    throw Error(fmt::format("{}: holds files that are not earlier results; name another folder", path_.string()));
 }
 
 void OutputFolder::startAnew(const std::string& marker, const std::function<bool(const std::string&)>& isResult) const {
@@ -67,7 +67,7 @@ void OutputFolder::startAnew(const std::string& marker, const std::function<bool
 TemporaryFolder::TemporaryFolder() {
   std::string name = (fs::temp_directory_path() / "hpsdf-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr)
-    throw Error(fmt::format("{}: cannot make a temporary folder ({}); TMPDIR can name another place", name,
+    throw Error(fmt::format("{}: cannot make a temporary folder ({}); TMPDIR can name another folder", name,
                             std::strerror(errno)));
   path_ = name;
 }

@@ -11,11 +11,11 @@
 
 namespace hpsdf::app {
 
-/// A folder that results are written to: made with those above it where they are not there yet. What was made is
-/// removed again, unless something lies in it or `keep` was called. Nothing of others is ever removed.
+/// A folder for results. The constructor creates it with its parents where they do not exist. The destructor removes
+/// the folders that it created and that are empty, unless `keep` was called; other folders and files are never removed.
 class OutputFolder {
  public:
-  /// Throws `Error` naming the folder when it cannot be made.
+  /// Throws `Error` naming the folder where it cannot be created.
   explicit OutputFolder(const std::filesystem::path& folder);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
@@ -23,30 +23,30 @@ class OutputFolder {
 
   void keep() { created_.clear(); }
 
-  /// Writes a file under a temporary name. `commit` gives all of them their own, and the folder is kept; without it
-  /// none is left and earlier ones stay as they were. Throws `Error` as `OutputFile` does.
+  /// Writes a file under a temporary name. `commit` renames all such files and keeps the folder; without it they are
+  /// removed, and older files of these names stay. Both throw `Error` as `OutputFile` does.
   void write(const std::string& name, std::string_view bytes);
   void commit();
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// For results that take a folder to themselves, known again by their file `marker`: throws `Error` where other
-  /// things lie in it and no such file.
+  /// Throws `Error` where the folder holds files but no file `marker`, by which a folder of earlier results is
+  /// recognized.
   void requireOwn(const std::string& marker) const;
 
-  /// Writes an empty marker, so that what is broken off is known again too, and removes earlier results: what lies in
-  /// the folder under a name that `isResult` knows. After `requireOwn`.
+  /// Writes an empty marker, so that a folder of incomplete results is recognized too, and removes the earlier results:
+  /// files whose names `isResult` accepts. Call `requireOwn` before.
   void startAnew(const std::string& marker, const std::function<bool(const std::string&)>& isResult) const;
 
  private:
   void removeCreated();
 
   std::filesystem::path path_;
-  std::vector<std::filesystem::path> created_;  // innermost first
+  std::vector<std::filesystem::path> created_;  // folders that the constructor created, innermost first
   std::vector<std::unique_ptr<OutputFile>> files_;
 };
 
-/// A new folder under the system's own for such, removed with all that is in it.
+/// A new folder in the system's folder for temporary files. The destructor removes it with its contents.
 class TemporaryFolder {
  public:
   TemporaryFolder();

@@ -1,5 +1,5 @@
 #pragma once
-// Text files, read whole and written whole.
+// Reads and writes whole text files.
 
 #include <cstddef>
 #include <filesystem>
@@ -9,24 +9,24 @@
 
 namespace hpsdf::app {
 
-/// Text that a person writes by hand or by a short script, a script of ours or a list, is never as long as this.
+/// Largest accepted text: scripts and lists of meshes are never this long.
 constexpr std::size_t kMostTextBytes = std::size_t{1} << 26;
 
-/// All of a text that is called `name` in messages. Throws `Error` where it is longer than `kMostTextBytes`, or cannot
-/// be read to its end.
+/// Reads a stream to its end; `name` stands for it in messages. Throws `Error` where it is longer than `kMostTextBytes`
+/// or cannot be read to its end.
 std::string readText(std::istream& in, const std::string& name);
 
-/// All of a text file. Throws `Error` as `readText`, and for a file that is missing, a folder, or a device, which may
-/// have no end.
+/// Reads a text file. Throws `Error` as `readText` does, and where the file is missing, a folder, or a device, which
+/// might have no end.
 std::string readTextFile(const std::string& file);
 
-/// All of a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` otherwise.
+/// Reads a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` does otherwise.
 std::string readWholeFile(const std::string& file);
 
-/// The last line that is not empty; "" where there is none.
+/// Returns the last line that is not empty; "" where there is none.
 std::string lastLine(const std::string& text);
 
-/// Writes a whole file under a temporary name first. Throws `Error` naming it; then nothing of it is left behind.
+/// Writes a file under a temporary name and renames it. Throws `Error` naming the file, and leaves nothing behind then.
 void writeTextFile(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace hpsdf::app

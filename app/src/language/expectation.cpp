@@ -6,16 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
 #include "language/registry.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
 struct Source {
   std::string_view name;
-  std::string_view arguments;  ///< as one writes them
+  std::string_view arguments;  ///< as a user writes them
   std::size_t count;
 };
 constexpr Source kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};
@@ -37,7 +37,7 @@ class Reader {
     return true;
   }
 
-  /// Letters, digits, _ and -; may be empty.
+  /// Reads letters, digits, _ and -. The name may be empty.
   std::string name() {
     skipBlanks();
     const std::size_t begin = position_;
@@ -76,10 +76,8 @@ const Source& sourceNamed(const std::string& name, const Reader& reader) {
     known.emplace_back(s.name);
     shown.push_back(fmt::format("{}{}", s.name, s.arguments));
   }
-  const std::string near = nearestName(name, known);
-  reader.fail(fmt::format(
-      "unknown figures '{}'; {}", name,
-      near.empty() ? fmt::format("there are {}", fmt::join(shown, ", ")) : fmt::format("did you mean '{}'?", near)));
+  reader.fail(fmt::format("unknown figures '{}'; {}", name,
+                          suggestion(name, known, fmt::format("expected {}", fmt::join(shown, ", ")))));
 }
 
 }  // namespace

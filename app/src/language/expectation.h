@@ -1,5 +1,5 @@
 #pragma once
-// What `expect` says of figures: "stats.leaves < 60000", "pick(640,360).degree == 4".
+// Expectations compare a number with a limit: "stats.leaves < 60000", "pick(640,360).degree == 4".
 
 #include <string>
 #include <string_view>
@@ -10,16 +10,16 @@ namespace hpsdf::app {
 /// SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER]
 struct Expectation {
   std::string source;             ///< stats, jumps, pick, at
-  std::vector<double> arguments;  ///< in parentheses
-  std::vector<std::string> path;  ///< keys, or numbers of elements
+  std::vector<double> arguments;  ///< numbers in parentheses
+  std::vector<std::string> path;  ///< keys of objects and indices of arrays
   std::string comparison;         ///< == != < <= > >=
   double wanted = 0;
-  double tolerance = 0;  ///< of == and !=
+  double tolerance = 0;  ///< largest difference that == and != accept as equal
 
   bool holds(double found) const;
 };
 
-/// Throws `Error` for text that is none, with the nearest known source.
+/// Throws `Error` for text that is not an expectation, with the nearest known source where the source is unknown.
 Expectation parseExpectation(std::string_view text);
 
 }  // namespace hpsdf::app

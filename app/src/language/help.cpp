@@ -3,14 +3,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <functional>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 namespace hpsdf::app {
 namespace {
 
 constexpr std::size_t kWidth = 96;
 
-/// Words of `text` in lines of at most kWidth characters, each line indented. Empty lines separate paragraphs.
+/// Breaks `text` into lines of at most kWidth bytes, each line indented. Empty lines separate paragraphs.
 std::string wrapped(const std::string& text, std::size_t indent) {
   const std::string margin(indent, ' ');
   std::istringstream lines(text);
@@ -58,15 +62,16 @@ std::string valueName(const Parameter& parameter) {
   return typeName(parameter.type);
 }
 
-/// "-o, --output FILE"
+/// Spells a parameter as "-o, --output FILE".
 std::string spelling(const Parameter& parameter) {
   if (parameter.positional) return valueName(parameter);
   const std::string alias = parameter.alias == 0 ? "" : fmt::format("-{}, ", parameter.alias);
   const std::string value = valueName(parameter);
-  return fmt::format("{}--{}{}{}", alias, parameter.name, value.empty() ? "" : " ", value);
+  return fmt::format("{}--{}{}{}", alias, parameter.synonym.empty() ? parameter.name : parameter.synonym,
+                     value.empty() ? "" : " ", value);
 }
 
-/// Range, unit and default: what the help text need not repeat.
+/// Lists range, unit, default and further spelling in parentheses, so that the help text need not contain them.
 std::string facts(const Parameter& parameter) {
   std::vector<std::string> parts;
   const bool hasRange = parameter.minimum || parameter.maximum;
@@ -77,7 +82,8 @@ std::string facts(const Parameter& parameter) {
   if (parameter.need == Need::onCommandLine) parts.push_back("required on the command line");
   if (!parameter.defaultText.empty() && parameter.type != ParameterType::flag)
     parts.push_back("default " + parameter.defaultText);
-  return parts.empty() ? std::string() : fmt::format("({})", fmt::join(parts, "; "));
+  if (!parameter.synonym.empty()) parts.push_back(fmt::format("also --{}", parameter.name));
+  return parts.empty() ? std::string() : fmt::format(" ({})", fmt::join(parts, "; "));
 }
 
 std::string usage(const Command& command) {
@@ -95,67 +101,163 @@ std::string usage(const Command& command) {
   return line + " [options]";
 }
 
+std::string headingOf(const Parameter& parameter) {
+  if (parameter.positional) return "Arguments";
+  return parameter.group.empty() ? "Options" : parameter.group;
+}
+
+struct Group {
+  std::string heading;
+  std::vector<const Parameter*> parameters = {};
+};
+
+/// Collects parameters under their headings, in the order in which the headings first appear; `kGeneralGroup` is last.
+std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
+  std::vector<Group> groups;
+  for (const Parameter& parameter : parameters) {
+    const std::string heading = headingOf(parameter);
+    auto group = std::ranges::find(groups, heading, &Group::heading);
+    if (group == groups.end()) group = groups.insert(group, {heading});
+    group->parameters.push_back(&parameter);
+  }
+  std::ranges::stable_partition(groups, [](const Group& group) { return group.heading != kGeneralGroup; });
+  return groups;
+}
+
+/// The place of the page docs/commands.md that describes a shared option.
+enum class DescribedAt : std::uint8_t { here, build, sharedOptions };
+
+bool isSameOption(const Parameter& a, const Parameter& b) { return a.name == b.name && a.help == b.help; }
+
+DescribedAt describedAt(const Registry& registry, const Command& command, const Parameter& parameter) {
+  std::size_t commands = 0;
+  bool inBuild = false;
+  for (const Command& other : registry.commands())
+    for (const Parameter& one : other.parameters)
+      if (isSameOption(one, parameter)) {
+        ++commands;
+        inBuild = inBuild || other.name == "build";
+      }
+  if (commands == 1) return DescribedAt::here;
+  if (!inBuild || commands == registry.commands().size()) return DescribedAt::sharedOptions;
+  return command.name == "build" ? DescribedAt::here : DescribedAt::build;
+}
+
+std::string markdownRows(const std::string& heading, const std::vector<const Parameter*>& parameters) {
+  if (parameters.empty()) return {};
+  std::string text = fmt::format("\n| {} | |\n|---|---|\n", heading);
+  for (const Parameter* parameter : parameters) {
+    std::string cell = spelling(*parameter);
+    for (std::size_t i = 0; (i = cell.find('|', i)) != std::string::npos; i += 2) cell.insert(i, "\\");
+    text += fmt::format("| `{}` | {}{} |\n", cell, parameter->help, facts(*parameter));
+  }
+  return text;
+}
+
+std::string markdownNames(const std::vector<const Parameter*>& parameters) {
+  std::vector<std::string> names;
+  for (const Parameter* parameter : parameters)
+    names.push_back(fmt::format("`{}{}`", parameter->positional ? valueName(*parameter) : "--" + parameter->name,
+                                parameter->repeatable ? " …" : ""));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// Describes the command's own parameters by group and refers to the descriptions of those that it shares.
+std::string markdownParameters(const Registry& registry, const Command& command) {
+  std::string text;
+  std::vector<const Parameter*> shared;
+  for (const Group& group : byGroup(command.parameters)) {
+    std::vector<const Parameter*> own, ofBuild;
+    for (const Parameter* parameter : group.parameters) {
+      const DescribedAt where = describedAt(registry, command, *parameter);
+      (where == DescribedAt::here ? own : where == DescribedAt::build ? ofBuild : shared).push_back(parameter);
+    }
+    text += markdownRows(group.heading, own);
+    if (!ofBuild.empty())
+      text += fmt::format("\n{}, see [build](#build): {}.\n", group.heading, markdownNames(ofBuild));
+  }
+  if (!shared.empty()) text += fmt::format("\n[Shared options](#shared-options): {}.\n", markdownNames(shared));
+  return text;
+}
+
+std::string markdownSharedOptions(const Registry& registry) {
+  std::vector<Parameter> shared;
+  for (const Command& command : registry.commands())
+    for (const Parameter& parameter : command.parameters)
+      if (describedAt(registry, command, parameter) == DescribedAt::sharedOptions &&
+          std::ranges::none_of(shared, [&](const Parameter& other) { return isSameOption(other, parameter); }))
+        shared.push_back(parameter);
+  std::string text;
+  for (const Group& group : byGroup(shared)) text += markdownRows(group.heading, group.parameters);
+  return text;
+}
+
 }  // namespace
 
 std::string overviewHelp(const Registry& registry) {
   std::string text =
-      "hpsdf turns a triangle mesh into a hierarchical hp-adaptive signed distance field: an octree whose leaves hold\n"
-      "polynomials of degree 1 to 30, refined where the distance asks for it, until the error falls below a target.\n"
-      "\n"
-      "A first session:\n"
-      "  hpsdf build bunny.obj -o bunny.hpsdf               from a mesh to a field, once\n"
-      "  hpsdf info bunny.hpsdf                             what it holds, how exact it is\n"
-      "  hpsdf slice bunny.hpsdf -o degree.png              a plane through it\n"
-      "  hpsdf render bunny.hpsdf -o surface.png            its surface\n"
-      "  echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf         distance and gradient at a point\n"
-      "  hpsdf report builtin:torus -o torus                all of that on one page, no file needed\n"
-      "\n"
-      "Commands:\n";
-  for (const Command& command : registry.commands())
-    if (!command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
-  text += "\nIn scripts also:\n";
-  for (const Command& command : registry.commands())
-    if (command.scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
-  text +=
-      "\n'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its options; 'hpsdf --version' tells "
-      "the "
-      "version.\nA script writes an option --name value as name=value. Exit status: 0 done, 1 a comparison failed, 2 "
-      "bad "
-      "input, 3 some\nmeshes of a batch failed, 130 cancelled.\n";
-  return text;
+      R"(hpsdf turns a triangle mesh into a hierarchical hp-adaptive signed distance field: an octree whose leaves hold
+polynomials of degree 1 to 30. It is refined where the distance requires it, until the error falls below a target.
+
+A first session:
+  hpsdf build bunny.obj -o bunny.hpsdf               build a field from a mesh, once
+  hpsdf info bunny.hpsdf                             see its size, its settings and its error
+  hpsdf slice bunny.hpsdf -o degree.png              draw a plane through it
+  hpsdf render bunny.hpsdf -o surface.png            draw its surface
+  echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf         compute distance and gradient at a point
+  hpsdf report builtin:torus -o torus                do all of this for a built-in shape, on one page
+
+Commands:
+)";
+  for (const bool scriptOnly : {false, true}) {
+    if (scriptOnly) text += "\nCommands of scripts only:\n";
+    for (const Command& command : registry.commands())
+      if (command.scriptOnly == scriptOnly) text += fmt::format("  {:<9} {}\n", command.name, command.summary);
+  }
+  return text + R"(
+'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its common options, 'hpsdf COMMAND --help-all'
+all of its options. 'hpsdf --version' prints the version. A script writes an option --name value as name=value.
+Exit status: 0 done, 1 a comparison failed, 2 bad input, 3 some meshes of a batch failed, 130 cancelled.
+)";
 }
 
-std::string commandHelp(const Command& command) {
+std::string commandHelp(const Command& command, HelpDetail detail) {
   std::string text = fmt::format("{}\n\nUsage: {}\n\n{}", command.summary, usage(command), wrapped(command.help, 0));
   text += command.examples.size() == 1 ? "\nExample:\n" : "\nExamples:\n";
   for (const std::string& example : command.examples) text += "  " + example + "\n";
-  text += "\nParameters:\n";
-  for (const Parameter& parameter : command.parameters) {
-    const std::string detail = facts(parameter);
-    text += "  " + spelling(parameter) + "\n" + wrapped(parameter.help + (detail.empty() ? "" : " " + detail), 6);
+  std::size_t hidden = 0;
+  for (const Group& group : byGroup(command.parameters)) {
+    std::string options;
+    for (const Parameter* parameter : group.parameters)
+      if (detail == HelpDetail::all || parameter->audience == Audience::common)
+        options += "  " + spelling(*parameter) + "\n" + wrapped(parameter->help + facts(*parameter), 6);
+      else
+        ++hidden;
+    if (!options.empty()) text += "\n" + group.heading + ":\n" + options;
   }
+  if (hidden > 0)
+    text += fmt::format("\n'hpsdf {} --help-all' also explains {} advanced options.\n", command.name, hidden);
   return text;
 }
 
 std::string commandsMarkdown(const Registry& registry) {
   std::string text =
       "# Commands\n\n"
-      "Written by `hpsdf docs`, from the registry that the program itself reads. In a script an option\n"
-      "`--name value` is written `name=value` (see [scripts.md](scripts.md)).\n";
+      "`hpsdf docs` writes this page from the registry that the program itself reads. A script writes an option\n"
+      "`--name value` as `name=value` (see [scripts.md](scripts.md)).\n\n"
+      "| command | |\n|---|---|\n";
+  for (const Command& command : registry.commands())
+    text += fmt::format("| [{0}](#{0}) | {1} |\n", command.name, command.summary);
+  text += "\n## Shared options\n\nSeveral commands have these options; each command lists which.\n";
+  text += markdownSharedOptions(registry);
   for (const Command& command : registry.commands()) {
-    text += fmt::format("\n## {}\n\n{}{}\n\n```\n{}\n```\n\n{}\n", command.name, command.summary,
-                        command.scriptOnly        ? " In scripts only."
-                        : command.commandLineOnly ? " On the command line only."
-                                                  : "",
-                        usage(command), command.help);
+    const char* const where = command.scriptOnly        ? " In scripts only."
+                              : command.commandLineOnly ? " On the command line only."
+                                                        : "";
+    text += fmt::format("\n## {}\n\n{}{}\n\n```\n{}\n```\n\n{}\n", command.name, command.summary, where, usage(command),
+                        command.help);
     text += fmt::format("\n```sh\n{}\n```\n", fmt::join(command.examples, "\n"));
-    text += "\n| parameter | |\n|---|---|\n";
-    for (const Parameter& parameter : command.parameters) {
-      std::string cell = spelling(parameter);
-      for (std::size_t at = 0; (at = cell.find('|', at)) != std::string::npos; at += 2) cell.insert(at, "\\");
-      const std::string detail = facts(parameter);
-      text += fmt::format("| `{}` | {}{}{} |\n", cell, parameter.help, detail.empty() ? "" : " ", detail);
-    }
+    text += markdownParameters(registry, command);
   }
   return text;
 }
@@ -171,6 +273,8 @@ nlohmann::ordered_json commandsJson(const Registry& registry) {
                             {"unit", parameter.unit},
                             {"positional", parameter.positional},
                             {"repeatable", parameter.repeatable},
+                            {"group", parameter.group},
+                            {"advanced", parameter.audience == Audience::advanced},
                             {"help", parameter.help}});
     commands.push_back({{"name", command.name},
                         {"summary", command.summary},

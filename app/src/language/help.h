@@ -1,6 +1,7 @@
 #pragma once
-// Help, from the registry alone.
+// Help texts and docs/commands.md, made from the registry.
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -8,14 +9,25 @@
 
 namespace hpsdf::app {
 
-/// What the program is, a first session, all commands.
+/// The heading of options that many commands have, such as `json` and `threads`. It comes last in help texts.
+constexpr std::string_view kGeneralGroup = "General";
+
+enum class HelpDetail : std::uint8_t {
+  common,  ///< without options of `Audience::advanced`; the last line tells how many were left out
+  all,
+};
+
+/// Describes the program, a first session and all commands.
 std::string overviewHelp(const Registry& registry);
 
-std::string commandHelp(const Command& command);
+/// Describes one command: usage, purpose, examples, and its parameters by group.
+std::string commandHelp(const Command& command, HelpDetail detail);
 
-/// docs/commands.md.
+/// Returns the page docs/commands.md. An option that several commands share is described once: with `build` where it
+/// belongs to the construction, else in the section "Shared options".
 std::string commandsMarkdown(const Registry& registry);
 
+/// Returns commands and parameters as JSON.
 nlohmann::ordered_json commandsJson(const Registry& registry);
 
 }  // namespace hpsdf::app

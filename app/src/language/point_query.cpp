@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::app {
@@ -20,31 +21,25 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 bool isSeparator(char c) { return c == ',' || c == ';' || kBlanks.find(c) != std::string_view::npos; }
 bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-std::string_view trimmed(std::string_view line) {
-  const std::size_t first = line.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return line.substr(first, line.find_last_not_of(kBlanks) - first + 1);
-}
-
-/// Exactly three numbers with blanks, and at most one comma or semicolon, between them. Finite or not.
+/// Parses exactly three numbers, finite or not, separated by blanks and at most one comma or semicolon.
 std::optional<Vector3> parsePoint(std::string_view text) {
   Vector3 point;
-  const char* at = text.data();
-  const char* const end = at + text.size();
+  const char* next = text.data();
+  const char* const end = next + text.size();
   for (int axis = 0; axis < 3; ++axis) {
-    const char* const before = at;
+    const char* const before = next;
     int commas = 0;
-    for (; at != end && isSeparator(*at); ++at) commas += kBlanks.find(*at) == std::string_view::npos;
-    if (commas > (axis == 0 ? 0 : 1) || (axis > 0 && at == before)) return std::nullopt;
-    if (at != end && *at == '+') ++at;
-    const auto [next, error] = std::from_chars(at, end, point[axis]);
+    for (; next != end && isSeparator(*next); ++next) commas += kBlanks.find(*next) == std::string_view::npos;
+    if (commas > (axis == 0 ? 0 : 1) || (axis > 0 && next == before)) return std::nullopt;
+    if (next != end && *next == '+') ++next;
+    const auto [after, error] = std::from_chars(next, end, point[axis]);
     if (error != std::errc()) return std::nullopt;
-    at = next;
+    next = after;
   }
-  return at == end ? std::optional(point) : std::nullopt;
+  return next == end ? std::optional(point) : std::nullopt;
 }
 
-/// A line of column names: they begin with letters and are not numbers such as nan.
+/// True for a line of column names: it begins with a letter or a quote, and is not a point such as "nan nan nan".
 bool isHeader(std::string_view text) {
   return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
 }
@@ -61,7 +56,7 @@ class Query {
       std::string_view text = line;
       if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
       take(trimmed(text), number);
-      if (in.rdbuf()->in_avail() <= 0) flush();  // who writes a point and waits gets its answer
+      if (in.rdbuf()->in_avail() <= 0) flush();  // another program may wait for this answer
     }
     if (in.bad()) throw Error(name_ + ": cannot be read");
     flush();
@@ -82,7 +77,7 @@ class Query {
     if (points_.size() == kBatch) flush();
   }
 
-  /// JSON knows no infinity.
+  /// JSON has no infinities and no NaN.
   static std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {

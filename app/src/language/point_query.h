@@ -1,5 +1,6 @@
 #pragma once
-// Points in, distances and gradients out, as text; batch by batch, so that millions of points need little memory.
+// Answers points with distances and gradients, all as text. It works in batches, so that millions of points need little
+// memory.
 
 #include <cstdint>
 #include <filesystem>
@@ -15,10 +16,10 @@ namespace hpsdf::app {
 
 enum class PointFormat : std::uint8_t { csv, json };
 
-/// Throws `Error` naming a file that is missing, a folder or unreadable.
+/// Opens a file of points. Throws `Error` with its name where it is missing, a folder or unreadable.
 std::ifstream openPoints(const std::filesystem::path& file);
 
-/// Answers every point of `in`, called `name` in messages, through `write`; returns how many there were.
+/// Reads points from `in`, evaluates the field there and passes the answers to `write`. Returns the number of points.
 /// Throws `Error` "name:line: …" for a line that is not a point.
 std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                         const std::function<void(std::string_view)>& write);

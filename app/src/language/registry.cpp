@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "hpsdf/detail/nearest_name.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -28,9 +28,10 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   }
 }
 
-std::string suggestion(std::string_view wanted, const std::vector<std::string>& known) {
-  const std::string near = nearestName(wanted, known);
-  return near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near);
+std::vector<std::string> namesOf(const auto& described) {
+  std::vector<std::string> names;
+  for (const auto& one : described) names.push_back(one.name);
+  return names;
 }
 
 bool inRange(const Parameter& parameter, double value) {
@@ -65,8 +66,8 @@ std::optional<bool> parseFlag(std::string_view text) {
   return std::nullopt;
 }
 
-/// How many numbers a parameter takes, in words: "a number", "3 numbers with commas between them"; counts that follow
-/// one another are one form.
+/// Describes each accepted count of numbers: "a number", "3 numbers with commas between them". Consecutive counts share
+/// one description.
 std::vector<std::string> countForms(const Parameter& parameter) {
   const char* kind = parameter.whole ? "whole number" : "number";
   std::vector<std::string> forms;
@@ -84,7 +85,7 @@ std::vector<std::string> countForms(const Parameter& parameter) {
   return forms;
 }
 
-/// The numbers of a value, or nothing when it is not what the parameter takes.
+/// Parses the numbers of a value; nothing where the parameter does not accept them.
 std::optional<std::vector<double>> parseNumbers(const Parameter& parameter, std::string_view text) {
   const bool whole = parameter.whole || parameter.type == ParameterType::wholeNumber;
   std::vector<double> numbers;
@@ -136,8 +137,16 @@ std::string expectedValue(const Parameter& parameter) {
 }
 
 const Parameter* findParameter(const Command& command, std::string_view name) {
-  const auto found = std::ranges::find(command.parameters, name, &Parameter::name);
+  const auto found = std::ranges::find_if(command.parameters, [&](const Parameter& parameter) {
+    return parameter.name == name || (!parameter.synonym.empty() && parameter.synonym == name);
+  });
   return found == command.parameters.end() ? nullptr : &*found;
+}
+
+std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables) {
+  std::vector<Parameter> parameters;
+  for (const std::vector<Parameter>& table : tables) parameters.insert(parameters.end(), table.begin(), table.end());
+  return parameters;
 }
 
 void Registry::add(Command command) {
@@ -145,22 +154,31 @@ void Registry::add(Command command) {
     throw std::logic_error("two commands named " + command.name);
   command.parameters.push_back({.name = "json",
                                 .type = ParameterType::flag,
-                                .help = "Report as JSON on standard output, and nothing else there.",
+                                .help = "Writes the results as JSON to standard output, and nothing else. Use it in "
+                                        "programs that call hpsdf.",
                                 .defaultText = "false"});
   commands_.push_back(std::move(command));
+}
+
+void Registry::present(std::span<const ParameterPresentation> table) {
+  for (Command& command : commands_)
+    for (Parameter& parameter : command.parameters) {
+      const auto found = std::ranges::find(table, parameter.name, &ParameterPresentation::name);
+      if (found == table.end() || parameter.positional) continue;
+      if (parameter.group.empty()) parameter.group = found->group;
+      parameter.audience = found->audience;
+      parameter.synonym = found->synonym;
+    }
 }
 
 const Command& Registry::command(std::string_view name) const {
   const auto found = std::ranges::find(commands_, name, &Command::name);
   if (found != commands_.end()) return *found;
-  std::vector<std::string> names;
-  for (const Command& command : commands_) names.push_back(command.name);
-  const std::string near = nearestName(name, names);
-  throw Error(fmt::format("unknown command '{}'; {}", name,
-                          near.empty() ? "'hpsdf --help' lists them" : fmt::format("did you mean '{}'?", near)));
+  throw Error(
+      fmt::format("unknown command '{}'; {}", name, suggestion(name, namesOf(commands_), "'hpsdf --help' lists them")));
 }
 
-/// Builds the `Arguments` of one call; CLI11 tells options, their values and positional words apart.
+/// Builds the `Arguments` of one call. CLI11 separates options, their values and positional words.
 class ArgumentReader {
  public:
   ArgumentReader(const Command& command, std::span<const Word> words, Origin origin)
@@ -189,18 +207,19 @@ class ArgumentReader {
  private:
   static CLI::Option* addOption(CLI::App& parser, const Parameter& parameter) {
     std::string names = "--" + parameter.name;
+    if (!parameter.synonym.empty()) names += ",--" + parameter.synonym;
     if (parameter.alias != 0) names += fmt::format(",-{}", parameter.alias);
     if (parameter.type == ParameterType::flag)
       return parser.add_flag(names)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     if (parameter.positional) names += "," + parameter.name;
     CLI::Option* option = parser.add_option(names);
     if (parameter.repeatable) option->expected(1, CLI::detail::expected_max_vector_size);
-    // one value an occurrence: `-e A B` must leave B to the positional words
+    // Each occurrence takes one value: `-e A B` must leave B to the positional words.
     option->allow_extra_args(parameter.repeatable && parameter.positional);
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
-  /// Script spelling to that of the command line. The value has not been split by blanks and is not again.
+  /// Converts the script spelling name=value to --name=value. Values are passed on as one word, with their blanks.
   std::vector<std::string> normalizedWords() const {
     std::vector<std::string> result;
     for (std::size_t i = 0; i < words_.size(); ++i) {
@@ -223,18 +242,15 @@ class ArgumentReader {
   }
 
   ArgumentError unknownOption(const std::string& written, std::string_view name, std::size_t word) const {
-    std::vector<std::string> known;
-    for (const Parameter& parameter : command_.parameters) known.push_back(parameter.name);
-    std::string near = nearestName(name, known);
-    if (!near.empty() && origin_ == Origin::commandLine) near.insert(0, "--");
-    return ArgumentError(fmt::format("{}: unknown option '{}'; {}", command_.name, written,
-                                     near.empty() ? fmt::format("'hpsdf help {}' lists them", command_.name)
-                                                  : fmt::format("did you mean '{}'?", near)),
-                         word);
+    const std::string list = fmt::format("'hpsdf help {} --all' lists them", command_.name);
+    return ArgumentError(
+        fmt::format("{}: unknown option '{}'; {}", command_.name, written,
+                    suggestion(name, namesOf(command_.parameters), list, origin_ == Origin::commandLine ? "--" : "")),
+        word);
   }
 
   void refuseUnknown(const std::vector<std::string>& extras) const {
-    // an unknown option leaves its value behind as a positional word: name the option
+    // The value of an unknown option is left over as a positional word too: report the option itself.
     const auto option = std::ranges::find_if(extras, [](const std::string& word) { return word.starts_with('-'); });
     if (option != extras.end()) {
       const std::string written = option->substr(0, option->find('='));
@@ -252,17 +268,24 @@ class ArgumentReader {
     return found == words_.end() ? 0 : static_cast<std::size_t>(found - words_.begin());
   }
 
-  /// The last word that sets this parameter: that is where a complaint about its value belongs.
+  /// Returns the index of the last word that sets this parameter, to which a complaint about its value points.
   std::size_t wordOf(const Parameter& parameter, std::string_view value) const {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;
-      const bool named = words_[i].equals != std::string::npos && text.substr(0, words_[i].equals) == parameter.name;
-      const std::string option = "--" + parameter.name;
-      const bool dashed = text.starts_with(option) && (text.size() == option.size() || text[option.size()] == '=');
       const bool aliased = parameter.alias != 0 && text.starts_with(fmt::format("-{}", parameter.alias));
-      if (named || dashed || aliased || (parameter.positional && text == value)) return i;
+      const bool named =
+          sets(words_[i], parameter.name) || (!parameter.synonym.empty() && sets(words_[i], parameter.synonym));
+      if (named || aliased || (parameter.positional && text == value)) return i;
     }
     return 0;
+  }
+
+  /// True for `name=value`, `--name` and `--name=value`.
+  static bool sets(const Word& word, const std::string& name) {
+    const std::string_view text = word.text;
+    const std::string option = "--" + name;
+    if (text.starts_with(option) && (text.size() == option.size() || text[option.size()] == '=')) return true;
+    return word.equals != std::string::npos && text.substr(0, word.equals) == name;
   }
 
   std::string shown(const Parameter& parameter) const {
@@ -290,9 +313,9 @@ class ArgumentReader {
   Arguments::Value checked(const Parameter& parameter, const std::string& text) const {
     Arguments::Value value{.text = text};
     const auto refuse = [&](const std::string& hint = {}) {
-      throw ArgumentError(
-          fmt::format("{}: expected {}, found '{}'{}", shown(parameter), expectedValue(parameter), text, hint),
-          wordOf(parameter, text));
+      throw ArgumentError(fmt::format("{}: expected {}, found '{}'{}{}", shown(parameter), expectedValue(parameter),
+                                      text, hint.empty() ? "" : "; ", hint),
+                          wordOf(parameter, text));
     };
     switch (parameter.type) {
       case ParameterType::text:
@@ -301,7 +324,7 @@ class ArgumentReader {
         if (text.empty()) refuse();
         break;
       case ParameterType::choice:
-        if (!contains(parameter.choices, text)) refuse(suggestion(text, parameter.choices));
+        if (!contains(parameter.choices, text)) refuse(suggestion(text, parameter.choices, ""));
         break;
       case ParameterType::flag:
         if (const auto on = parseFlag(text))
@@ -317,7 +340,7 @@ class ArgumentReader {
         if (auto numbers = parseNumbers(parameter, text))
           value.numbers = std::move(*numbers);
         else
-          refuse(suggestion(text, parameter.choices));
+          refuse(suggestion(text, parameter.choices, ""));
         break;
     }
     return value;

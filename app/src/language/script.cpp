@@ -10,35 +10,37 @@
 
 #include "console/failed.h"
 #include "files/text_file.h"
-#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
-constexpr std::size_t kDeepestInclude = 16;  // as deep as `run` goes
-// A few lines can ask for any amount of memory, by variables made of variables and by files that include others twice.
+constexpr std::size_t kDeepestInclude = 16;  // the same limit as for scripts that run each other
+// A few lines can require any amount of memory, by variables that contain variables and by files that include others
+// twice. The limits below end such scripts.
 constexpr std::size_t kMostCalls = 100'000;
-constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // put in for $name, altogether
+constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // sum over all replacements of $name
 
 bool isLower(char c) { return c >= 'a' && c <= 'z'; }
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 bool isLetter(char c) { return isLower(c) || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-/// Of a variable: letters, digits and _, not first a digit.
+/// True for a name of a variable: letters, digits and _, not starting with a digit.
 bool isIdentifier(std::string_view name) {
   return !name.empty() && isLetter(name[0]) &&
          std::ranges::all_of(name, [](char c) { return isLetter(c) || isDigit(c); });
 }
 
-/// Where a `=` ends a name of an option or a variable; npos for any other word, such as builtin:torus,major=0.7.
+/// Returns the index of the `=` that ends the name of an option or a variable; npos for any other word, such as
+/// builtin:torus,major=0.7.
 std::size_t equalsAfterName(std::string_view word) {
   const std::size_t equals = word.find('=');
   if (equals == std::string_view::npos || equals == 0) return std::string_view::npos;
   const auto name = word.substr(0, equals);
-  const bool plain =
+  const bool isName =
       isLetter(name[0]) && std::ranges::all_of(name, [](char c) { return isLetter(c) || isDigit(c) || c == '-'; });
-  return plain ? equals : std::string_view::npos;
+  return isName ? equals : std::string_view::npos;
 }
 
 struct Statement {
@@ -49,11 +51,11 @@ struct Statement {
 /// Splits a script into statements and words.
 class Scanner {
  public:
-  /// `includedFrom` ends every message: see `Call`. `variableBytes` counts what is put in for variables.
+  /// `includedFrom` is appended to every message (see `Call`). `variableBytes` sums the lengths of replaced variables.
   Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
       : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 
-  /// The next statement that has words; an empty one at the end of the text.
+  /// Returns the next statement that has words, or an empty one at the end of the text.
   Statement next(const Variables& variables) {
     Statement statement{line_, {}};
     while (position_ < text_.size()) {
@@ -83,7 +85,8 @@ class Scanner {
     if (text_[position_] == '\n') {
       ++line_;
       column_ = 1;
-    } else if ((static_cast<unsigned char>(text_[position_]) & 0xc0) != 0x80) {  // a UTF-8 character is one column
+    } else if ((static_cast<unsigned char>(text_[position_]) & 0xc0) !=
+               0x80) {  // continuation bytes of UTF-8 have no column
       ++column_;
     }
     ++position_;
@@ -96,7 +99,7 @@ class Scanner {
 
   Word word(const Variables& variables) {
     Word word{.column = column_};
-    std::size_t literal = std::string::npos;  // length of the part before the first quote or variable
+    std::size_t literal = std::string::npos;  // length of the text before the first quote or variable
     while (!atWordEnd()) {
       const char c = text_[position_];
       if (c == '"' || c == '$') literal = std::min(literal, word.text.size());
@@ -149,23 +152,21 @@ class Scanner {
     if (braced && (position_ == text_.size() || text_[position_] != '}'))
       fail(line_, column, "expected } after ${" + name);
     if (braced) advance();
-    if (!isIdentifier(name)) fail(line_, column, "expected a variable's name after $; a plain dollar sign is $$");
+    if (!isIdentifier(name)) fail(line_, column, "expected a variable's name after $; write $$ for a dollar sign");
     const auto found = variables.find(name);
     if (found == variables.end()) fail(line_, column, unknownVariable(name, variables));
     variableBytes_ += found->second.size();
     if (variableBytes_ > kMostVariableBytes)
       fail(line_, column,
-           fmt::format("the script's variables make more than {} characters; take some out", kMostVariableBytes));
+           fmt::format("the script's variables expand to more than {} characters; use fewer", kMostVariableBytes));
     out += found->second;
   }
 
   static std::string unknownVariable(const std::string& name, const Variables& variables) {
     std::vector<std::string> known;
     for (const auto& [other, value] : variables) known.push_back(other);
-    const std::string near = nearestName(name, known);
-    return fmt::format("unknown variable ${}; {}", name,
-                       near.empty() ? fmt::format("give {}=VALUE after the script, or 'set {}=VALUE'", name, name)
-                                    : fmt::format("did you mean ${}?", near));
+    const std::string remedy = fmt::format("give {}=VALUE after the script, or 'set {}=VALUE'", name, name);
+    return fmt::format("unknown variable ${}; {}", name, suggestion(name, known, remedy, "$"));
   }
 
   std::string_view name_;
@@ -177,7 +178,7 @@ class Scanner {
   int column_ = 1;
 };
 
-/// Reads a script and, in their places, those that it includes.
+/// Reads a script; the lines of an included script replace its `include`.
 class ScriptReader {
  public:
   ScriptReader(const Registry& registry, Variables variables) : registry_(registry), variables_(std::move(variables)) {}
@@ -188,7 +189,7 @@ class ScriptReader {
   }
 
  private:
-  /// A script that is being read, and where it includes the next.
+  /// A script that is being read, with the position of its `include` that is being followed.
   struct Open {
     std::string name;
     std::string where = {};
@@ -212,15 +213,14 @@ class ScriptReader {
     std::string name, text;
   };
 
-  /// Checks the statement; what it includes, if it does.
+  /// Checks the statement and appends its call. Returns the script that it includes, if it includes one.
   std::optional<Included> addCall(const Scanner& scanner, const Statement& statement, const std::string& includedFrom) {
     const Word& verb = statement.words.front();
     const auto rest = std::span(statement.words).subspan(1);
     std::optional<Included> included;
     try {
       if (calls_.size() == kMostCalls)
-        throw Error(
-            fmt::format("more than {} commands, those of included scripts among them; take some out", kMostCalls));
+        throw Error(fmt::format("more than {} commands, counting those of included scripts; use fewer", kMostCalls));
       const Command& command = registry_.command(verb.text);
       if (command.commandLineOnly)
         throw Error(fmt::format("'{}' is a command of the command line: hpsdf {} …", verb.text, verb.text));
@@ -239,7 +239,7 @@ class ScriptReader {
     return included;
   }
 
-  /// A relative name starts at the folder of the script that includes it.
+  /// Relative names start at the folder of the including script.
   Included readIncluded(const std::string& file) const {
     const auto path = (std::filesystem::path(open_.back().name).parent_path() / file).lexically_normal();
     const auto isThat = [&](const Open& other) {
@@ -247,15 +247,14 @@ class ScriptReader {
       return std::filesystem::equivalent(path, other.name, missing);
     };
     if (std::ranges::any_of(open_, isThat))
-      throw Error(
-          fmt::format("{}: includes itself, directly or by others; take one of the includes out", path.string()));
+      throw Error(fmt::format("{}: includes itself, directly or by others; remove one of the includes", path.string()));
     if (std::error_code missing; std::filesystem::exists(path, missing) &&
                                  !std::filesystem::is_regular_file(path, missing) &&
                                  !std::filesystem::is_directory(path, missing))
-      throw Error(path.string() + ": is not a regular file; include a script");  // a device may have no end
+      throw Error(path.string() + ": is not a regular file; include a script");  // reading a device might never end
     if (open_.size() > kDeepestInclude)
-      throw Error(
-          fmt::format("{}: more than {} scripts include each other; take some apart", path.string(), kDeepestInclude));
+      throw Error(fmt::format("{}: more than {} scripts include each other; join some of them", path.string(),
+                              kDeepestInclude));
     return {path.string(), readTextFile(path.string())};
   }
 
@@ -269,7 +268,7 @@ class ScriptReader {
 
   const Registry& registry_;
   Variables variables_;
-  std::vector<Open> open_;  // the script itself first
+  std::vector<Open> open_;  // the outermost script first
   std::vector<Call> calls_;
   std::size_t variableBytes_ = 0;
 };

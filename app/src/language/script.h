@@ -1,5 +1,5 @@
 #pragma once
-// Scripts: a command a line, `verb value key=value …`; docs/scripts.md is the manual.
+// Scripts hold one command a line, `verb value key=value …`; docs/scripts.md is the manual.
 
 #include <cstddef>
 #include <filesystem>
@@ -16,25 +16,25 @@ namespace hpsdf::app {
 
 using Variables = std::map<std::string, std::string, std::less<>>;
 
-/// A checked command of a script.
+/// A checked command of a script, ready to run.
 struct Call {
   const Command* command;
   Arguments arguments;
   std::string where;         ///< "file:line:column" of the verb
-  std::string includedFrom;  ///< " (included from file:line:column, …)", which ends messages; "" in the script itself
-  int line;                  ///< in the script itself: of an included call, that of the `include`
+  std::string includedFrom;  ///< end of messages, " (included from file:line:column, …)"; "" in the outermost script
+  int line;                  ///< line in the outermost script; for an included call the line of its `include`
 };
 
-/// Reads and checks a whole script, so that a mistake in the last line shows before the first has run. `name` stands
-/// in messages, and is what included files are looked for beside; `variables` replace $name. The calls refer to the
-/// registry's commands. Throws `Error` "file:line:column: …".
+/// Reads and checks a whole script, so that a mistake in the last line is found before the first line runs. `name` is
+/// the script's file: messages begin with it, and included files are searched in its folder. `variables` replace $name.
+/// The calls refer to commands of the registry. Throws `Error` "file:line:column: …".
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables);
 
-/// Runs the calls one after another; stops at the first that throws, and says where.
+/// Runs the calls in order. An error ends the script; its message then begins with the position of the call.
 void runScript(Session& session, std::span<const Call> calls);
 
-/// "name=value" words. Throws `Error` for one that is not of that form.
+/// Parses words of the form name=value. Throws `Error` for any other word.
 Variables parseVariables(const std::vector<std::string>& words);
 
 bool isVariableAssignment(std::string_view word);

@@ -1,23 +1,21 @@
 #include "pictures/figure_commands.h"
 
-// pick and expect: figures of the current field and of the last picture.
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "console/failed.h"
-#include "hpsdf/detail/nearest_name.h"
 #include "language/expectation.h"
 #include "pictures/readout.h"
 #include "session/field_summary.h"
 #include "session/session.h"
 #include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
-/// What the last picture shows at a pixel; null where that is nothing of the field. With what takes longer to find:
-/// the exact distance, where it is known, and the jumps at the cell's nearest face.
+/// The figures of the field at a pixel of the last picture; null where the pixel shows no part of the field. `withAll`
+/// adds those that take long to compute: the exact distance, if it is known, and the jumps at the cell's nearest face.
 Json pickJson(Session& session, int x, int y, bool withAll) {
   const auto pick = render::pickAt(session.current().field, session.picture(), x, y);
   if (!pick) return {};
@@ -76,23 +74,21 @@ Json figuresOf(Session& session, const Expectation& expectation) {
   return pick;
 }
 
-/// The element that a path leads to. Throws `Error` with the nearest known name.
-double followed(Json json, const Expectation& expectation) {
-  std::string way = expectation.source;
+/// The number at the expectation's path. Throws `Error` with the nearest known name where the path leads nowhere.
+double numberAt(Json json, const Expectation& expectation) {
+  std::string path = expectation.source;
   for (const std::string& key : expectation.path) {
     const bool isElement = json.is_array() && parseNumber(key) && json.size() > std::size_t(*parseNumber(key));
     if (!isElement && !(json.is_object() && json.contains(key))) {
       std::vector<std::string> known;
       for (const auto& [name, value] : json.items()) known.push_back(name);
-      const std::string near = nearestName(key, known);
-      throw Error(fmt::format(
-          "{} has no '{}'; {}", way, key,
-          near.empty() ? fmt::format("it has {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near)));
+      throw Error(fmt::format("{} has no '{}'; {}", path, key,
+                              suggestion(key, known, fmt::format("it has {}", fmt::join(known, ", ")))));
     }
     json = isElement ? Json(json[std::size_t(*parseNumber(key))]) : Json(json[key]);
-    way += "." + key;
+    path += "." + key;
   }
-  if (!json.is_number()) throw Error(fmt::format("{} is no number", way));
+  if (!json.is_number()) throw Error(fmt::format("{} is no number", path));
   return json.get<double>();
 }
 
@@ -120,7 +116,7 @@ std::string expressionOf(const Arguments& arguments) {
 void runExpect(Session& session, const Arguments& arguments) {
   const std::string text = expressionOf(arguments);
   const Expectation expectation = parseExpectation(text);
-  const double found = followed(figuresOf(session, expectation), expectation);
+  const double found = numberAt(figuresOf(session, expectation), expectation);
   if (!expectation.holds(found)) throw Failed(fmt::format("expected {}, found {}", text, found));
   if (session.wantsJson(arguments)) printJson(session.console().out, {{"expected", text}, {"found", found}});
 }

@@ -8,8 +8,10 @@
 #include <ostream>
 
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "files/film.h"
+#include "language/append_parameters.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
@@ -43,7 +45,7 @@ std::vector<Parameter> filmParameters(const std::string& frames, const std::stri
            .maximum = 240}};
 }
 
-/// Those of another command, without what is the caller's own.
+/// The parameters of another command but those named in `without`.
 std::vector<Parameter> parametersOf(const Registry& registry, std::string_view command,
                                     std::initializer_list<std::string_view> without) {
   std::vector<Parameter> parameters = registry.command(command).parameters;
@@ -53,15 +55,11 @@ std::vector<Parameter> parametersOf(const Registry& registry, std::string_view c
   return parameters;
 }
 
-void append(std::vector<Parameter>& parameters, std::vector<Parameter> more) {
-  std::ranges::move(more, std::back_inserter(parameters));
-}
-
 void step(const Progress& progress, std::size_t done, std::size_t all) {
-  progress.at("drawing frames", double(done) / double(all));
+  progress.update("drawing frames", double(done) / double(all));
 }
 
-/// What the commands report, and a folder's frames.json holds; a frame a row of `rows`.
+/// Publishes the film and reports it. `rows` holds the figures of each frame, for the folder's frames.json.
 void publish(Session& session, const Arguments& arguments, Film& film, const render::Image& image, Json rows) {
   const Json about = film.about(image, session.lastRenderer(), std::move(rows));
   film.publish(about);
@@ -69,15 +67,13 @@ void publish(Session& session, const Arguments& arguments, Film& film, const ren
   session.console().out << Film::line(about);
 }
 
-// turntable
-
 void runTurntable(Session& session, const Arguments& arguments) {
   render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
   const int frames = arguments.whole("frames");
   Film film(arguments.text("output"));
   useField(session, arguments);
-  const InterruptGuard guard;  // until all is in its place
+  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
@@ -91,7 +87,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
       step(progress, film.frames(), std::size_t(frames));
       picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
       render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
-      picture.scale = drawn.scale;  // that of the first frame, so that no colour changes its meaning
+      picture.scale = drawn.scale;  // colours keep the meaning that they have in the first frame
       seen |= drawn.seen;
       image = std::move(drawn.image);
       film.add(image);
@@ -104,10 +100,8 @@ void runTurntable(Session& session, const Arguments& arguments) {
   publish(session, arguments, film, last, rows);
 }
 
-// frames
-
-/// `slice` and `render` without field and output: what --of takes.
-Registry looks(const Registry& registry) {
+/// The commands that --of takes: `slice` and `render` without the parameters field and output.
+Registry drawingCommands(const Registry& registry) {
   Registry result;
   for (const char* name : {"slice", "render"}) {
     Command command = registry.command(name);
@@ -117,40 +111,40 @@ Registry looks(const Registry& registry) {
   return result;
 }
 
-/// The one command of --of. Throws `Error` "of:line:column: …".
-Call lookOf(const Registry& looks, const Arguments& arguments) {
-  std::vector<Call> calls = parseScript(looks, "of", arguments.text("of"), {});
+/// The command that --of holds. Throws `Error` "of:line:column: …".
+Call drawingCall(const Registry& commands, const Arguments& arguments) {
+  std::vector<Call> calls = parseScript(commands, "of", arguments.text("of"), {});
   if (calls.size() != 1) throw Error("of: expected one command, slice or render");
   return std::move(calls.front());
 }
 
-bool isSlice(const Call& look) { return look.command->name == "slice"; }
+bool isSlice(const Call& call) { return call.command->name == "slice"; }
 
-render::ColorBy colorOf(const Call& look) {
-  return isSlice(look) ? slicePicture(look.arguments).color : surfacePicture(look.arguments).color;
+render::ColorBy colorOf(const Call& call) {
+  return isSlice(call) ? slicePicture(call.arguments).color : surfacePicture(call.arguments).color;
 }
 
-void checkFrames(const Registry& looks, const Arguments& arguments) {
-  const Call look = lookOf(looks, arguments);
-  colorOf(look);
-  backend(look.arguments);
+void checkFrames(const Registry& commands, const Arguments& arguments) {
+  const Call call = drawingCall(commands, arguments);
+  colorOf(call);
+  backend(call.arguments);
 }
 
-/// Draws the session's current field, on a scale that is given, if one is.
-render::Drawn drawLook(Session& session, const Call& look, const std::optional<render::ScaleOptions>& scale) {
-  const Arguments& arguments = look.arguments;
+/// Draws the session's current field, with the given scale if there is one.
+render::Drawn drawFrame(Session& session, const Call& call, const std::optional<render::ScaleOptions>& scale) {
+  const Arguments& arguments = call.arguments;
   const auto drawn = [&](auto picture, auto draw) {
     if (scale) picture.scale = *scale;
     const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
     return draw(session.renderer(backend(arguments)), session.current().field, picture, reference);
   };
   const Box& domain = session.current().field.domain();
-  if (!isSlice(look)) return drawn(surfacePicture(arguments, domain), render::drawSurface);
+  if (!isSlice(call)) return drawn(surfacePicture(arguments, domain), render::drawSurface);
   return drawn(slicePicture(arguments, domain), render::drawSlice);
 }
 
-/// The steps after which a frame is drawn: none, then 1 growing by an even factor to all, each more than the one
-/// before. As many as are asked for, or one for each step where there are fewer.
+/// The numbers of steps after which a frame is drawn: 0, then a geometric sequence from 1 to `all`, strictly ascending.
+/// There are `frames` numbers, or all + 1 if that is less.
 std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   frames = std::min<std::uint64_t>(frames, all + 1);
   std::vector<std::uint64_t> steps = {0};
@@ -162,8 +156,8 @@ std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   return steps;
 }
 
-/// All levels from the lowest of the base cells to the highest of the finished field: each that a frame between them
-/// can have.
+/// Extends the scale to all levels that a frame can have: from the lowest of the base cells to the highest of the
+/// finished field.
 void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);
@@ -177,28 +171,28 @@ Json frameRow(const Field& field) {
   return {{"file", ""}, {"steps", *field.metadata().steps}, {"leaves", statistics(field).leaves}};
 }
 
-void runFrames(Session& session, const Registry& looks, const Arguments& arguments) {
-  const Call look = lookOf(looks, arguments);
+void runFrames(Session& session, const Registry& commands, const Arguments& arguments) {
+  const Call call = drawingCall(commands, arguments);
   const std::string surface = arguments.text("mesh");
   Film film(arguments.text("output"));
-  const InterruptGuard guard;  // until all is in its place
+  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
   BuiltField built = buildField(session.console(), surface, arguments);
   const std::shared_ptr<const DistanceFunction> exact = built.exact;
   session.setField({std::move(built.field), surface});
   session.setExact(exact);
   const Field& finished = session.current().field;
   const auto steps = frameSteps(std::size_t(arguments.whole("frames")), *finished.metadata().steps);
-  render::ScaleOptions scale = drawLook(session, look, std::nullopt).scale;
+  render::ScaleOptions scale = drawFrame(session, call, std::nullopt).scale;
 
   Json rows = Json::array();
-  std::ostream silent(nullptr);  // of what is done for each frame
+  std::ostream silent(nullptr);  // hides the messages of each frame
   const auto addStage = [&](Field field) {
-    if (film.frames() == 0) widenLevels(scale, field, colorOf(look));
+    if (film.frames() == 0) widenLevels(scale, field, colorOf(call));
     rows.push_back(frameRow(field));
     Session stage(session.registry(), {session.console().in, silent, silent});
     stage.setField({std::move(field), surface});
     stage.setExact(exact);
-    film.add(drawLook(stage, look, scale).image);
+    film.add(drawFrame(stage, call, scale).image);
   };
   const render::Image last = withProgress(session.console(), [&](const Progress& progress) {
     buildStages(*exact, finished.domain(), buildOptions(arguments), std::span(steps).first(steps.size() - 1),
@@ -208,7 +202,7 @@ void runFrames(Session& session, const Registry& looks, const Arguments& argumen
                 },
                 {.report = {}, .cancelled = progress.cancelled});
     rows.push_back(frameRow(finished));
-    render::Image image = drawLook(session, look, scale).image;
+    render::Image image = drawFrame(session, call, scale).image;
     film.add(image);
     film.encode(arguments.number("fps"), progress);
     return image;
@@ -234,7 +228,7 @@ Command turntableCommand(const Registry& registry) {
 }
 
 Command framesCommand(const Registry& registry) {
-  const auto shared = std::make_shared<const Registry>(looks(registry));
+  const auto shared = std::make_shared<const Registry>(drawingCommands(registry));
   Command command{
       .name = "frames",
       .summary = "Draw how a field refines itself, as frames or an MP4.",

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds turntable and frames, whose parameters are those of slice and render: after these.
+/// Adds `turntable` and `frames`. The registry must hold `slice` and `render`, whose parameters they take over.
 void addMotionCommands(Registry& registry);
 
 }  // namespace hpsdf::app

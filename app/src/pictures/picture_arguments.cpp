@@ -10,6 +10,8 @@
 #include "hpsdf/error.h"
 #include "pictures/picture_names.h"
 #include "session/backend.h"
+#include "text/json.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 
@@ -84,14 +86,14 @@ render::ShownCells shownCells(const Arguments& arguments) {
   const std::string style = arguments.text("cells");
   for (const char* name : {"degrees", "depths"})
     if (style == "none" && arguments.given(name))
-      throw Error(fmt::format("{}: needs cells, lines or boxes: it says which of them are drawn", name));
+      throw Error(fmt::format("{}: needs cells=lines or cells=boxes, of which it chooses some", name));
   return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
           levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
 }
 
 render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
 
-/// The plane in a surface's picture: six numbers, or an axis with an offset.
+/// The plane that `render` draws: six numbers, or an axis with an offset.
 std::optional<render::Plane> scenePlane(const Arguments& arguments) {
   if (!arguments.given("plane")) {
     if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
@@ -141,9 +143,9 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain)
   return picture;
 }
 
-std::vector<Parameter> lookParameters(const Registry& registry) {
+std::vector<Parameter> cameraParameters(const Registry& registry) {
   std::vector<Parameter> parameters;
-  for (const char* name : kLooks) parameters.push_back(*findParameter(registry.command("render"), name));
+  for (const char* name : kCameraParameters) parameters.push_back(*findParameter(registry.command("render"), name));
   return parameters;
 }
 
@@ -228,6 +230,18 @@ render::ReferenceData referenceDataFor(Session& session, const Arguments& argume
   const std::string defects = arguments.textOr("defects", "");
   if (!defects.empty()) reference.defects = &session.defects(defects);
   return reference;
+}
+
+void requirePng(const std::string& file) {
+  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+}
+
+void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,
+                   const std::string& renderer) {
+  if (session.wantsJson(arguments))
+    return printJson(session.console().out,
+                     {{"output", file}, {"width", width}, {"height", height}, {"renderer", renderer}});
+  session.console().out << fmt::format("{}: {}x{}, {}\n", file, width, height, renderer);
 }
 
 }  // namespace hpsdf::app

@@ -1,5 +1,5 @@
 #pragma once
-// From validated arguments to the settings of render.
+// Converts validated arguments into the renderer's settings.
 
 #include <array>
 #include <memory>
@@ -15,43 +15,50 @@
 
 namespace hpsdf::app {
 
-/// "2,4-6" → 2, 4, 5, 6; empty for "". Throws `Error` naming the parameter.
+/// The levels of a list such as "2,4-6", each from 0 to `most`; empty for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 
-/// Of a parameter that takes three numbers and was given.
+/// The point that a parameter of three numbers holds, which must have been given.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// Throws `Error` when plane and axis are both given. Its plane is the one asked for, or, in a domain, lies where
-/// nobody said otherwise: at 0, or where the domain does not hold that, in its middle.
+/// The settings of `slice`. Without an offset the plane is at 0, or, if a domain is given, at `defaultOffset`. Throws
+/// `Error` when plane and axis are both given.
 render::SlicePicture slicePicture(const Arguments& arguments);
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
 
-/// The parameters of `render` that any picture before a camera takes.
-inline constexpr std::array kLooks = {"camera", "view", "target", "projection", "size", "samples", "cpu", "gl"};
-std::vector<Parameter> lookParameters(const Registry& registry);
+/// The parameters of `render` that every picture with a camera takes.
+inline constexpr std::array kCameraParameters = {"camera", "view",    "target", "projection",
+                                                 "size",   "samples", "cpu",    "gl"};
+std::vector<Parameter> cameraParameters(const Registry& registry);
 
-/// Draws these meshes, by OpenGL or on the CPU.
+/// A renderer of these meshes, by OpenGL or on the CPU.
 std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend);
 
-/// What any picture before a camera takes: camera, view, target, projection, size and samples. Throws `Error` for a
-/// camera or a size out of range.
+/// The settings that `kCameraParameters` give. Throws `Error` for a camera or a size out of range.
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
-/// Throws `Error` for a camera out of range, or options that exclude or need each other. Its plane is the one asked
-/// for, or, in a domain, lies where nobody said otherwise.
+/// The settings of `render`. Without an offset the plane is at 0, or, if a domain is given, at `defaultOffset`. Throws
+/// `Error` for a camera out of range, and for parameters that exclude or need each other.
 render::SurfacePicture surfacePicture(const Arguments& arguments);
 render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain);
 
-/// Tells what explains an empty picture, or an open shell.
+/// Writes a note that explains an empty picture, or a surface that is cut off by the walls of the domain.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// What a picture of the session's field draws besides, by a command's arguments.
+/// The reference data that a picture of the session's field needs, from the files that the arguments name.
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SlicePicture& picture);
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SurfacePicture& picture);
 
-/// Where a slice across an axis lies when nobody says: at 0, or where the domain does not hold that, in its middle.
+/// Default offset of a plane across an axis: 0, or the domain's middle if 0 lies outside.
 double defaultOffset(const Box& domain, int axis);
+
+/// Throws `Error` unless the file ends in .png.
+void requirePng(const std::string& file);
+
+/// Reports a picture that was written: one line, or a JSON object if the arguments ask for it.
+void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,
+                   const std::string& renderer);
 
 }  // namespace hpsdf::app

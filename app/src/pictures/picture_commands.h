@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds slice and render.
+/// Adds `slice` and `render`.
 void addPictureCommands(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -58,7 +58,7 @@ std::string_view colorName(ColorBy color) {
   return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
 }
 
-/// One of the names above: the registry has seen to that.
+/// The registry accepts only the names above, so that one is always found.
 ColorBy colorNamed(std::string_view name) {
   return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Names of what pictures show, as commands spell them.
+// Names of colours, directions and cell styles, as commands spell them.
 
 #include <optional>
 #include <string>
@@ -10,19 +10,19 @@
 
 namespace hpsdf::app {
 
-/// Names of colours, as commands spell them.
+/// Names of the quantities that colours show: degree, depth, distance, ….
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
 render::ColorBy colorNamed(std::string_view name);
 
-/// Names of directions of a camera: front, back, …
+/// Names of a camera's directions: front, back, ….
 std::vector<std::string> viewNames();
-/// Turns the camera. The name is one of those.
+/// Turns the camera into a direction that `viewNames` contains.
 void turnTo(render::OrbitCamera& camera, std::string_view view);
-/// The name of its direction; "" where it has none.
+/// The name of the camera's direction; "" if it has none.
 std::string viewName(const render::OrbitCamera& camera);
 
-/// none, lines or boxes.
+/// The names are none, lines and boxes.
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);
 

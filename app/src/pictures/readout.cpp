@@ -6,12 +6,13 @@
 #include <limits>
 #include <span>
 
+#include "construction/surface.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
-/// Distance from a point to the square that an interface is.
+/// Distance from a point to an interface, which is an axis-aligned square.
 double distanceTo(const Interface& face, const Vector3& domainSizes, const Field& field, const Vector3& x) {
   const int depth = std::max(face.depths[0], face.depths[1]);
   double sum = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// What is known of the field at a point of a picture.
+// The figures of a field at a point of a picture.
 
 #include <optional>
 #include <string>
@@ -13,18 +13,18 @@ namespace hpsdf::app {
 struct Readout {
   render::Pick pick;
   Vector3 gradient;
-  double value;                  ///< f by a query, in double precision
-  std::optional<double> exact;   ///< where the exact distance is known
-  Jump valueJump, gradientJump;  ///< across the cell's nearest face
+  double value;                  ///< field at the point, in double precision
+  std::optional<double> exact;   ///< exact distance, if it is known
+  Jump valueJump, gradientJump;  ///< jumps across the cell's nearest face
   double toFace;                 ///< distance to that face, world units
 };
 
 Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick);
 
-/// Of the current field; measures its jumps when they are not known yet.
+/// The readout of the session's current field, whose jumps are measured if necessary.
 Readout readoutAt(Session& session, const render::Pick& pick);
 
-/// Two lines.
+/// The readout as two lines of text.
 std::vector<std::string> readoutText(const Readout& readout);
 
 }  // namespace hpsdf::app

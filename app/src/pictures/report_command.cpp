@@ -7,14 +7,17 @@
 #include <filesystem>
 
 #include "console/version.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "construction/mesh_summary.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
+#include "files/text_file.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/picture.h"
+#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
@@ -40,8 +43,8 @@ std::string buildCommandLine(const std::string& surface, const std::string& file
   return line;
 }
 
-/// Mean seconds a frame of the surface's buffers, field resident: after one frame to warm up, some frames, or as many
-/// as fit into two seconds.
+/// Mean time of one frame of the surface's buffers, in seconds. After one frame to warm up, it draws eight frames, or
+/// as many as fit into two seconds.
 double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
   using Clock = std::chrono::steady_clock;
   constexpr int kFrames = 8;
@@ -61,7 +64,7 @@ struct Drawing {
   std::string file;
   std::string title;
   std::string caption;
-  std::string command;  ///< what follows the field's file
+  std::string command;  ///< arguments after "hpsdf", with {} for the field's file
   bool slice;
   render::ColorBy color;
 };
@@ -128,9 +131,9 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Coefficients",
                     fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
   rows.emplace_back("Memory", bytesText(double(counts.bytes)));
-  rows.emplace_back("Target error τ", shortNumber(metadata.targetError));
+  rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
   rows.emplace_back("Total error ε",
-                    fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.nearness));
+                    fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
   rows.emplace_back("Estimated RMS error", fmt::format("{} in mesh units, {} of the mesh's longest side",
                                                        shortNumber(rms), shortNumber(rms / metadata.referenceLength)));
   rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
@@ -171,16 +174,14 @@ void runReport(Session& session, const Arguments& arguments) {
                   .footer = fmt::format("{}; {}", versionText(), renderer.description())};
   for (const Drawing& drawing : drawings())
     page.pictures.push_back(drawInto(folder.path(), session, renderer, fieldFile, drawing, arguments.whole("samples")));
-  const render::SurfacePicture traced;  // one sample a pixel, whatever the pictures above have
+  const render::SurfacePicture traced;  // the timed frame has one sample per pixel
   const double seconds = frameSeconds(renderer, field, traced);
   page.figures.emplace_back("Traced frame", fmt::format("{:.3f} s for {}x{}, one sample a pixel, field resident",
                                                         seconds, traced.width, traced.height));
   page.figures.emplace_back("Renderer", renderer.description());
 
   const fs::path index = folder.path() / "index.html";
-  OutputFile out(index);
-  out.write(reportHtml(page));
-  out.commit();
+  writeTextFile(index, reportHtml(page));
   if (session.wantsJson(arguments)) {
     Json files = Json::array();
     for (const ReportPicture& picture : page.pictures) files.push_back((folder.path() / picture.file).string());
@@ -225,8 +226,8 @@ void addReportCommand(Registry& registry) {
                       .minimum = 1,
                       .maximum = 8}},
       .action = runReport};
-  for (Parameter& parameter : buildParameters()) command.parameters.push_back(std::move(parameter));
-  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  append(command.parameters, buildParameters());
+  append(command.parameters, backendParameters());
   registry.add(std::move(command));
 }
 

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds report.
+/// Adds `report`, which writes a page about one field.
 void addReportCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -9,11 +9,13 @@ namespace hpsdf::app {
 std::vector<Parameter> backendParameters() {
   return {{.name = "cpu",
            .type = ParameterType::flag,
-           .help = "Draw in double precision on the CPU, without OpenGL: slow, and the reference.",
+           .help = "Draws in double precision on the CPU, without OpenGL. It is slow; use it as the reference, or "
+                   "where there is no "
+                   "OpenGL.",
            .defaultText = "false"},
           {.name = "gl",
            .type = ParameterType::choice,
-           .help = "Which OpenGL device to take; auto tries a hardware device first.",
+           .help = "Selects the OpenGL device. auto takes a graphics card where there is one, else software.",
            .defaultText = "auto",
            .choices = {"auto", "software", "hardware"}}};
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Which renderer draws, and the options that choose it.
+// The choice of a renderer, and the options for it.
 
 #include <vector>
 
@@ -8,20 +8,20 @@
 
 namespace hpsdf::app {
 
-/// Which renderer draws.
+/// The choice of a renderer.
 struct Backend {
   bool cpu = false;
   render::GlChoice gl = render::GlChoice::automatic;
   bool operator==(const Backend&) const = default;
 };
 
-/// The parameters `cpu` and `gl`.
+/// Returns the parameters `cpu` and `gl`.
 std::vector<Parameter> backendParameters();
 
-/// The OpenGL device that the argument `gl` names.
+/// Returns the OpenGL device that the argument `gl` names.
 render::GlChoice glChoice(const Arguments& arguments);
 
-/// The renderer that the arguments choose. Throws `Error` when `cpu` and `gl` are both given.
+/// Returns the renderer that the arguments choose. Throws `Error` where both `cpu` and `gl` are given.
 Backend backend(const Arguments& arguments);
 
 }  // namespace hpsdf::app

@@ -8,14 +8,14 @@
 
 namespace hpsdf::app {
 
-/// The field that commands work on.
+/// The field on which commands work.
 struct CurrentField {
   Field field;
-  std::string name;                              ///< file or mesh that it came from
-  std::optional<std::uintmax_t> fileBytes = {};  ///< of one that was loaded or saved
-  std::string surface = {};                      ///< mesh file or shape that it was built from just now
+  std::string name;                              ///< name of the file or mesh that it came from
+  std::optional<std::uintmax_t> fileBytes = {};  ///< size of its file, where it was loaded or saved
+  std::string surface = {};                      ///< mesh file or shape, where it was built in this session
 
-  /// What it can be built from again: as far as is known.
+  /// Returns the mesh file or shape from which it can be built again; "" where that is unknown.
   const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
 

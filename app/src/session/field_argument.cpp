@@ -10,7 +10,7 @@ namespace hpsdf::app {
 Parameter fieldParameter() {
   return {.name = "field",
           .type = ParameterType::path,
-          .help = "A field's file; in a script, the current field when left out.",
+          .help = "The file of a field. A script may leave it out and works on the current field then.",
           .valueName = "FIELD",
           .positional = true,
           .need = Need::onCommandLine};
@@ -23,7 +23,7 @@ void loadField(Session& session, const std::string& file) {
 
 void useField(Session& session, const Arguments& arguments) {
   if (arguments.has("field")) return loadField(session, arguments.text("field"));
-  session.current();  // throws where there is none
+  session.current();  // throws where there is no field
 }
 
 }  // namespace hpsdf::app

@@ -1,5 +1,5 @@
 #pragma once
-// The field that a command works on: one that it names, or the current one.
+// The argument FIELD, by which a command names the field on which it works.
 
 #include <string>
 
@@ -8,13 +8,13 @@
 
 namespace hpsdf::app {
 
-/// The parameter `field` of commands that look at a field.
+/// Returns the parameter `field` of commands that read a field.
 Parameter fieldParameter();
 
-/// Loads a field's file as the current field. Throws `Error` naming the file.
+/// Loads a file as the current field. Throws `Error` naming the file.
 void loadField(Session& session, const std::string& file);
 
-/// Loads the field that the argument `field` names, or keeps the current one. Throws `Error` where there is neither.
+/// Loads the field that the argument `field` names, or keeps the current one. Throws `Error` where neither exists.
 void useField(Session& session, const Arguments& arguments);
 
 }  // namespace hpsdf::app

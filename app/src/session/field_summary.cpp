@@ -1,12 +1,14 @@
 #include "session/field_summary.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
 #include "construction/mesh_summary.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
 #include "text/json.h"
 #include "text/printable.h"
@@ -24,7 +26,7 @@ Json levelsJson(const std::map<int, Value>& levels) {
   return json;
 }
 
-/// A row a level: share of the volume, number of leaves, a bar as long as the share.
+/// Prints one row a level with its share of the volume, its number of leaves and a bar proportional to the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
@@ -41,30 +43,11 @@ std::string fingerprintText(std::uint64_t fingerprint) { return fmt::format("{:0
 
 }  // namespace
 
-std::string nearnessName(NearnessKind kind) { return kind == NearnessKind::polynomial ? "polynomial" : "exponential"; }
-
-std::string estimatorName(Estimator estimator) { return estimator == Estimator::embedded ? "embedded" : "residual"; }
-
-std::string criterionName(Criterion criterion) { return criterion == Criterion::paper ? "paper" : "optimal"; }
-
-std::string continuityName(const Field& field) {
-  const bool weak = field.metadata().continuityWeight > 0, exact = field.data().blend > 0;
-  return weak && exact ? "both" : weak ? "weak" : exact ? "exact" : "none";
-}
-
 std::string strategyName(Strategy strategy) {
-  switch (strategy) {
-    case Strategy::h1:
-      return "h1";
-    case Strategy::h2:
-      return "h2";
-    case Strategy::hp:
-      break;
-  }
-  return "hp";
+  return settingText(buildSetting("strategy"), BuildOptions{.strategy = strategy});
 }
 
-/// Of the leaves' errors, in ascending order; empty where none are kept.
+/// Returns the leaves' error bounds in ascending order; empty where the field holds no bounds.
 std::vector<double> leafBounds(const Field& field) {
   std::vector<double> bounds;
   const FieldData& data = field.data();
@@ -80,55 +63,65 @@ Json boundsJson(const Field& field) {
   return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
 }
 
+/// A setting as a number, a word or true and false; null where it asks for nothing.
+Json settingJson(const BuildSetting& setting, const BuildOptions& options) {
+  const std::vector<double> numbers = setting.get(options);
+  if (numbers.empty()) return {};
+  if (setting.type == BuildSetting::Type::number) return numbers[0];
+  if (setting.type == BuildSetting::Type::wholeNumber) return static_cast<std::int64_t>(numbers[0]);
+  if (setting.type == BuildSetting::Type::flag) return numbers[0] != 0;
+  return settingText(setting, options);
+}
+
+/// The settings that a field keeps, with underscores in their names.
+void addSettings(Json& json, const BuildOptions& settings) {
+  for (const BuildSetting& setting : buildSettings()) {
+    if (setting.storedAt == 0) continue;
+    std::string key(setting.key.empty() ? setting.name : setting.key);
+    std::ranges::replace(key, '-', '_');
+    json[key] = settingJson(setting, settings);
+  }
+}
+
 Json fieldJson(const CurrentField& current) {
   const Field& field = current.field;
   const FieldMetadata& metadata = field.metadata();
   const FieldStatistics figures = statistics(field);
-  return {
-      {"leaves", figures.leaves},
-      {"nodes", figures.nodes},
-      {"coefficients", figures.coefficients},
-      {"precision", field.singlePrecision() ? "float" : "double"},
-      {"bytes", figures.bytes},
-      {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
-      {"total_error", metadata.totalError},
-      {"target_error", metadata.targetError},
-      {"rms_estimate", metadata.rmsEstimate(field.domain())},
-      {"rounding_rms", metadata.roundingRms},
-      {"exact_evaluations", metadata.exactEvaluations},
-      {"steps", metadata.steps ? Json(*metadata.steps) : Json()},
-      {"domain", boxJson(field.domain())},
-      {"grid", field.grid()},
-      {"strategy", strategyName(metadata.strategy)},
-      {"nearness", metadata.nearness},
-      {"nearness_kind", nearnessName(metadata.nearnessKind)},
-      {"estimator", estimatorName(metadata.estimator)},
-      {"criterion", criterionName(metadata.criterion)},
-      {"max_error", metadata.maxError > 0 ? Json(metadata.maxError) : Json()},
-      {"measured_error", metadata.maxError > 0 ? Json(metadata.measuredError) : Json()},
-      {"max_degree", metadata.maxDegree},
-      {"max_depth", metadata.maxDepth},
-      {"quadrature", metadata.quadrature},
-      {"band", metadata.band},
-      {"enriched", metadata.enriched},
-      {"continuity_weight", metadata.continuityWeight > 0 ? Json(metadata.continuityWeight) : Json()},
-      {"continuity", continuityName(field)},
-      {"blend", field.data().blend},
-      {"bounds", boundsJson(field)},
-      {"reference_length", metadata.referenceLength},
-      {"normalization",
-       {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
-      {"mesh",
-       {{"name", metadata.source.name},
-        {"fingerprint", fingerprintText(metadata.source.fingerprint)},
-        {"vertices", metadata.source.vertices},
-        {"faces", metadata.source.faces},
-        {"sign", metadata.source.faces > 0 ? Json(insideTestName(metadata.source.insideTest)) : Json()},
-        {"thickness", metadata.source.thickness > 0 ? Json(metadata.source.thickness) : Json()}}},
-      {"degree_volume", levelsJson(figures.degreeVolume)},
-      {"depth_volume", levelsJson(figures.depthVolume)},
-      {"degree_leaves", levelsJson(figures.degreeLeaves)},
-      {"depth_leaves", levelsJson(figures.depthLeaves)}};
+  Json json = {{"leaves", figures.leaves},
+               {"nodes", figures.nodes},
+               {"coefficients", figures.coefficients},
+               {"precision", field.singlePrecision() ? "float" : "double"},
+               {"bytes", figures.bytes},
+               {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
+               {"total_error", metadata.totalError},
+               {"rms_estimate", metadata.rmsEstimate(field.domain())},
+               {"rounding_rms", metadata.roundingRms},
+               {"exact_evaluations", metadata.exactEvaluations},
+               {"steps", metadata.steps ? Json(*metadata.steps) : Json()},
+               {"domain", boxJson(field.domain())},
+               {"grid", field.grid()}};
+  addSettings(json, metadata.settings);
+  json["target_error"] = metadata.settings.targetError.weighted();
+  json["measured_error"] = metadata.settings.maxError > 0 ? Json(metadata.measuredError) : Json();
+  json.update(
+      {{"continuity", settingText(buildSetting("continuity"), settingsOf(field.data()))},
+       {"blend", field.data().blend},
+       {"bounds", boundsJson(field)},
+       {"reference_length", metadata.referenceLength},
+       {"normalization",
+        {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
+       {"mesh",
+        {{"name", metadata.source.name},
+         {"fingerprint", fingerprintText(metadata.source.fingerprint)},
+         {"vertices", metadata.source.vertices},
+         {"faces", metadata.source.faces},
+         {"sign", metadata.source.faces > 0 ? Json(insideTestName(metadata.source.insideTest)) : Json()},
+         {"thickness", metadata.source.thickness > 0 ? Json(metadata.source.thickness) : Json()}}},
+       {"degree_volume", levelsJson(figures.degreeVolume)},
+       {"depth_volume", levelsJson(figures.depthVolume)},
+       {"degree_leaves", levelsJson(figures.degreeLeaves)},
+       {"depth_leaves", levelsJson(figures.depthLeaves)}});
+  return json;
 }
 
 std::string unitText(const Field& field) {
@@ -142,6 +135,18 @@ std::string fieldLine(const Field& field) {
   const FieldStatistics figures = statistics(field);
   return fmt::format("{} leaves, {} coefficients ({}), {}", grouped(figures.leaves), grouped(figures.coefficients),
                      field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
+}
+
+/// The settings that a field keeps, but its target error: words or numbers.
+std::string settingsText(const BuildOptions& settings, bool ofWords) {
+  std::vector<std::string> parts;
+  for (const BuildSetting& setting : buildSettings()) {
+    const bool isWord = setting.type == BuildSetting::Type::choice || setting.type == BuildSetting::Type::flag;
+    const std::string text = settingText(setting, settings);
+    const bool isShown = setting.storedAt > 0 && setting.ending != BuildSetting::Ending::target && !text.empty();
+    if (isShown && isWord == ofWords) parts.push_back(fmt::format("{} {}", setting.name, text));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
 }
 
 std::string fieldText(const CurrentField& current) {
@@ -169,26 +174,17 @@ std::string fieldText(const CurrentField& current) {
                                                  field.singlePrecision() ? "float" : "double"));
   text += summaryRow("memory", bytesText(double(figures.bytes)));
   if (current.fileBytes) text += summaryRow("file", bytesText(double(*current.fileBytes)));
-  text += summaryRow("error, target", fmt::format("{}, {} (at the scale where the longest side is 2)",
-                                                  shortNumber(metadata.totalError), shortNumber(metadata.targetError)));
+  text += summaryRow("error, target",
+                     fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
+                                 shortNumber(metadata.settings.targetError.weighted())));
   text += summaryRow("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
   if (field.singlePrecision()) text += summaryRow("change by float", shortNumber(metadata.roundingRms) + " RMS");
   text += summaryRow("exact distances", grouped(metadata.exactEvaluations));
   if (metadata.steps) text += summaryRow("refinement steps", grouped(*metadata.steps));
-  text += summaryRow("settings",
-                     fmt::format("strategy {}, grid {}x{}x{}, nearness {}, degree ≤ {}, depth ≤ {}, quadrature {}",
-                                 strategyName(metadata.strategy), grid[0], grid[1], grid[2], metadata.nearness,
-                                 metadata.maxDegree, metadata.maxDepth, metadata.quadrature));
-  text +=
-      summaryRow("steering", fmt::format("{} nearness, {} estimator, {} criterion", nearnessName(metadata.nearnessKind),
-                                         estimatorName(metadata.estimator), criterionName(metadata.criterion)));
-  if (metadata.maxError > 0)
-    text += summaryRow("greatest error, asked",
-                       fmt::format("{}, {}", shortNumber(metadata.measuredError), shortNumber(metadata.maxError)));
-  if (metadata.enriched) text += summaryRow("enriched", "every cell, by one degree at the end");
-  if (metadata.continuityWeight > 0)
-    text += summaryRow("continuity", fmt::format("weak, weight {}", shortNumber(metadata.continuityWeight)));
-  if (metadata.band > 0) text += summaryRow("narrow band", fmt::format("{}", metadata.band));
+  text += summaryRow("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));
+  text += summaryRow("settings", settingsText(metadata.settings, false));
+  text += summaryRow("", settingsText(metadata.settings, true));
+  if (metadata.settings.maxError > 0) text += summaryRow("greatest error", shortNumber(metadata.measuredError));
   if (const double width = field.data().blend; width > 0)
     text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
   if (const auto bounds = leafBounds(field); !bounds.empty())

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "construction/reference_surface.h"
+#include "construction/surface.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::app {

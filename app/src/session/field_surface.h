@@ -1,24 +1,24 @@
 #pragma once
-// The surface that a field was made from.
+// The surface from which a field was made, for commands that compare the two.
 
 #include <string>
 #include <string_view>
 
-#include "construction/building.h"
+#include "construction/reference_surface.h"
 #include "language/registry.h"
 #include "session/current_field.h"
 
 namespace hpsdf::app {
 
-/// The surface that a field was made from; throws `Error` where it does not say.
+/// Returns the mesh file or shape from which a field was made. Throws `Error` where that is unknown; the message asks
+/// for `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
-/// The surface that the argument `mesh` names, or the one that the current field itself names; throws `Error` where
-/// neither does.
+/// Returns the surface that the argument `mesh` names, else that of `surfaceOf`.
 std::string surfaceFor(const CurrentField& current, const Arguments& arguments);
 
-/// Throws `Error` where the current field was made from another surface than this one, `surface`; `otherwise` ends the
-/// message.
+/// Throws `Error` where the current field was made from another surface than `surface`, whose data is `reference`. The
+/// message ends with `otherwise`.
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise = "");
 

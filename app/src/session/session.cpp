@@ -4,7 +4,8 @@
 #include <utility>
 
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/reference_surface.h"
+#include "construction/surface.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "session/backend.h"
@@ -27,7 +28,7 @@ void Session::setField(CurrentField field) {
   defects_.reset();
   jumps_.reset();
   exact_.reset();
-  given_.reset();
+  exactOfArgument_.reset();
   picture_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
   if (extension_) extension_->fieldChanged();
@@ -35,10 +36,10 @@ void Session::setField(CurrentField field) {
 
 void Session::changeField(CurrentField field) {
   auto exact = std::move(exact_);
-  auto given = std::move(given_);
+  auto exactOfArgument = std::move(exactOfArgument_);
   setField(std::move(field));
   exact_ = std::move(exact);
-  given_ = std::move(given);
+  exactOfArgument_ = std::move(exactOfArgument);
 }
 
 const CurrentField& Session::current() const {
@@ -54,7 +55,9 @@ const Jumps& Session::jumps() {
   return *jumps_;
 }
 
-bool Session::knowsExact() const { return exact_ || given_ || isShape(current().field.metadata().source.name); }
+bool Session::knowsExact() const {
+  return exact_ || exactOfArgument_ || isShape(current().field.metadata().source.name);
+}
 
 const DistanceFunction& Session::exact(const std::string& surface) {
   const Source& source = current().field.metadata().source;
@@ -63,13 +66,13 @@ const DistanceFunction& Session::exact(const std::string& surface) {
       throw Error("errors need the mesh that the field was made from: give mesh=" +
                   (source.name.empty() ? "FILE" : source.name));
     if (!exact_ && isShape(source.name)) exact_ = exactDistance(console_, source.name, source);
-    return exact_ ? *exact_ : *given_;
+    return exact_ ? *exact_ : *exactOfArgument_;
   }
-  if (!given_ || surface != givenSurface_) {
-    given_ = exactDistance(console_, surface, source);
-    givenSurface_ = surface;
+  if (!exactOfArgument_ || surface != surfaceArgument_) {
+    exactOfArgument_ = exactDistance(console_, surface, source);
+    surfaceArgument_ = surface;
   }
-  return *given_;
+  return *exactOfArgument_;
 }
 
 const render::Drawn& Session::picture() const {
@@ -98,20 +101,21 @@ const MeshDefects& Session::defects(const std::string& surface) {
   return *defects_;
 }
 
-Session::Other& Session::keptOther(const std::string& file) {
+Session::Other& Session::loadedOther(const std::string& file) {
   const auto found = std::ranges::find(others_, file, &Other::file);
   if (found != others_.end()) {
     std::rotate(others_.begin(), found, found + 1);
   } else {
     std::error_code unknown;
-    const auto written = std::filesystem::last_write_time(file, unknown);  // before: what is written since is seen
+    const auto written =
+        std::filesystem::last_write_time(file, unknown);  // read before loading, so that later changes are noticed
     others_.insert(others_.begin(), std::make_unique<Other>(Other{file, load(file), written}));
     if (others_.size() > 2) others_.pop_back();
   }
   return *others_.front();
 }
 
-const Session::Other& Session::other(const std::string& file) { return keptOther(file); }
+const Session::Other& Session::other(const std::string& file) { return loadedOther(file); }
 
 bool Session::forgetChangedOthers() {
   return std::erase_if(others_, [](const std::unique_ptr<Other>& other) {
@@ -122,14 +126,14 @@ bool Session::forgetChangedOthers() {
 }
 
 const Jumps& Session::otherJumps(const std::string& file) {
-  Other& other = keptOther(file);
+  Other& other = loadedOther(file);
   if (!other.jumps)
     other.jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(other.field, 0, progress); });
   return *other.jumps;
 }
 
 render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
-  Other& other = keptOther(file);
+  Other& other = loadedOther(file);
   if (!other.renderer || other.backend != backend) other.renderer = makeRenderer(other.field, backend);
   other.backend = backend;
   return *other.renderer;

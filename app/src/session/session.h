@@ -19,14 +19,14 @@
 
 namespace hpsdf::app {
 
-/// An object that lives as long as the session and is told when another field becomes the current one.
+/// An object that lives as long as the session and is notified when another field becomes the current one.
 class SessionExtension {
  public:
   virtual ~SessionExtension() = default;
   virtual void fieldChanged() = 0;
 };
 
-/// What lives from command to command: the current field, its renderer, and what the explorer shows.
+/// The state that lives from command to command: the current field, its renderer, and data that was computed for it.
 class Session {
  public:
   Session(const Registry& registry, Console console);
@@ -36,93 +36,94 @@ class Session {
 
   const Registry& registry() const { return registry_; }
   const Console& console() const { return console_; }
-  /// Nobody's, with nullptr. Kept by reference.
+  /// Sets the observer of long work, which must outlive its use; null removes it.
   void setListener(WorkListener* listener) { console_.listener = listener; }
 
   bool wantsJson(const Arguments& arguments) const { return json_ || arguments.flag("json"); }
-  /// Lets all commands report as JSON; returns the setting before.
+  /// Sets whether all commands report as JSON and returns the previous setting.
   bool setJson(bool json) { return std::exchange(json_, json); }
 
-  /// Scripts that run each other without end are told from deep ones by this count of scripts now running.
+  /// Number of scripts that run each other at present. `run` limits it, which ends scripts that run themselves.
   int scriptDepth = 0;
 
   void setField(CurrentField field);
-  /// The current field in another form: what is known of its surface stays.
+  /// Replaces the current field by another form of it. The exact distance to its surface is kept.
   void changeField(CurrentField field);
   bool hasField() const { return field_ != nullptr; }
-  /// Throws `Error` when there is none, saying how to get one.
+  /// Throws `Error` where there is no field.
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);
 
-  /// The current field's jumps: measured when first asked for. Throws `Cancelled` after Ctrl-C.
+  /// Returns the jumps of the current field, which the first call measures. Throws `Cancelled` after Ctrl-C.
   const Jumps& jumps();
   bool knowsJumps() const { return jumps_.has_value(); }
 
-  /// The exact distance that the current field was made from: of `surface`, or, where that is empty, of the shape that
-  /// the field names or the mesh that it was built from just now; where neither is known, of the surface that was asked
-  /// for last. Kept. Throws `Error` when it is not to be had.
+  /// Returns the exact distance to `surface`. Where that is empty, it is the distance to the shape that the field names
+  /// or to the mesh from which it was built in this session, else to the surface of the previous call. The result is
+  /// kept. Throws `Error` where no surface is known or it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
-  /// Whether `exact` needs no surface.
+  /// True where `exact` can be called with an empty surface.
   bool knowsExact() const;
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
 
-  /// The last picture drawn of the current field. Throws `Error` when there is none.
+  /// Returns the last picture of the current field. Throws `Error` where none was drawn.
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
-  /// For pictures that are not drawn by `renderer`.
+  /// Records the renderer of a picture that was not drawn by `renderer`.
   void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
-  /// The session's extension, made from the session when it is first asked for. A session has one, of one type.
+  /// Returns the extension, which the first call creates. All calls must ask for the same type.
   template <typename Extension>
   Extension& extension() {
     if (!extension_) extension_ = std::make_unique<Extension>(*this);
     return static_cast<Extension&>(*extension_);
   }
 
-  /// A field to compare the current one with: read from its file when first asked for, and kept; of two files at most,
-  /// one beside the current field and one that it differs from.
+  /// A second field, with which the current one is compared. It is read from its file at first use and kept. Two are
+  /// kept at most: one that is shown beside the current field, and one whose difference from it is shown.
   struct Other {
     std::string file;
     Field field;
-    std::filesystem::file_time_type written = {};  ///< the file, when it was read
+    std::filesystem::file_time_type written = {};  ///< modification time of the file when it was read
     std::optional<Jumps> jumps = {};
     std::unique_ptr<render::Renderer> renderer = {};
     Backend backend = {};
   };
   const Other& other(const std::string& file);
-  /// Forgets those whose files were written since; one that was deleted is kept. Whether there was any.
+  /// Forgets second fields whose files were modified, and returns whether there were any. A field whose file was
+  /// deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
-  /// What pictures with these colours need: for errors the mesh `surface` or what is known, for differences the field
-  /// of the file `other`, read once. Good until it is asked for again.
+  /// Returns the data that a colouring needs: jumps, the exact distance to `surface` (see `exact`) for errors, or the
+  /// field of the file `other` for differences. The result is valid until the next call.
   render::ReferenceData reference(render::ColorBy color, const std::string& surface, const std::string& other = "");
 
-  /// What is wrong with the mesh `surface`, in the units of the current field; "own": the one that it was made from.
-  /// Kept. Throws `Error` when it is not to be had.
+  /// Returns the defects of the mesh `surface` in the units of the current field. "own" stands for the mesh from which
+  /// the field was made. The result is kept. Throws `Error` where the mesh is unknown or cannot be read.
   const MeshDefects& defects(const std::string& surface);
 
-  /// The renderer of the current field: kept, since its upload takes longer than most pictures.
+  /// Returns the renderer of the current field. It is kept, because its upload takes longer than most pictures.
   render::Renderer& renderer(const Backend& backend);
-  /// Description of the one asked for last; "" before that.
+  /// Returns the description of the renderer that was used last; "" before its first use.
   const std::string& lastRenderer() const { return lastRenderer_; }
 
  private:
-  Other& keptOther(const std::string& file);
+  Other& loadedOther(const std::string& file);
 
   const Registry& registry_;
   Console console_;
   bool json_ = false;
   std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
-  std::optional<Jumps> jumps_;           // of the current field
+  std::optional<Jumps> jumps_;           // jumps of the current field
   std::optional<render::Drawn> picture_;
   std::optional<MeshDefects> defects_;
-  std::string defectsOf_;                          ///< their mesh, as it was asked for
-  std::vector<std::unique_ptr<Other>> others_;     // last asked for first; their renderers refer to them
-  std::shared_ptr<const DistanceFunction> exact_;  // of the field's own surface
-  std::shared_ptr<const DistanceFunction> given_;  // of a surface that was asked for by its name
-  std::string givenSurface_;
+  std::string defectsOf_;                                    // surface argument of the call that computed `defects_`
+  std::vector<std::unique_ptr<Other>> others_;               // most recently used first; their renderers refer to them
+  std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
+  std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`
+  std::string surfaceArgument_;
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
   std::string lastRenderer_;

@@ -8,7 +8,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// For each vertex the index of its cube, numbered in the order in which vertices first need one.
+/// The index of each vertex's cube. Cubes are numbered in the order of their first vertices.
 std::vector<std::uint32_t> cubesOf(const std::vector<Vector3>& vertices, double size) {
   std::map<std::array<double, 3>, std::uint32_t> known;
   std::vector<std::uint32_t> cubes;
@@ -20,8 +20,8 @@ std::vector<std::uint32_t> cubesOf(const std::vector<Vector3>& vertices, double 
   return cubes;
 }
 
-/// What lies in each cube, in its middle.
-std::vector<Vector3> middles(const std::vector<Vector3>& vertices, const std::vector<std::uint32_t>& cubes) {
+/// The mean of the vertices in each cube.
+std::vector<Vector3> cubeMeans(const std::vector<Vector3>& vertices, const std::vector<std::uint32_t>& cubes) {
   const std::size_t count = cubes.empty() ? 0 : *std::ranges::max_element(cubes) + std::size_t{1};
   std::vector<Vector3> sums(count, Vector3::Zero());
   std::vector<double> members(count, 0);
@@ -38,7 +38,7 @@ std::vector<Vector3> middles(const std::vector<Vector3>& vertices, const std::ve
 TriangleMesh coarse(const TriangleMesh& mesh, double size) {
   if (!(size > 0)) return mesh;
   const std::vector<std::uint32_t> cubes = cubesOf(mesh.vertices, size);
-  TriangleMesh result{.vertices = middles(mesh.vertices, cubes), .triangles = {}, .name = mesh.name};
+  TriangleMesh result{.vertices = cubeMeans(mesh.vertices, cubes), .triangles = {}, .name = mesh.name};
   for (const auto& [a, b, c] : mesh.triangles)
     if (cubes[a] != cubes[b] && cubes[b] != cubes[c] && cubes[c] != cubes[a])
       result.triangles.push_back({cubes[a], cubes[b], cubes[c]});

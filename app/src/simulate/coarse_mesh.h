@@ -4,10 +4,10 @@
 
 namespace hpsdf::app {
 
-/// A mesh without detail below `size` (0 or more, in the mesh's units), by vertex clustering (Rossignac and Borrel
-/// 1993): vertices in one cube of that size become one, in their middle; triangles of which fewer than three corners
-/// are left go. What is larger stays as it is, to the bit; a mesh without such detail is returned with the triangles
-/// that it has.
+/// Removes detail below `size` (0 or more, in the mesh's units) by vertex clustering (Rossignac and Borrel 1993): the
+/// vertices within one cube of that size are merged into their mean, and triangles with fewer than three different
+/// corners are removed. A vertex that is alone in its cube keeps its coordinates to the bit. A mesh that would lose all
+/// its triangles is returned as it is.
 TriangleMesh coarse(const TriangleMesh& mesh, double size);
 
 }  // namespace hpsdf::app

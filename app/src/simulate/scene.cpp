@@ -10,7 +10,7 @@
 
 #include "console/console.h"
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/surface.h"
 #include "hpsdf/build.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
@@ -22,22 +22,25 @@
 namespace hpsdf::app {
 namespace {
 
-/// Made if it is not there.
+/// Creates the folder if necessary.
 const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) throw Error(fmt::format("{}: is no folder for fields ({})", folder.string(), error.message()));
+  if (error)
+    throw Error(fmt::format("{}: cannot be made a folder for fields ({}); give another folder", folder.string(),
+                            error.message()));
   return folder;
 }
 
-Field keptField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
+/// Loads a field from the cache and checks that it belongs to the mesh with that fingerprint.
+Field cachedField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
   try {
     Field field = load(file);
     const FieldMetadata& metadata = field.metadata();
-    if (metadata.source.fingerprint == print && metadata.targetError == targetError) return field;
+    if (metadata.source.fingerprint == print && metadata.settings.targetError.weighted() == targetError) return field;
     throw Error(file.string() + ": is the field of another mesh, or of another target error");
   } catch (const Error& error) {
-    throw Error(fmt::format("{}; or remove the file, and it is built anew", error.what()));
+    throw Error(fmt::format("{}; remove the file to build the field again", error.what()));
   }
 }
 
@@ -57,7 +60,7 @@ BodyKind& Scene::addKind(const Console& console, const SceneRequest& request, Tr
   return kinds_.emplace_back(std::move(mesh), std::move(field), samples, margin);
 }
 
-void Scene::stand(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
+void Scene::addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
   world_.add(kind.shape, 0, worldFromMesh * kind.mass.meshFromInertia, material);
 }
 
@@ -97,7 +100,7 @@ TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fil
     throw Error(name + ": " + error.what());
   }
   if (!inspect(mesh).closed())
-    warn(console, name + " is not closed: beside its holes bodies may pass, or be pushed inside");
+    warn(console, name + " is not closed: near its holes bodies may pass through it, or be pushed inside");
   const bool turns = fileIsYUp && !isShape(name);
   if (turns)
     for (Vector3& x : mesh.vertices) x = Vector3(x.x(), -x.z(), x.y());
@@ -114,8 +117,8 @@ Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRe
   if (request.cache) {
     file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
     std::error_code unknown;
-    if (std::filesystem::exists(file, unknown)) return keptField(file, print, request.targetError);
-    checkWritable(file);  // before long work
+    if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request.targetError);
+    checkWritable(file);  // fails before the long construction
   }
   const int threads = tbb::this_task_arena::max_concurrency();
   Field field = withProgress(console, [&](const Progress& progress) {

@@ -1,5 +1,6 @@
 #pragma once
-// The paper's simulations (sec. 4, Figs. 1, 7, 8, 9): what is there at the start, and what comes when.
+// The scenes of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9): their bodies at the start, and those that are
+// dropped later.
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -16,7 +17,7 @@
 
 namespace hpsdf::app {
 
-/// What bodies of one mesh share.
+/// The data that all bodies of one mesh share.
 struct BodyKind {
   BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, double margin);
 
@@ -36,36 +37,38 @@ class Scene {
 
   physics::World& world() { return world_; }
   const physics::World& world() const { return world_; }
-  /// Lets in what is due, before each step.
+  /// Adds the bodies whose time has come to the world. Called before each step.
   void admit();
 
-  /// A body that comes at some time.
+  /// A body that is added to the world during the simulation.
   struct Drop {
-    double seconds;
+    double seconds;  ///< simulated time at which the body is added
     btCollisionShape* shape;
     double mass;
     Eigen::Isometry3d worldFromBody;
     physics::Material material;
   };
-  const std::deque<Drop>& drops() const { return drops_; }  ///< still to come
+  const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, by ascending time
   const std::deque<BodyKind>& kinds() const { return kinds_; }
-  /// Below this height a body is lost.
+  /// Height below which a body counts as lost, world units.
   double floor() const { return floor_; }
-  std::size_t lost() const;                              ///< bodies, and soft bodies of which some node is
-  std::size_t moving() const;                            ///< bodies that are in, and move or may move
-  std::size_t waiting() const { return drops_.size(); }  ///< bodies that come later
-  /// What bodies are compared with: a marble's radius, or the size of a body.
+  std::size_t lost() const;                              ///< number of bodies, soft or rigid, with a part below `floor`
+  std::size_t moving() const;                            ///< number of rigid bodies in the world that are not static
+  std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
+  /// Length that penetration depths are compared with: a marble's radius, or the size of a body.
   double bodySize() const { return bodySize_; }
 
  protected:
-  /// With the mesh's field, as `sceneField` has it.
+  /// Adds a kind of body with the mesh's field, which `sceneField` makes. `samples` is the number of surface samples
+  /// and `margin` the collision margin in world units.
   BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples,
                     double margin);
-  void stand(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
-  /// In the order of time.
+  /// Adds a static body.
+  void addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
+  /// Schedules a body. Calls must come in ascending order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 
-  // before the world, which refers to them
+  // These are declared before the world, which refers to them.
   std::deque<BodyKind> kinds_;
   std::deque<std::unique_ptr<btCollisionShape>> shapes_;
   physics::World world_;
@@ -74,19 +77,20 @@ class Scene {
   double bodySize_ = 1;
 };
 
-/// Throws `Error` for what cannot be made, naming it.
+/// Makes the scene of that name. Throws `Error` naming a mesh or field that cannot be made.
 std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request);
 
-/// The mesh of a file or shape, z up, its middle at the origin and its longest side `size`, or as it is for 0. Warns of
-/// one that is not closed. Throws `Error` naming it, also where it has no volume.
+/// The mesh of a file or shape with z up. It is centred at the origin and scaled to a longest side of `size`, unless
+/// that is 0. Warns of a mesh that is not closed. Throws `Error` naming a mesh that cannot be read or has no volume.
 TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size);
 
-/// The field of a mesh: from the cache's folder if it is there, or else built, by the threads of the caller's TBB
-/// arena, and kept there. Throws `Error` for a folder that cannot be used and for a file in it that is not this field.
+/// The field of a mesh. It is loaded from the cache's folder, or else built by the threads of the caller's TBB arena
+/// and saved there. Throws `Error` for a folder that cannot be used, and for a file in it that is another field.
 Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRequest& request);
 
-/// What stands upright around the axis z, its middle at the origin.
+/// A cylinder of 24 sides around the z axis, centred at the origin.
 TriangleMesh poleMesh(double radius, double height);
+/// A box of these extents, centred at the origin.
 TriangleMesh slabMesh(const Vector3& size);
 
 }  // namespace hpsdf::app

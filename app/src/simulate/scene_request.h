@@ -1,5 +1,5 @@
 #pragma once
-// The paper's simulations (sec. 4, Figs. 1, 7, 8, 9), as far as they can be asked for without Bullet at hand.
+// The settings of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9), which do not depend on Bullet.
 
 #include <array>
 #include <cstdint>
@@ -12,28 +12,28 @@
 namespace hpsdf::app {
 
 struct SceneRequest {
-  std::size_t bodies = 0;                           ///< that move; some of the slope's are soft
-  std::size_t nodes = 0;                            ///< of cloth, at least
-  std::size_t samples = 0;                          ///< of each kind of body
-  std::string ground = {};                          ///< what all else falls on, where the scene takes one
-  std::vector<std::string> meshes = {};             ///< of the bodies, where the scene takes some
-  bool filesAreYUp = true;                          ///< which way is up in mesh files; shapes have z
-  double targetError = 1e-6;                        ///< τ of the fields
-  std::optional<std::filesystem::path> cache = {};  ///< folder for the fields
-  std::uint64_t seed = 1;
-  double step = 1.0 / 240;  ///< seconds
-  int iterations = 20;      ///< of the solver
+  std::size_t bodies = 0;                ///< number of moving bodies, among them the soft bodies of the slope
+  std::size_t nodes = 0;                 ///< least number of nodes of the cloth
+  std::size_t samples = 0;               ///< surface samples of each kind of body
+  std::string ground = {};               ///< mesh that bodies fall onto; empty in scenes without one
+  std::vector<std::string> meshes = {};  ///< meshes of the bodies; empty in scenes of marbles
+  bool filesAreYUp = true;               ///< mesh files have y up; shapes always have z up
+  double targetError = 1e-6;             ///< target error τ of the fields
+  std::optional<std::filesystem::path> cache = {};  ///< folder in which fields are kept between runs
+  std::uint64_t seed = 1;                           ///< of the random positions and orientations
+  double step = 1.0 / 240;                          ///< seconds of simulated time
+  int iterations = 20;                              ///< iterations of the constraint solver in each step
 };
 
 struct SceneKind {
   std::string name;
   std::string help;
   SceneRequest defaults;
-  double seconds;
-  std::array<double, 2> view;  ///< azimuth and elevation in degrees, from where one sees what happens
+  double seconds;              ///< default duration, simulated time
+  std::array<double, 2> view;  ///< default azimuth and elevation of the camera, degrees
 };
 
-/// All of them.
+/// All scenes.
 std::span<const SceneKind> scenes();
 
 }  // namespace hpsdf::app

@@ -23,14 +23,15 @@ using physics::Material;
 
 Eigen::Isometry3d shift(const Vector3& by) { return Eigen::Isometry3d(Eigen::Translation3d(by)); }
 
-/// The same on every machine, unlike the distributions of the standard library.
+/// Random numbers that are the same on every machine, unlike those of the standard library's distributions.
 class Random {
  public:
   explicit Random(std::uint64_t start) : engine_(start) {}
 
   double within(double lo, double hi) { return lo + (hi - lo) * double(engine_() >> 11) * 0x1p-53; }
 
-  Eigen::Quaterniond rotation() {  // Shoemake 1992
+  /// A uniformly distributed rotation (Shoemake 1992).
+  Eigen::Quaterniond rotation() {
     const double u = within(0, 1), a = within(0, 2 * std::numbers::pi), b = within(0, 2 * std::numbers::pi);
     const double s = std::sqrt(1 - u), c = std::sqrt(u);
     return {c * std::cos(b), s * std::sin(a), s * std::cos(a), c * std::sin(b)};
@@ -40,8 +41,9 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// Where a marble's centre is when it is let down onto a field from above. `name` is the field's, for the error.
-Vector3 above(const Field& field, const std::string& name, double x, double y, double radius) {
+/// The centre of a marble of that radius that lies on a field's surface at (x, y). `name` is the field's, for the
+/// error.
+Vector3 restingPosition(const Field& field, const std::string& name, double x, double y, double radius) {
   Vector3 at(x, y, field.domain().max().z() + radius);
   for (int step = 0; step < 10000; ++step) {
     const double gap = field.value(at) - radius;
@@ -53,10 +55,10 @@ Vector3 above(const Field& field, const std::string& name, double x, double y, d
   return at;
 }
 
-/// Marbles have a size of their own. On ground that is too small there is no room for them; on what is too large they
-/// become so fast that they pass through it in a step.
+/// Throws `Error` unless ground fits marbles of that radius: small ground has no room for them, and on large ground
+/// they become so fast that they pass through it within one step.
 void requireFitting(const TriangleMesh& ground, const std::string& name, double radius) {
-  constexpr double kLeast = 10, kMost = 400;  // radii
+  constexpr double kLeast = 10, kMost = 400;  // least width and greatest extent, in radii
   const double width = boundingBox(ground).sizes().head<2>().minCoeff();
   if (width < kLeast * radius || boundingBox(ground).sizes().maxCoeff() > kMost * radius)
     throw Error(
@@ -65,13 +67,13 @@ void requireFitting(const TriangleMesh& ground, const std::string& name, double 
                     name, width, boundingBox(ground).sizes().z(), radius, kLeast * radius, kMost * radius));
 }
 
-/// Marbles over something that is open upwards.
+/// Marbles that fall onto ground that is open upwards.
 class MarbleScene : public Scene {
  public:
   MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request, radius / 300) {
     TriangleMesh mesh = sceneMesh(console, request.ground, request.filesAreYUp, 0);
     requireFitting(mesh, request.ground, radius);
-    stand(addKind(console, request, std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());
+    addStatic(addKind(console, request, std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());
     shapes_.push_back(std::make_unique<btSphereShape>(radius));
     bodySize_ = radius;
     floor_ = ground().domain().min().z() - 10 * radius;
@@ -80,8 +82,8 @@ class MarbleScene : public Scene {
  protected:
   const Field& ground() const { return kinds_.front().field; }
 
-  /// Slowed down, and may fall asleep.
-  Material inPile() const {
+  /// The material of marbles in a pile: damped, and at rest below a speed.
+  Material pileMaterial() const {
     return {.friction = 0.4,
             .rollingFriction = 0.02 * bodySize_,
             .linearDamping = 0.05,
@@ -89,8 +91,8 @@ class MarbleScene : public Scene {
             .restSpeed = 0.2};
   }
 
-  /// Rolls long.
-  Material alone() const {
+  /// The material of a marble that rolls for a long time.
+  Material rollingMaterial() const {
     return {.friction = 0.4,
             .rollingFriction = 0.002 * bodySize_,
             .linearDamping = 0.01,
@@ -98,6 +100,7 @@ class MarbleScene : public Scene {
             .restSpeed = 0};
   }
 
+  /// Schedules a marble of glass at a position.
   void dropMarble(double seconds, const Vector3& at, const Material& material) {
     constexpr double kDensity = 2500;
     const double mass = kDensity * 4 / 3 * std::numbers::pi * std::pow(bodySize_, 3);
@@ -105,24 +108,24 @@ class MarbleScene : public Scene {
   }
 };
 
-/// A layer every so often, as many as have room side by side.
+/// Every 0.2 s a layer of marbles falls into the bowl.
 std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request) {
   struct Bowl final : MarbleScene {
     Bowl(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.03) {
       const Box box = ground().domain();
-      const double reach = 0.3 * box.sizes().head<2>().minCoeff(), apart = 2.6 * bodySize_;
+      const double extent = 0.3 * box.sizes().head<2>().minCoeff(), distance = 2.6 * bodySize_;
       const double height = box.max().z() + 2 * bodySize_;
       Random random(from.seed);
       std::size_t left = from.bodies;
       for (int layer = 0; left > 0; ++layer)
-        for (double y = -reach; y <= reach && left > 0; y += apart)
-          for (double x = -reach; x <= reach && left > 0; x += apart) {
-            if (std::hypot(x, y) > reach) continue;
+        for (double y = -extent; y <= extent && left > 0; y += distance)
+          for (double x = -extent; x <= extent && left > 0; x += distance) {
+            if (std::hypot(x, y) > extent) continue;
             const Vector3 jitter(random.within(-1, 1), random.within(-1, 1), random.within(-1, 1));
             dropMarble(
                 0.2 * layer,
                 Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) + 0.2 * bodySize_ * jitter,
-                inPile());
+                pileMaterial());
             --left;
           }
     }
@@ -133,15 +136,15 @@ std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request)
 std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request) {
   struct Helix final : MarbleScene {
     Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
-      // where the groove of three turns is at y = 0, away from the rim
+      // The groove of three turns crosses y = 0 at this x, away from the edge of the bowl.
       for (std::size_t n = 0; n < from.bodies; ++n)
-        dropMarble(2.0 * double(n), above(ground(), from.ground, 2.0 / 3, 0, bodySize_), alone());
+        dropMarble(2.0 * double(n), restingPosition(ground(), from.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
     }
   };
   return std::make_unique<Helix>(console, request);
 }
 
-/// Down the run, and out of it among the bodies that stand there.
+/// A marble rolls down the run and then into a triangle of standing bodies, as in bowling.
 std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) {
   struct Run final : MarbleScene {
     Run(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.045) {
@@ -149,7 +152,7 @@ std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) 
       floor_ = table - 1;
       shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
       world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
-      dropMarble(0, above(ground(), from.ground, 0.92, -0.05, bodySize_), alone());
+      dropMarble(0, restingPosition(ground(), from.ground, 0.92, -0.05, bodySize_), rollingMaterial());
       constexpr double kPin = 0.2;
       std::vector<BodyKind*> pins;
       for (const std::string& name : from.meshes)
@@ -170,7 +173,7 @@ std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) 
   return std::make_unique<Run>(console, request);
 }
 
-/// Bodies of the given meshes, of size 1 where not said otherwise, and what they fall on.
+/// Bodies of the request's meshes, which fall onto poles, a slope or a table.
 class PileScene : public Scene {
  public:
   explicit PileScene(const SceneRequest& request) : Scene(request), random_(request.seed) { floor_ = -1; }
@@ -194,6 +197,7 @@ class PileScene : public Scene {
     world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.6});
   }
 
+  /// Schedules a body at a position, with a random orientation.
   void dropBody(BodyKind& kind, double seconds, const Vector3& at) {
     constexpr double kDensity = 1000;
     drop({seconds,
@@ -210,26 +214,27 @@ std::unique_ptr<Scene> poles(const Console& console, const SceneRequest& request
   struct Poles final : PileScene {
     Poles(const Console& to, const SceneRequest& from) : PileScene(from) {
       constexpr int kSide = 8;
-      constexpr double kApart = 1.3, kHeight = 4, kWave = 1.2;
+      constexpr double kDistance = 1.3, kHeight = 4, kWave = 1.2;
       const auto kinds = bodyKinds(to, from, 1);
       BodyKind& pole = addKind(to, from, poleMesh(0.12, kHeight), 2000);
       addGround();
-      const auto place = [](int i) { return kApart * (i - 0.5 * (kSide - 1)); };
+      const auto position = [](int i) { return kDistance * (i - 0.5 * (kSide - 1)); };
       for (int x = 0; x < kSide; ++x)
-        for (int y = 0; y < kSide; ++y) stand(pole, shift({place(x), place(y), kHeight / 2}));
+        for (int y = 0; y < kSide; ++y) addStatic(pole, shift({position(x), position(y), kHeight / 2}));
       for (std::size_t n = 0; n < from.bodies; ++n) {
         const int x = int(n % kSide), y = int(n / kSide % kSide);
         const std::size_t wave = n / (kSide * kSide);
         const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), random_.within(-0.1, 0.1));
-        dropBody(*kinds[n % kinds.size()], kWave * double(wave), Vector3(place(x), place(y), kHeight + 2.5) + jitter);
+        dropBody(*kinds[n % kinds.size()], kWave * double(wave),
+                 Vector3(position(x), position(y), kHeight + 2.5) + jitter);
       }
     }
   };
   return std::make_unique<Poles>(console, request);
 }
 
-/// Bullet has its links pull nodes into what they rest on after all contacts; here contacts have the last word.
-void contactsLast(btSoftBody& body) {
+/// Makes Bullet solve contacts last. In its own order the links pull nodes into the bodies that they rest on.
+void solveContactsLast(btSoftBody& body) {
   btAlignedObjectArray<btSoftBody::ePSolver::_>& sequence = body.m_cfg.m_psequence;
   sequence.resize(0);
   for (const auto solver : {btSoftBody::ePSolver::Linear, btSoftBody::ePSolver::Anchors,
@@ -239,18 +244,18 @@ void contactsLast(btSoftBody& body) {
 
 std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& at, double size) {
   const TriangleMesh mesh = shapes::mesh("torus,major=0.7,minor=0.3,segments=24,sides=12");
-  std::vector<btScalar> places;
+  std::vector<btScalar> coordinates;
   for (const Vector3& x : mesh.vertices)
-    for (int axis = 0; axis < 3; ++axis) places.push_back(at[axis] + size / 2 * x[axis]);
+    for (int axis = 0; axis < 3; ++axis) coordinates.push_back(at[axis] + size / 2 * x[axis]);
   std::vector<int> corners;
   for (const auto& triangle : mesh.triangles)
     for (const std::uint32_t vertex : triangle) corners.push_back(int(vertex));
-  std::unique_ptr<btSoftBody> body(
-      btSoftBodyHelpers::CreateFromTriMesh(info, places.data(), corners.data(), int(mesh.triangles.size()), false));
+  std::unique_ptr<btSoftBody> body(btSoftBodyHelpers::CreateFromTriMesh(info, coordinates.data(), corners.data(),
+                                                                        int(mesh.triangles.size()), false));
   body->generateBendingConstraints(2);
-  contactsLast(*body);
+  solveContactsLast(*body);
   body->m_cfg.piterations = 4;
-  body->m_cfg.kMT = 0.05;  // towards its own form
+  body->m_cfg.kMT = 0.05;  // pulls the nodes towards the initial shape
   body->m_cfg.kDF = 0.3;
   body->m_cfg.kDP = 0.01;
   body->getCollisionShape()->setMargin(0.02);
@@ -271,14 +276,14 @@ std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request
       floor_ = -4;
       const Material smooth{.friction = 0.3};
       const Eigen::Isometry3d ramp =
-          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.55, Vector3::UnitY()));  // falls towards +x
-      stand(slab, ramp, smooth);
+          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.55, Vector3::UnitY()));  // descends towards +x
+      addStatic(slab, ramp, smooth);
       for (const double side : {-0.5, 0.5})
-        stand(rail, ramp * shift({0, side * (kWidth + kThick), (kRail - kThick) / 2}), smooth);
-      stand(table, shift({0.75 * kLength, 0, -0.3}));
+        addStatic(rail, ramp * shift({0, side * (kWidth + kThick), (kRail - kThick) / 2}), smooth);
+      addStatic(table, shift({0.75 * kLength, 0, -0.3}));
       for (int row = 0; row < 3; ++row)
         for (int i = 0; i < 2 + row % 2; ++i)
-          stand(pole, ramp * shift({-1.0 + 1.6 * row, 1.4 * (i - 0.5 * (1 + row % 2)), 0.4 + kThick / 2}), smooth);
+          addStatic(pole, ramp * shift({-1.0 + 1.6 * row, 1.4 * (i - 0.5 * (1 + row % 2)), 0.4 + kThick / 2}), smooth);
       for (std::size_t n = 0; n < from.bodies; ++n) {
         const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), 0);
         const Vector3 at = ramp * Vector3(-3.2, 1.0 * (double(n % 3) - 1), 0.9) + jitter;
@@ -303,14 +308,14 @@ std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request
       const double top = boundingBox(mesh).sizes().z();
       BodyKind& body = addKind(to, from, mesh, from.samples);
       BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
-      const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through
-      stand(body, shift({0, 0, stands}), rough);
-      stand(table, shift({0, 0, -0.1}), rough);
+      const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through the cloth
+      addStatic(body, shift({0, 0, stands}), rough);
+      addStatic(table, shift({0, 0, -0.1}), rough);
       const int side = std::max(2, int(std::ceil(std::sqrt(double(from.nodes)))));
       const auto corner = [&](double x, double y) { return btVector3(x * kSide / 2, y * kSide / 2, top + 0.05); };
       std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(
           world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
-      contactsLast(*sheet);
+      solveContactsLast(*sheet);
       sheet->m_cfg.piterations = 8;
       sheet->m_cfg.kDF = 1;
       sheet->m_cfg.kDP = 0.05;

@@ -1,6 +1,4 @@
 #pragma once
-// A picture of a simulation.
-
 #include <cstddef>
 #include <string>
 
@@ -12,10 +10,10 @@ namespace hpsdf::app {
 /// A picture of a simulation.
 struct SimulationShot {
   render::Drawn drawn;
-  const Field& field;  ///< whose surface and coordinates it has; good while it is taken
-  const std::string& renderer;
-  double seconds;  ///< simulated
-  std::size_t contacts;
+  const Field& field;  ///< field of the traced surface, in whose coordinates the picture is; valid during `take`
+  const std::string& renderer;  ///< description of the renderer
+  double seconds;               ///< simulated time
+  std::size_t contacts;         ///< surface samples that lie in another body
 };
 
 }  // namespace hpsdf::app

@@ -9,9 +9,10 @@
 #include <optional>
 
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
 #include "files/film.h"
 #include "hpsdf/detail/output_file.h"
+#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/session.h"
@@ -27,18 +28,18 @@ const SceneKind& kindOf(const Arguments& arguments) {
   return *std::ranges::find(scenes(), arguments.text("scene"), &SceneKind::name);
 }
 
-/// What a scene has no use for is refused, rather than ignored.
-void refuse(const Arguments& arguments, const std::string& name, bool takes) {
+/// Throws `Error` for a parameter that was given although the scene does not take it.
+void requireTaken(const Arguments& arguments, const std::string& name, bool takes) {
   if (arguments.given(name) && !takes)
-    throw Error(fmt::format("{}: is not for the scene {}", name, arguments.text("scene")));
+    throw Error(fmt::format("{}: the scene {} does not take it; leave it out", name, arguments.text("scene")));
 }
 
 SceneRequest requestOf(const Arguments& arguments) {
   SceneRequest request = kindOf(arguments).defaults;
-  refuse(arguments, "bodies", request.bodies > 0);
-  refuse(arguments, "nodes", request.nodes > 0);
-  refuse(arguments, "ground", !request.ground.empty());
-  refuse(arguments, "body", !request.meshes.empty());
+  requireTaken(arguments, "bodies", request.bodies > 0);
+  requireTaken(arguments, "nodes", request.nodes > 0);
+  requireTaken(arguments, "ground", !request.ground.empty());
+  requireTaken(arguments, "body", !request.meshes.empty());
   if (arguments.given("bodies")) request.bodies = std::size_t(arguments.whole("bodies"));
   if (arguments.given("nodes")) request.nodes = std::size_t(arguments.whole("nodes"));
   if (arguments.given("points")) request.samples = std::size_t(arguments.whole("points"));
@@ -55,8 +56,8 @@ SceneRequest requestOf(const Arguments& arguments) {
 
 Json jsonOf(const std::string& scene, const SceneRequest& request, const SimulationFigures& figures) {
   const double steps = double(figures.steps);
-  const auto aStep = [&](const CountAStep& of) {
-    return Json{{"mean", of.sum / steps}, {"max", of.most}, {"last", of.last}};
+  const auto perStep = [&](const CountPerStep& count) {
+    return Json{{"mean", count.sum / steps}, {"max", count.most}, {"last", count.last}};
   };
   return {{"scene", scene},
           {"bodies", figures.bodies},
@@ -66,8 +67,8 @@ Json jsonOf(const std::string& scene, const SceneRequest& request, const Simulat
           {"simulated_seconds", figures.simulated},
           {"step_seconds", request.step},
           {"steps", figures.steps},
-          {"contacts", aStep(figures.penetrating)},
-          {"touching", aStep(figures.touching)},
+          {"contacts", perStep(figures.penetrating)},
+          {"touching", perStep(figures.touching)},
           {"penetration",
            {{"size", figures.size},
             {"max", figures.deepest},
@@ -92,11 +93,12 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
                       1 / request.step);
   if (figures.waiting > 0)
     text += fmt::format("  still to come       {} bodies, which more --seconds let in\n", grouped(figures.waiting));
-  const auto aStep = [&](const CountAStep& of) {
-    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", of.sum / steps, grouped(of.most),
-                       grouped(of.last));
+  const auto perStep = [&](const CountPerStep& count) {
+    return fmt::format("{:.0f} in the mean, {} at most, {} at the end\n", count.sum / steps, grouped(count.most),
+                       grouped(count.last));
   };
-  text += "  contacts a step     " + aStep(figures.penetrating) + "  touching a step     " + aStep(figures.touching);
+  text +=
+      "  contacts a step     " + perStep(figures.penetrating) + "  touching a step     " + perStep(figures.touching);
   text += fmt::format("  deepest             {} ({:.2g} % of {}), in the last second {} ({:.2g} %)\n",
                       shortNumber(figures.deepest), 100 * figures.deepest / figures.size, shortNumber(figures.size),
                       shortNumber(figures.deepestAtEnd), 100 * figures.deepestAtEnd / figures.size);
@@ -107,8 +109,6 @@ std::string textOf(const std::string& scene, const SceneRequest& request, const 
   text += fmt::format("  state at the end    {:016x}\n", figures.state);
   return text;
 }
-
-// Pictures
 
 bool isStill(const Arguments& arguments) { return lowerExtension(arguments.text("output")) == ".png"; }
 
@@ -139,7 +139,7 @@ void checkSimulate(const Arguments& arguments) {
     return checkFilm(arguments);
   }
   if (arguments.given("fps")) throw Error("fps: is for pictures: give output");
-  for (const char* name : kLooks)
+  for (const char* name : kCameraParameters)
     if (arguments.given(name)) throw Error(fmt::format("{}: is for pictures: give output", name));
 }
 
@@ -149,7 +149,7 @@ SimulationFigures simulateAs(const Console& console, const Arguments& arguments,
                   camera);
 }
 
-/// The scene's own camera where nothing else is said.
+/// The camera that the arguments describe, with the scene's direction and distance where they name none.
 SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
   render::SurfacePicture look = cameraPicture(arguments);
   const auto& [azimuth, elevation] = kindOf(arguments).view;
@@ -161,14 +161,14 @@ SimulationCamera cameraOf(const Arguments& arguments, std::function<void(Simulat
   return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
 }
 
-/// What came of a simulation and its pictures.
+/// The figures of a simulation and the report of its pictures.
 struct Outcome {
   SimulationFigures figures;
-  Json pictures = {};     // null without any
-  std::string line = {};  // the same
+  Json pictures = {};     ///< null without pictures
+  std::string line = {};  ///< empty without pictures
 };
 
-/// The field that it shows becomes the current one, of which it is the picture.
+/// Draws the end of a simulation. The traced field becomes the session's current field.
 Outcome runStill(Session& session, const Arguments& arguments, const SceneRequest& request) {
   const std::string file = arguments.text("output");
   checkWritable(file);
@@ -191,7 +191,7 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
 
 Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
   Film film(arguments.text("output"));
-  const InterruptGuard guard;  // until all is in its place
+  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
   Json rows = Json::array();
   render::Image last;
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
@@ -229,10 +229,9 @@ void runSimulate(Session& session, const Arguments& arguments) {
   printJson(console.out, json);
 }
 
-/// Those of `render` that simulations take too.
-/// As of `render`, but for what camera and target mean.
-std::vector<Parameter> sceneLookParameters(const Registry& registry) {
-  std::vector<Parameter> parameters = lookParameters(registry);
+/// The camera parameters of `render`, with the meaning that camera and target have in simulations.
+std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
+  std::vector<Parameter> parameters = cameraParameters(registry);
   Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
   camera.help =
       "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
@@ -242,6 +241,106 @@ std::vector<Parameter> sceneLookParameters(const Registry& registry) {
   target.help =
       "The point in the picture's middle, in the scene's coordinates, z up; when left out, all of the scene is in the "
       "middle.";
+  return parameters;
+}
+
+/// The parameters of the scene and its bodies.
+std::vector<Parameter> sceneParameters(const std::vector<std::string>& sceneNames) {
+  return {{.name = "scene",
+           .type = ParameterType::choice,
+           .help = "Which scene.",
+           .choices = sceneNames,
+           .positional = true,
+           .need = Need::always},
+          {.name = "seconds",
+           .type = ParameterType::number,
+           .help = "How long, in simulated time; each scene has its own default.",
+           .unit = "seconds",
+           .minimum = 0,
+           .maximum = 3600,
+           .minimumExcluded = true},
+          {.name = "bodies",
+           .type = ParameterType::wholeNumber,
+           .help = "How many bodies move.",
+           .minimum = 1,
+           .maximum = 20000},
+          {.name = "nodes",
+           .type = ParameterType::wholeNumber,
+           .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
+           .minimum = 4,
+           .maximum = 1e6},
+          {.name = "points",
+           .type = ParameterType::wholeNumber,
+           .help = "Points on the surface of each kind of body.",
+           .minimum = 1,
+           .maximum = 1e6},
+          {.name = "body",
+           .type = ParameterType::text,
+           .help = "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope.",
+           .valueName = "MESH",
+           .repeatable = true},
+          {.name = "ground",
+           .type = ParameterType::text,
+           .help = "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where "
+                   "it is as large as it is: 2 wide suits the marbles.",
+           .valueName = "MESH"},
+          {.name = "up",
+           .type = ParameterType::choice,
+           .help = "The axis that points up in mesh files. In shapes it is z.",
+           .defaultText = "y",
+           .choices = {"y", "z"}}};
+}
+
+/// The parameters of the fields and of the solver.
+std::vector<Parameter> solverParameters() {
+  return {{.name = "target-error",
+           .type = ParameterType::number,
+           .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, "
+                   "and 1e-8 in the bowl.",
+           .minimum = 0,
+           .minimumExcluded = true},
+          {.name = "cache",
+           .type = ParameterType::outputPath,
+           .help = "A folder in which fields are kept, and taken from the next time.",
+           .valueName = "FOLDER"},
+          {.name = "rate",
+           .type = ParameterType::number,
+           .help = "Steps a second. Fast or small things need more.",
+           .defaultText = "240",
+           .minimum = 1,
+           .maximum = 100000},
+          {.name = "iterations",
+           .type = ParameterType::wholeNumber,
+           .help = "Of Bullet's solver, in each step.",
+           .defaultText = "20",
+           .minimum = 1,
+           .maximum = 1000},
+          {.name = "seed",
+           .type = ParameterType::wholeNumber,
+           .help = "Which random places and directions bodies start with.",
+           .defaultText = "1",
+           .minimum = 0,
+           .maximum = 1e9},
+          threadsParameter("The simulation is")};
+}
+
+/// The parameters of its pictures.
+std::vector<Parameter> pictureParameters(const Registry& registry) {
+  std::vector<Parameter> parameters = {
+      {.name = "output",
+       .type = ParameterType::outputPath,
+       .help = "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as "
+               "'turntable' has it; or *.mp4, for which ffmpeg must be installed. Without it nothing is "
+               "drawn.",
+       .valueName = "FILE.png|FOLDER|FILE.mp4",
+       .alias = 'o'},
+      {.name = "fps",
+       .type = ParameterType::number,
+       .help = "Frames a simulated second, at which an .mp4 plays.",
+       .defaultText = "30",
+       .minimum = 0.1,
+       .maximum = 10000}};
+  append(parameters, sceneCameraParameters(registry));
   return parameters;
 }
 
@@ -275,96 +374,11 @@ Command simulateCommand(const Registry& registry) {
                    "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json",
                    "hpsdf simulate bowl --bodies 300 --seconds 2 -o bowl.png --samples 2",
                    "hpsdf simulate slope -o slope.mp4 --view front --size 960x540"},
-      .parameters = {{.name = "scene",
-                      .type = ParameterType::choice,
-                      .help = "Which scene.",
-                      .choices = names,
-                      .positional = true,
-                      .need = Need::always},
-                     {.name = "seconds",
-                      .type = ParameterType::number,
-                      .help = "How long, in simulated time; each scene has its own default.",
-                      .unit = "seconds",
-                      .minimum = 0,
-                      .maximum = 3600,
-                      .minimumExcluded = true},
-                     {.name = "bodies",
-                      .type = ParameterType::wholeNumber,
-                      .help = "How many bodies move.",
-                      .minimum = 1,
-                      .maximum = 20000},
-                     {.name = "nodes",
-                      .type = ParameterType::wholeNumber,
-                      .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
-                      .minimum = 4,
-                      .maximum = 1e6},
-                     {.name = "points",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Points on the surface of each kind of body.",
-                      .minimum = 1,
-                      .maximum = 1e6},
-                     {.name = "body",
-                      .type = ParameterType::text,
-                      .help =
-                          "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope.",
-                      .valueName = "MESH",
-                      .repeatable = true},
-                     {.name = "ground",
-                      .type = ParameterType::text,
-                      .help =
-                          "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where "
-                          "it is as large as it is: 2 wide suits the marbles.",
-                      .valueName = "MESH"},
-                     {.name = "up",
-                      .type = ParameterType::choice,
-                      .help = "The axis that points up in mesh files. In shapes it is z.",
-                      .defaultText = "y",
-                      .choices = {"y", "z"}},
-                     {.name = "target-error",
-                      .type = ParameterType::number,
-                      .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, "
-                              "and 1e-8 in the bowl.",
-                      .minimum = 0,
-                      .minimumExcluded = true},
-                     {.name = "cache",
-                      .type = ParameterType::outputPath,
-                      .help = "A folder in which fields are kept, and taken from the next time.",
-                      .valueName = "FOLDER"},
-                     {.name = "rate",
-                      .type = ParameterType::number,
-                      .help = "Steps a second. Fast or small things need more.",
-                      .defaultText = "240",
-                      .minimum = 1,
-                      .maximum = 100000},
-                     {.name = "iterations",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Of Bullet's solver, in each step.",
-                      .defaultText = "20",
-                      .minimum = 1,
-                      .maximum = 1000},
-                     {.name = "seed",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Which random places and directions bodies start with.",
-                      .defaultText = "1",
-                      .minimum = 0,
-                      .maximum = 1e9},
-                     threadsParameter("The simulation is"),
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as "
-                              "'turntable' has it; or *.mp4, for which ffmpeg must be installed. Without it nothing is "
-                              "drawn.",
-                      .valueName = "FILE.png|FOLDER|FILE.mp4",
-                      .alias = 'o'},
-                     {.name = "fps",
-                      .type = ParameterType::number,
-                      .help = "Frames a simulated second, at which an .mp4 plays.",
-                      .defaultText = "30",
-                      .minimum = 0.1,
-                      .maximum = 10000}},
+      .parameters = sceneParameters(names),
       .action = runSimulate,
       .check = checkSimulate};
-  std::ranges::move(sceneLookParameters(registry), std::back_inserter(command.parameters));
+  append(command.parameters, solverParameters());
+  append(command.parameters, pictureParameters(registry));
   return command;
 }
 

@@ -18,6 +18,7 @@
 namespace hpsdf::app {
 namespace {
 
+/// A hash of the positions and orientations of all bodies.
 std::uint64_t stateOf(const physics::World& world) {
   std::vector<double> state;
   const auto add = [&](const btVector3& v) { state.insert(state.end(), {v.x(), v.y(), v.z()}); };
@@ -44,18 +45,19 @@ void addStep(const physics::StepFigures& step, double size, bool lastSecond, Sim
   if (lastSecond) figures.deepestAtEnd = std::max(figures.deepestAtEnd, step.dispatch.deepest);
 }
 
-/// Takes the pictures that are due, where there is a camera.
+/// Takes the pictures that are due. Does nothing without a camera.
 class Photographer {
  public:
   Photographer(const Scene& scene, const std::string& name, const SimulationCamera* camera, double rate)
       : camera_(camera) {
     if (camera == nullptr) return;
     studio_.emplace(scene, name, camera->look, camera->backend);
-    if (camera->framesPerSecond > 0) stepsAFrame_ = rate / camera->framesPerSecond;
+    if (camera->framesPerSecond > 0) stepsPerFrame_ = rate / camera->framesPerSecond;
   }
 
+  /// Takes the picture after that many steps, if one is due.
   void after(std::uint64_t steps, bool last) {
-    if (!studio_ || (stepsAFrame_ > 0 ? double(steps) < std::round(stepsAFrame_ * double(frames_)) : !last)) return;
+    if (!studio_ || (stepsPerFrame_ > 0 ? double(steps) < std::round(stepsPerFrame_ * double(frames_)) : !last)) return;
     camera_->take(studio_->shot());
     ++frames_;
   }
@@ -63,8 +65,8 @@ class Photographer {
  private:
   const SimulationCamera* camera_;
   std::optional<Studio> studio_;
-  double stepsAFrame_ = 0;  // 0: none but the last
-  std::uint64_t frames_ = 0;
+  double stepsPerFrame_ = 0;  ///< steps between frames; 0 for one picture after the last step
+  std::uint64_t frames_ = 0;  ///< number of pictures taken
 };
 
 SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps, double rate,
@@ -72,7 +74,7 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
   SimulationFigures figures;
   Photographer photographer(scene, name, camera, rate);
   for (std::uint64_t step = 0; step < steps; ++step) {
-    progress.at("simulating", double(step) / double(steps));
+    progress.update("simulating", double(step) / double(steps));
     scene.admit();
     photographer.after(step, false);
     scene.world().step();

@@ -14,8 +14,8 @@
 
 namespace hpsdf::app {
 
-/// A number that each step has.
-struct CountAStep {
+/// Statistics of a number that every step has.
+struct CountPerStep {
   double sum = 0;
   std::size_t most = 0, last = 0;
 
@@ -26,32 +26,35 @@ struct CountAStep {
   }
 };
 
-/// Of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
+/// Figures of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
 struct SimulationFigures {
-  std::size_t bodies = 0, nodes = 0;  ///< that move
-  std::size_t waiting = 0;            ///< bodies that would have come later
-  std::size_t lost = 0;               ///< at the end
+  std::size_t bodies = 0, nodes = 0;  ///< number of moving bodies and of nodes of soft bodies
+  std::size_t waiting = 0;            ///< bodies that were never added
+  std::size_t lost = 0;               ///< bodies below the floor at the end
   std::uint64_t steps = 0;
-  double simulated = 0;  ///< seconds
+  double simulated = 0;  ///< simulated time, seconds
+  /// Wall-clock time in seconds: of the preparation, of all steps, of their field queries, of the solver, and of the
+  /// queries of the slowest step.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
-  CountAStep penetrating, touching;  ///< touching are the solver's contacts
-  double size = 0;  ///< what depths are compared with: the radius of a marble, the size of a body, a cloth's margin
-  double deepest = 0, sumOfDeepest = 0, deepestAtEnd = 0;  ///< the last of the simulation's last second
-  std::uint64_t state = 0;                                 ///< a fingerprint of all places at the end
+  CountPerStep penetrating, touching;  ///< contacts in fields, and contacts that the solver treats
+  double size = 0;  ///< length that depths are compared with: a marble's radius, a body's size or a cloth's margin
+  double deepest = 0, sumOfDeepest = 0,
+         deepestAtEnd = 0;  ///< penetration depths, world units; the end is the last second
+  std::uint64_t state = 0;  ///< hash of all positions at the end
 };
 
-/// How a simulation is drawn: it goes on as if it were not.
+/// Settings of a simulation's pictures, which do not influence the simulation.
 struct SimulationCamera {
-  /// Camera, size and samples. The camera's distance is a multiple of that at which all of the scene is just in view,
-  /// and it circles the scene's middle where it has no target.
+  /// Camera, size and samples. The camera's distance is a multiple of the distance at which the whole scene is just in
+  /// view. Without a target the camera looks at the scene's middle.
   render::SurfacePicture look;
   Backend backend;
-  double framesPerSecond = 0;  ///< simulated ones, the start first; 0: one picture, of the end
-  std::function<void(SimulationShot)> take;
+  double framesPerSecond = 0;  ///< frames per simulated second, from the start; 0 for one picture of the end
+  std::function<void(SimulationShot)> take;  ///< called with each picture
 };
 
-/// Runs a scene, and takes pictures of it where there is a camera. Throws `Error` for what cannot be made or simulated,
-/// and in a program that was built without Bullet; `Cancelled` after Ctrl-C.
+/// Simulates a scene for `seconds` of simulated time and takes pictures if there is a camera. Throws `Error` for a
+/// scene that cannot be made or simulated, and in a program that was built without Bullet; `Cancelled` after Ctrl-C.
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
                            double seconds, int threads, const SimulationCamera* camera = nullptr);
 

@@ -20,7 +20,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr render::Color kLevelGround = {224, 226, 230};
-constexpr double kLevelGroundSide = 8;  // in diagonals of what is on it
+constexpr double kLevelGroundSide = 8;  // diagonals of the scene's other bodies
 
 const physics::FieldShape* fieldShape(const btCollisionShape& shape) {
   return dynamic_cast<const physics::FieldShape*>(&shape);
@@ -30,7 +30,7 @@ const BodyKind& kindOf(const Scene& scene, const physics::FieldShape& shape) {
   return *std::ranges::find(scene.kinds(), &shape, [](const BodyKind& kind) { return &kind.shape; });
 }
 
-/// Calls visit(shape, worldFromBody) for the rigid bodies that are in, and for those to come where they start.
+/// Calls visit(shape, worldFromBody) for the rigid bodies in the world, and for those to be added at their start.
 template <typename Visit>
 void forEachRigid(const Scene& scene, const Visit& visit) {
   const physics::World& world = scene.world();
@@ -62,23 +62,23 @@ Box boxAround(std::span<const Vector3> points) {
 
 TriangleMesh sphereMesh(double radius) { return shapes::mesh(fmt::format("sphere,radius={},subdivisions=3", radius)); }
 
-/// Where a plane is, with its outside upwards, below or above a point: from a frame in which it is z = 0.
+/// The frame of a plane: the plane is z = 0, its outside is z > 0, and the origin is the foot of `point`.
 Eigen::Isometry3d planeAt(const btStaticPlaneShape& shape, const Vector3& point) {
   const Vector3 normal = physics::fromBullet(shape.getPlaneNormal());
   const Vector3 foot = point - (normal.dot(point) - shape.getPlaneConstant()) * normal;
   return Eigen::Translation3d(foot) * Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), normal);
 }
 
-/// A slab, its upper side at z = 0.
+/// A slab with its upper side at z = 0.
 TriangleMesh levelGround(double side) {
   TriangleMesh mesh = slabMesh({side, side, 0.01 * side});
   for (Vector3& x : mesh.vertices) x.z() -= 0.005 * side;
   return mesh;
 }
 
-/// Points of a body's shape, in the body's frame, that are in view only where all of it is; level ground has none.
+/// Points of a shape in the body's frame. The whole body is in view if they are. Level ground has none.
 std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape) {
-  constexpr double kDetail = 1.0 / 16;  // of the longest side: outlines need no more
+  constexpr double kDetail = 1.0 / 16;  // in longest sides, fine enough for an outline
   std::vector<Vector3> points;
   if (const auto* field = fieldShape(shape)) {
     const TriangleMesh& mesh = kindOf(scene, *field).mesh;
@@ -91,16 +91,16 @@ std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape
   return points;
 }
 
-/// What falls onto level ground spreads: the corners of a box on it, drawn apart.
+/// Adds the corners of the box projected onto level ground, with a border, because bodies spread when they land there.
 void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<Vector3>& points) {
   constexpr double kSpread = 1.25;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vector3 apart = box.center() + kSpread * (box.corner(Box::CornerType(corner)) - box.center());
-    points.push_back(planeAt(plane, apart).translation());
+    const Vector3 widened = box.center() + kSpread * (box.corner(Box::CornerType(corner)) - box.center());
+    points.push_back(planeAt(plane, widened).translation());
   }
 }
 
-/// Of everything in a scene, in the world.
+/// The outlines of all bodies of a scene, in world coordinates.
 std::vector<Vector3> outlineOf(const Scene& scene) {
   std::map<const btCollisionShape*, std::vector<Vector3>> outlines;
   std::vector<Vector3> points;
@@ -123,17 +123,19 @@ render::Camera cameraOf(const render::SurfacePicture& look, const Box& domain) {
   return render::cameraOf(look.camera, domain, size.width, size.height);
 }
 
-/// Aims a camera that has a direction, and perhaps a target, so that its distance 1 is where the points are just in
-/// view, in their middle where it has no target. Then its distance is one in diagonals of the domain.
+/// Aims a camera that has a direction, and perhaps a target, at the points. The camera's distance is a multiple of the
+/// distance from which all points are just in view; it is converted to diagonals of the domain. Without a target the
+/// camera looks at the middle of the points.
 ///
-/// In the camera's directions, across it in units of the half view at distance 1: a point s across and z towards the
-/// eye is in view where |s - s_eye| ≤ z_eye - z, and, of parallel rays, where |s - s_eye| ≤ distance.
+/// Let s be a point's coordinate along the picture's width or height, in units of half the view's extent at distance 1,
+/// and z its coordinate towards the eye. A point is in view if |s - s_eye| ≤ z_eye - z, or, with parallel rays, if
+/// |s - s_eye| ≤ distance.
 void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Box& domain) {
   constexpr double kBorder = 1.04;
   const bool parallel = look.camera.projection == render::Projection::orthographic;
   render::SurfacePicture wide = look;
   wide.camera.distance = 1;
-  wide.camera.projection = render::Projection::perspective;  // its half view is that at distance 1
+  wide.camera.projection = render::Projection::perspective;  // whose half extent at distance 1 is the unit of s
   const render::Camera camera = cameraOf(wide, domain);
   const Vector3 middle = look.camera.target.value_or(boxAround(points).center());
   Vector3 target = middle;
@@ -153,7 +155,7 @@ void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Bo
   look.camera.distance *= kBorder * distance / domain.diagonal().norm();
 }
 
-/// What a pixel covers where the box is nearest to the eye; 0 where that is in the box.
+/// The extent of a pixel at the point of the box that is nearest to the eye, world units; 0 if the eye is in the box.
 double finestDetail(const render::SurfacePicture& look, const Box& box, const Box& domain) {
   const render::Camera camera = cameraOf(look, domain);
   double nearest = std::numeric_limits<double>::infinity();
@@ -188,10 +190,10 @@ Studio::Ground Studio::groundOf(const Scene& scene) {
     if (worldFromMesh.linear().isIdentity(1e-9))
       return {n, &kindOf(scene, *shape).field, Eigen::Isometry3d(Eigen::Translation3d(-worldFromMesh.translation()))};
   }
-  throw std::logic_error("a scene in which nothing stands upright");
+  throw std::logic_error("the scene has no static body whose field can be traced");
 }
 
-/// Aims the camera, on which the meshes depend.
+/// Aims the camera and makes the meshes, whose detail depends on the camera.
 std::vector<TriangleMesh> Studio::makeModels() {
   std::vector<Vector3> outline = outlineOf(scene_);
   const Box extent = boxAround(outline);
@@ -233,8 +235,8 @@ std::vector<render::Body> Studio::bodies() const {
     if (n == ground_.body) continue;
     const btRigidBody& body = world.body(n);
     const Model& model = models_.at(body.getCollisionShape());
-    const bool level = body.getCollisionShape()->getShapeType() == STATIC_PLANE_PROXYTYPE;
-    const render::Color color = level                   ? kLevelGround
+    const bool isGround = body.getCollisionShape()->getShapeType() == STATIC_PLANE_PROXYTYPE;
+    const render::Color color = isGround                ? kLevelGround
                                 : body.isStaticObject() ? render::surfaceColor()
                                                         : render::bodyColor(moving++);
     result.push_back({model.mesh, ground_.fieldFromWorld * world.worldFromBody(n) * model.bodyFromMesh, color});
@@ -246,13 +248,10 @@ std::vector<render::Body> Studio::bodies() const {
 
 render::Caption Studio::caption() const {
   const physics::World& world = scene_.world();
-  const auto counted = [](std::size_t count, const char* one, const char* more) {
-    return grouped(count) + " " + (count == 1 ? one : more);
-  };
   render::Caption caption{name_, {fmt::format("t = {:.2f} s", world.seconds())}};
-  if (rigid_ > 0) caption.details.push_back(counted(scene_.moving(), "body", "bodies"));
-  if (world.softBodies() > 0) caption.details.push_back(counted(world.softBodies(), "soft body", "soft bodies"));
-  caption.details.push_back(counted(world.figures().dispatch.penetrating, "contact", "contacts"));
+  if (rigid_ > 0) caption.details.push_back(countOf(scene_.moving(), "body", "bodies"));
+  if (world.softBodies() > 0) caption.details.push_back(countOf(world.softBodies(), "soft body", "soft bodies"));
+  caption.details.push_back(countOf(world.figures().dispatch.penetrating, "contact", "contacts"));
   caption.details.push_back(
       fmt::format("camera {:g}°, {:g}°", look_.camera.azimuthDegrees, look_.camera.elevationDegrees));
   return caption;

@@ -1,5 +1,5 @@
 #pragma once
-// From a scene to its picture.
+// Draws the pictures of a simulation.
 
 #include <cstdint>
 #include <map>
@@ -15,26 +15,28 @@
 
 namespace hpsdf::app {
 
-/// Draws a scene as it is, and leaves it as it is. The surface of one field is traced, that of the first body that
-/// stands upright, in whose coordinates pictures are; all else are meshes, without detail that is below a pixel.
+/// Draws the present state of a scene. The surface of one field is traced, that of the first static body that is only
+/// translated, and the pictures are in its coordinates. All other bodies are drawn as meshes without detail below a
+/// pixel.
 class Studio {
  public:
-  /// `look` as in `SimulationCamera`: what is in view is decided now, by what is in and what is still to come. Throws
-  /// `Error` when no device serves.
+  /// `look` as in `SimulationCamera`. The camera is aimed once, at all bodies of the scene and those that are still to
+  /// be added. Throws `Error` when no renderer is available.
   Studio(const Scene& scene, std::string name, render::SurfacePicture look, const Backend& backend);
 
+  /// A picture of the scene as it is now.
   SimulationShot shot();
 
  private:
   /// The body whose field is traced.
   struct Ground {
-    std::size_t body;
+    std::size_t body;  ///< index in the world
     const Field* field;
-    Eigen::Isometry3d fieldFromWorld;  // a translation: what is up stays so
+    Eigen::Isometry3d fieldFromWorld;  ///< a translation, so that z stays up
   };
-  /// What bodies of a shape look like.
+  /// The mesh that is drawn for a collision shape.
   struct Model {
-    std::uint32_t mesh;
+    std::uint32_t mesh;  ///< index in the body renderer
     Eigen::Isometry3d bodyFromMesh;
   };
 
@@ -48,9 +50,9 @@ class Studio {
   std::string name_;
   render::SurfacePicture look_;
   Ground ground_;
-  std::map<const btCollisionShape*, Model> models_;  // of rigid bodies
-  std::uint32_t firstSoft_ = 0;                      // mesh of the first soft body; the others follow
-  std::size_t rigid_;                                // how many will move, so that colours of soft ones are others
+  std::map<const btCollisionShape*, Model> models_;  ///< meshes of the rigid bodies' shapes
+  std::uint32_t firstSoft_ = 0;                      ///< mesh of the first soft body; the other soft bodies follow
+  std::size_t rigid_;  ///< rigid bodies that will move; soft bodies have the colours after theirs
   std::unique_ptr<render::Renderer> renderer_;
   std::unique_ptr<render::BodyRenderer> bodyRenderer_;
   std::string description_;

@@ -1,5 +1,5 @@
 #pragma once
-// Studies: what fields of several meshes have in common, as tables and pictures in a folder.
+// Studies: they build fields of several meshes and write tables and pictures about them into a folder.
 
 #include <cstddef>
 #include <filesystem>
@@ -14,8 +14,8 @@ namespace hpsdf::app {
 /// A kind of study: `hpsdf study NAME MESH…`.
 struct Study {
   std::string name = {};
-  std::string help = {};                   ///< a paragraph
-  std::vector<Parameter> parameters = {};  ///< besides kind, mesh and output
+  std::string help = {};                   ///< one paragraph
+  std::vector<Parameter> parameters = {};  ///< parameters besides kind, mesh and output
   void (*run)(Session&, const Arguments&) = nullptr;
 };
 
@@ -23,18 +23,18 @@ Study convergenceStudy();
 Study tableStudy();
 Study continuityStudy();
 
-/// Parameters of `build` that a study takes too, once for all meshes or once for each: all but these.
+/// The parameters of `build` except those named. Each but a flag may be given once for all meshes, or once for each.
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);
 
-/// How many points errors are measured at, and which.
+/// The parameters of the points at which errors are measured: their number and the seed of their positions.
 std::vector<Parameter> samplingParameters();
 SampleOptions sampleOptions(const Arguments& arguments, int threads);
 
-/// For one of the meshes, the arguments of `build` that are among a study's: of an option that is given once for each
-/// mesh the one of its place. Throws `Error` for one that is given another number of times.
+/// The arguments of `build` for the mesh of that index. A parameter that is given once for each mesh has its value at
+/// the same index. Throws `Error` for a parameter that is given another number of times.
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh);
 
-/// Plain names for files, one for each mesh, no two the same.
+/// A different file name for each mesh.
 std::vector<std::string> fileNames(const std::vector<std::string>& meshes);
 
 }  // namespace hpsdf::app

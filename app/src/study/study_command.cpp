@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "construction/building.h"
+#include "construction/build_arguments.h"
 #include "session/session.h"
 #include "study/study.h"
 #include "text/text.h"
@@ -52,7 +52,7 @@ std::vector<Parameter> kindParameters() {
       if (std::ranges::find(all, parameter.name, &Parameter::name) != all.end()) continue;
       const std::vector<const Study*> takers = studiesThatTake(parameter.name);
       if (takers.size() < studies().size())
-        parameter.help += fmt::format(" For {}.", fmt::join(namesOf(takers), " and "));
+        parameter.group = fmt::format("Options of 'study {}'", fmt::join(namesOf(takers), "' and 'study "));
       const auto sameDefault = [&](const Study* other) {
         return parameterOf(*other, parameter.name)->defaultText == parameter.defaultText;
       };
@@ -124,45 +124,48 @@ std::vector<std::string> fileNames(const std::vector<std::string>& meshes) {
   return names;
 }
 
+namespace {
+
+const Command kStudy = {
+    .name = "study",
+    .summary = "Study size, time and accuracy of fields, as the paper does.",
+    .help =
+        "Builds fields of each MESH and writes tables and plots into a folder, as text for people and JSON for "
+        "programs. KIND selects the study:",
+    .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
+                 "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error 1e-7 --grid 6 "
+                 "--grid 10",
+                 "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
+    .parameters = {{.name = "kind",
+                    .type = ParameterType::choice,
+                    .help = "Kind of the study.",
+                    .positional = true,
+                    .need = Need::always},
+                   {.name = "mesh",
+                    .type = ParameterType::text,
+                    .help = "Mesh files, builtin:SHAPE or analytic:SHAPE.",
+                    .valueName = "MESH",
+                    .positional = true,
+                    .repeatable = true,
+                    .need = Need::always},
+                   {.name = "output",
+                    .type = ParameterType::outputPath,
+                    .help = "Folder of the results. It is created where it does not exist.",
+                    .valueName = "FOLDER",
+                    .alias = 'o',
+                    .need = Need::always}},
+    .action = [](Session& session, const Arguments& arguments) { studyOf(arguments).run(session, arguments); },
+    .check = checkStudy};
+
+}  // namespace
+
 void addStudyCommand(Registry& registry) {
-  std::vector<std::string> kinds;
-  std::string help =
-      "Builds fields of each MESH and writes what they have to tell into a folder, as text for people "
-      "and JSON for programs. KIND says what is studied:";
+  Command command = kStudy;
   for (const Study& study : studies()) {
-    kinds.push_back(study.name);
-    help += fmt::format("\n\n{}: {}", study.name, study.help);
+    command.parameters[0].choices.push_back(study.name);
+    command.help += fmt::format("\n\n{}: {}", study.name, study.help);
   }
-  Command command{
-      .name = "study",
-      .summary = "Study what fields of given meshes cost and how exact they are, as the paper does.",
-      .help = help,
-      .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
-                   "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error "
-                   "1e-7 --grid 6 --grid 10",
-                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
-      .parameters = {{.name = "kind",
-                      .type = ParameterType::choice,
-                      .help = "What is studied.",
-                      .choices = kinds,
-                      .positional = true,
-                      .need = Need::always},
-                     {.name = "mesh",
-                      .type = ParameterType::text,
-                      .help = "Mesh files, builtin:SHAPE or analytic:SHAPE.",
-                      .valueName = "MESH",
-                      .positional = true,
-                      .repeatable = true,
-                      .need = Need::always},
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "The folder; made when it is not there.",
-                      .valueName = "FOLDER",
-                      .alias = 'o',
-                      .need = Need::always}},
-      .action = [](Session& session, const Arguments& arguments) { studyOf(arguments).run(session, arguments); },
-      .check = checkStudy};
-  for (Parameter& parameter : kindParameters()) command.parameters.push_back(std::move(parameter));
+  command.parameters = joined({command.parameters, kindParameters()});
   registry.add(std::move(command));
 }
 

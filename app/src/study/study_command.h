@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds study.
+/// Adds `study`.
 void addStudyCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -3,13 +3,16 @@
 #include <chrono>
 
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "files/output_folder.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
+#include "language/append_parameters.h"
 #include "language/script.h"
 #include "session/session.h"
 #include "study/study.h"
@@ -19,21 +22,21 @@
 namespace hpsdf::app {
 namespace {
 
-/// Near the surface: within this part of the domain's longest edge.
+/// Width of the region near the surface, as a share of the domain's longest edge.
 constexpr double kNear = 0.01;
 
 struct Row {
   std::string mesh;
   bool enriched = false;
-  double weight = 0;  ///< λ; 0: without weak continuity
+  double weight = 0;  ///< λ; 0 without weak continuity
   double jump = 0, greatestJump = 0, rms = 0, nearRms = 0;
   std::size_t bytes = 0;
   int iterations = 0;
-  double seconds = 0;       ///< of the post-process
-  double buildSeconds = 0;  ///< of the construction
+  double seconds = 0;       ///< time of the post-process
+  double buildSeconds = 0;  ///< time of the construction
 };
 
-/// A row and what it is compared with: the mesh's field without enrichment and without weak continuity.
+/// A row with its ratios to `first`, the mesh's field without enrichment and without weak continuity.
 struct Compared {
   const Row& row;
   const Row& first;
@@ -45,7 +48,7 @@ struct Compared {
   double time() const { return row.seconds / row.buildSeconds; }
 };
 
-/// Of one mesh.
+/// Measures the fields of one mesh.
 class ContinuityStudy {
  public:
   ContinuityStudy(Session& session, const Arguments& arguments, std::size_t mesh)
@@ -110,7 +113,7 @@ class ContinuityStudy {
   ExactSamples uniform_, near_;
 };
 
-/// Names of shapes hold commas.
+/// A CSV field in quotes, because the names of shapes contain commas.
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -121,45 +124,45 @@ std::string csv(const std::vector<Compared>& rows) {
   std::string text =
       "mesh,enriched,weight,jump_rms,jump_rms_ratio,jump_max,jump_max_ratio,rms,rms_ratio,near_rms,near_rms_ratio,"
       "bytes,bytes_ratio,iterations,seconds,seconds_ratio\n";
-  for (const Compared& of : rows) {
-    const Row& row = of.row;
+  for (const Compared& ratio : rows) {
+    const Row& row = ratio.row;
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", quoted(row.mesh), int(row.enriched),
-                        row.weight > 0 ? fmt::format("{}", row.weight) : "", row.jump, of.jump(), row.greatestJump,
-                        of.greatestJump(), row.rms, of.rms(), row.nearRms, of.nearRms(), row.bytes, of.bytes(),
-                        row.iterations, row.seconds, of.time());
+                        row.weight > 0 ? fmt::format("{}", row.weight) : "", row.jump, ratio.jump(), row.greatestJump,
+                        ratio.greatestJump(), row.rms, ratio.rms(), row.nearRms, ratio.nearRms(), row.bytes,
+                        ratio.bytes(), row.iterations, row.seconds, ratio.time());
   }
   return text;
 }
 
 Json json(const std::vector<Compared>& rows) {
   Json all = Json::array();
-  for (const Compared& of : rows) {
-    const Row& row = of.row;
+  for (const Compared& ratio : rows) {
+    const Row& row = ratio.row;
     all.push_back({{"mesh", row.mesh},
                    {"enriched", row.enriched},
                    {"weight", row.weight > 0 ? Json(row.weight) : Json()},
                    {"jump_rms", row.jump},
-                   {"jump_rms_ratio", of.jump()},
+                   {"jump_rms_ratio", ratio.jump()},
                    {"jump_max", row.greatestJump},
-                   {"jump_max_ratio", of.greatestJump()},
+                   {"jump_max_ratio", ratio.greatestJump()},
                    {"rms", row.rms},
-                   {"rms_ratio", of.rms()},
+                   {"rms_ratio", ratio.rms()},
                    {"near_rms", row.nearRms},
-                   {"near_rms_ratio", of.nearRms()},
+                   {"near_rms_ratio", ratio.nearRms()},
                    {"bytes", row.bytes},
-                   {"bytes_ratio", of.bytes()},
+                   {"bytes_ratio", ratio.bytes()},
                    {"iterations", row.iterations},
                    {"seconds", row.seconds},
                    {"build_seconds", row.buildSeconds},
-                   {"seconds_ratio", of.time()}});
+                   {"seconds_ratio", ratio.time()}});
   }
   return all;
 }
 
 std::string table(const std::vector<Compared>& rows) {
   std::string text, mesh;
-  for (const Compared& of : rows) {
-    const Row& row = of.row;
+  for (const Compared& ratio : rows) {
+    const Row& row = ratio.row;
     if (row.mesh != mesh) {
       mesh = row.mesh;
       text +=
@@ -170,9 +173,9 @@ std::string table(const std::vector<Compared>& rows) {
                           "max jump", "error", "near", "bytes", "steps", "time");
     }
     text += fmt::format("  {:<10} {:>9} {:>7.3f} × {:>7.3f} × {:>7.3f} × {:>7.3f} × {:>5.2f} ×",
-                        row.enriched ? "enriched" : "", row.weight > 0 ? shortNumber(row.weight) : "none", of.jump(),
-                        of.greatestJump(), of.rms(), of.nearRms(), of.bytes());
-    text += row.weight > 0 ? fmt::format(" {:>6} {:>7.2f} ×\n", row.iterations, of.time()) : "\n";
+                        row.enriched ? "enriched" : "", row.weight > 0 ? shortNumber(row.weight) : "none", ratio.jump(),
+                        ratio.greatestJump(), ratio.rms(), ratio.nearRms(), ratio.bytes());
+    text += row.weight > 0 ? fmt::format(" {:>6} {:>7.2f} ×\n", row.iterations, ratio.time()) : "\n";
   }
   return text;
 }
@@ -181,7 +184,8 @@ void runContinuity(Session& session, const Arguments& arguments) {
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "continuity.csv");
   const std::vector<std::string> meshes = arguments.texts("mesh");
-  for (std::size_t n = 0; n < meshes.size(); ++n) buildArguments(session, arguments, n);  // mistakes, before long work
+  for (std::size_t n = 0; n < meshes.size(); ++n)
+    buildArguments(session, arguments, n);  // reports mistakes before the long work
   std::vector<std::vector<Row>> all;
   for (std::size_t n = 0; n < meshes.size(); ++n) all.push_back(ContinuityStudy(session, arguments, n).run());
   std::vector<Compared> rows;
@@ -219,10 +223,11 @@ Study continuityStudy() {
                       .minimumExcluded = true,
                       .counts = counts}},
       .run = runContinuity};
-  for (auto& parameters :
-       {samplingParameters(), buildParametersWithout({"enrich", "continuity", "continuity-weight", "blend-width",
-                                                      "bounds", "max-error", "max-bytes", "max-steps", "paper"})})
-    for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
+  std::vector<std::string> without = endParameters({BuildSetting::Ending::otherQuantity, BuildSetting::Ending::steps});
+  for (const char* name : {"enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"})
+    without.emplace_back(name);
+  for (const auto& parameters : {samplingParameters(), buildParametersWithout(without)})
+    append(study.parameters, parameters);
   return study;
 }
 

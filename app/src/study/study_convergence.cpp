@@ -1,4 +1,5 @@
-// study convergence: error over coefficients, hp beside plain octrees (paper, Figs. 3 and 4).
+// `study convergence`: error over the number of coefficients, for hp-refinement and for octrees of constant degree
+// (paper, Figs. 3 and 4).
 
 #include <fmt/format.h>
 
@@ -9,12 +10,15 @@
 #include <optional>
 
 #include "console/long_work.h"
-#include "construction/building.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "files/other_program.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
+#include "language/append_parameters.h"
 #include "language/script.h"
 #include "session/field_summary.h"
 #include "session/session.h"
@@ -30,7 +34,7 @@ namespace fs = std::filesystem;
 constexpr std::array kStrategies = {Strategy::hp, Strategy::h2, Strategy::h1};
 constexpr std::array kColors = {"#1683ab", "#d1721b", "#6b7280"};
 
-/// A field on the way of a construction. Errors are at the scale where the mesh's longest side is 2.
+/// The figures of a field during its construction. Errors are scaled to a mesh with a longest side of 2.
 struct Stage {
   std::uint64_t steps;
   std::size_t leaves;
@@ -42,20 +46,20 @@ struct Stage {
 
 struct Curve {
   Strategy strategy;
-  std::vector<Stage> stages;  ///< by growing numbers of coefficients
+  std::vector<Stage> stages;  ///< by ascending number of coefficients
 };
 
 struct Convergence {
   std::string mesh;
-  std::string name;  ///< for files
+  std::string name;  ///< name for files
   std::vector<Curve> curves;
 };
 
-/// Ends a construction that has become large enough.
+/// Thrown to end a construction that has enough coefficients.
 struct LargeEnough {};
 
-/// After no step, and then so many times more each time. How many coefficients they add differs from step to step, so
-/// that more fields are looked at than become stages.
+/// The numbers of steps at which the field is inspected: 0, then a geometric sequence with the ratio `growth`. Steps
+/// add different numbers of coefficients, so that more fields are inspected than become stages.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
       double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // the smallest step
@@ -82,7 +86,7 @@ Curve curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sa
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
-  options.targetError = std::numeric_limits<double>::min();  // whatever can be refined is
+  options.targetError = std::numeric_limits<double>::min();  // the construction refines until it is ended
   Curve curve{strategy, {}};
   try {
     buildStages(*input.exact, input.domain, options, stageSteps(std::pow(growth, 0.25), most),
@@ -119,7 +123,7 @@ Convergence studied(Session& session, const Arguments& arguments, std::size_t me
   });
 }
 
-/// The least measured RMS error that all curves reach.
+/// The smallest measured RMS error that all curves reach.
 double commonRms(const Convergence& convergence) {
   double common = 0;
   for (const Curve& curve : convergence.curves)
@@ -127,8 +131,8 @@ double commonRms(const Convergence& convergence) {
   return common;
 }
 
-/// How many coefficients a curve needs for a measured RMS error, logarithms interpolated; nothing where it does not
-/// reach that, or starts below it.
+/// The number of coefficients at which a curve has a measured RMS error, interpolated linearly in logarithms. Nothing
+/// if the curve does not reach the error, or starts below it.
 std::optional<double> coefficientsAt(const Curve& curve, double rms) {
   for (std::size_t n = 0; n < curve.stages.size(); ++n) {
     const Stage& after = curve.stages[n];
@@ -214,8 +218,6 @@ std::string textOf(const Convergence& convergence, const Arguments& arguments) {
   return text;
 }
 
-// the picture
-
 fs::path requireGnuplot() {
   if (const auto found = findProgram("gnuplot")) return *found;
   throw Error(
@@ -223,7 +225,7 @@ fs::path requireGnuplot() {
       "gnuplot-nox, or give --no-plot");
 }
 
-/// gnuplot's own words for a curve's data: the n-th block of the file.
+/// The gnuplot script that draws a mesh's curves. The data of the n-th curve are the n-th block of plot.dat.
 std::string plotScript(const Convergence& convergence) {
   std::string script = fmt::format(
       "set terminal pngcairo size 900,560 font \"DejaVu Sans,11\" background \"#fbfbf8\"\n"
@@ -265,7 +267,7 @@ std::string plotData(const Convergence& convergence) {
   return text;
 }
 
-/// The bytes of its PNG.
+/// Draws the curves of a mesh. Returns the bytes of the PNG file.
 std::string plotOf(const fs::path& gnuplot, const Convergence& convergence) {
   const TemporaryFolder folder;
   writeTextFile(folder.path() / "plot.dat", plotData(convergence));
@@ -285,7 +287,8 @@ void runConvergence(Session& session, const Arguments& arguments) {
   checkWritable(folder.path() / "convergence.csv");
   const std::vector<std::string> meshes = arguments.texts("mesh");
   const std::vector<std::string> names = fileNames(meshes);
-  for (std::size_t n = 0; n < meshes.size(); ++n) buildArguments(session, arguments, n);  // mistakes, before long work
+  for (std::size_t n = 0; n < meshes.size(); ++n)
+    buildArguments(session, arguments, n);  // reports mistakes before the long work
   std::vector<Convergence> all;
   std::vector<std::string> pictures;
   for (std::size_t n = 0; n < meshes.size(); ++n) {
@@ -294,7 +297,7 @@ void runConvergence(Session& session, const Arguments& arguments) {
   }
 
   Json files = Json::array();
-  const InterruptGuard guard;  // until all files are there
+  const InterruptGuard guard;  // Ctrl-C must not interrupt the writing of the files
   const auto write = [&](const std::string& file, const std::string& bytes) {
     folder.write(file, bytes);
     files.push_back((folder.path() / file).string());
@@ -310,11 +313,14 @@ void runConvergence(Session& session, const Arguments& arguments) {
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
 }
 
-/// The paper's curves are of plain errors, not of weighted ones.
-std::vector<Parameter> plainBuildParameters() {
-  auto parameters =
-      buildParametersWithout({"target-error", "near-error", "far-error", "near-distance", "max-error", "max-bytes",
-                              "strategy", "max-steps", "coefficients", "band", "bounds", "paper"});
+/// The parameters of `build`, with a nearness of 0, because the paper's curves show unweighted errors.
+std::vector<Parameter> unweightedBuildParameters() {
+  using Ending = BuildSetting::Ending;
+  std::vector<std::string> without =
+      endParameters({Ending::target, Ending::byDistance, Ending::otherQuantity, Ending::steps});
+  for (const char* name : {"near-distance", "strategy", "coefficients", "band", "bounds", "paper"})
+    without.emplace_back(name);
+  auto parameters = buildParametersWithout(without);
   std::ranges::find(parameters, "nearness", &Parameter::name)->defaultText = "0";
   return parameters;
 }
@@ -354,8 +360,8 @@ Study convergenceStudy() {
                               .help = "Write no pictures: gnuplot is not needed then.",
                               .defaultText = "false"}},
               .run = runConvergence};
-  for (auto& parameters : {samplingParameters(), plainBuildParameters()})
-    for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
+  for (const auto& parameters : {samplingParameters(), unweightedBuildParameters()})
+    append(study.parameters, parameters);
   return study;
 }
 

@@ -1,4 +1,4 @@
-// study table: what fields of given meshes cost (paper, Table 1).
+// `study table`: time, memory and errors of the fields of given meshes (paper, Table 1).
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "console/version.h"
-#include "construction/building.h"
+#include "construction/build_field.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
@@ -17,6 +17,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
+#include "language/append_parameters.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
@@ -30,16 +31,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kThumbnail = 200;  // pixels along a side
-constexpr int kBar = 300;        // pixels along the whole volume
+constexpr int kThumbnail = 200;  // side of a slice, pixels
+constexpr int kBar = 300;        // length of a bar, which shows the whole volume, pixels
 
 /// A mesh and its field.
 struct TableRow {
   std::string mesh;
-  std::string name;  ///< for files
+  std::string name;  ///< name for files
   Field field;
   FieldStatistics figures;
-  double seconds;
+  double seconds;      ///< of the construction
   ErrorFigures error;  ///< measured, in the field's units
 
   double scale() const { return field.metadata().referenceLength / 2; }
@@ -51,9 +52,9 @@ using Colors = std::map<int, render::Color>;
 
 TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
   const std::string surface = arguments.texts("mesh")[mesh];
-  const Arguments ofBuild = buildArguments(session, arguments, mesh);
-  BuiltField built = buildField(session.console(), surface, ofBuild);
-  const SampleOptions sampling = sampleOptions(arguments, ofBuild.whole("threads"));
+  const Arguments buildArgs = buildArguments(session, arguments, mesh);
+  BuiltField built = buildField(session.console(), surface, buildArgs);
+  const SampleOptions sampling = sampleOptions(arguments, buildArgs.whole("threads"));
   const ExactSamples samples = withProgress(session.console(), [&](const Progress& progress) {
     return sampleUniform(*built.exact, built.field.domain(), 0, sampling, progress);
   });
@@ -66,7 +67,7 @@ const Shares& sharesOf(const TableRow& row, render::ColorBy color) {
   return color == render::ColorBy::degree ? row.figures.degreeVolume : row.figures.depthVolume;
 }
 
-/// All levels of all rows, so that a colour means the same throughout.
+/// The levels of all rows, so that a colour has the same meaning in every picture.
 std::vector<int> levelsOf(const std::vector<TableRow>& rows, render::ColorBy color) {
   std::set<int> levels;
   for (const TableRow& row : rows)
@@ -74,9 +75,9 @@ std::vector<int> levelsOf(const std::vector<TableRow>& rows, render::ColorBy col
   return {levels.begin(), levels.end()};
 }
 
-/// A slice through the middle, and what its colours stand for.
+/// A slice through the middle of the domain, with the levels that its colours show.
 struct Thumbnail {
-  std::string png;  ///< its bytes
+  std::string png;  ///< bytes of the PNG file
   Colors colors;
 };
 
@@ -103,7 +104,7 @@ std::string cssColor(const render::Color& color) {
 
 constexpr int kBarHeight = 18;
 
-/// An SVG of that width, whatever stands in it.
+/// An SVG picture of that width with the given elements.
 std::string rowSvg(int width, const std::string& parts) {
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
@@ -111,7 +112,7 @@ std::string rowSvg(int width, const std::string& parts) {
       width, kBarHeight, parts);
 }
 
-/// A rectangle in a level's colour, its number in it where there is room.
+/// A rectangle in a level's colour. It contains the level's number if there is room.
 std::string partSvg(double from, double width, int level, const render::Color& color, const std::string& title) {
   std::string svg =
       fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
@@ -123,7 +124,7 @@ std::string partSvg(double from, double width, int level, const render::Color& c
   return svg;
 }
 
-/// Shares of the volume as one bar.
+/// A bar that shows the shares of the volume.
 std::string barSvg(const Shares& shares, const Colors& colors) {
   std::string parts;
   double from = 0;
@@ -135,7 +136,7 @@ std::string barSvg(const Shares& shares, const Colors& colors) {
   return rowSvg(kBar, parts);
 }
 
-/// All levels, the narrow ones of bars and those of slices too.
+/// The key to the colours of all levels.
 std::string legendSvg(const Colors& colors) {
   constexpr int kWidth = 26;
   std::string parts;
@@ -147,7 +148,7 @@ std::string legendSvg(const Colors& colors) {
   return rowSvg(from, parts);
 }
 
-/// Everything of a row that is drawn.
+/// The pictures of a row.
 struct RowPictures {
   Thumbnail degree, depth;
 
@@ -173,7 +174,7 @@ std::string gridText(const TableRow& row) {
   return x == y && y == z ? fmt::format("{}³", x) : fmt::format("{}×{}×{}", x, y, z);
 }
 
-/// Names and values of a row's figures, in the order of the paper's table.
+/// The names and values of a row's figures, in the order of the paper's table.
 std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
   const FieldMetadata& metadata = row.field.metadata();
   const bool isMesh = metadata.source.faces > 0;
@@ -183,7 +184,7 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"grid", gridText(row)},
           {"time", fmt::format("{:.1f} s", row.seconds)},
           {"cells", grouped(row.figures.leaves)},
-          {"τ", shortNumber(metadata.targetError)},
+          {"τ", shortNumber(metadata.settings.targetError.weighted())},
           {"memory", bytesText(double(row.figures.bytes))},
           {"estimated RMS", shortNumber(row.estimatedRms())},
           {"measured RMS", shortNumber(row.error.rms / row.scale())},
@@ -232,7 +233,7 @@ Json jsonOf(const TableRow& row) {
           {"leaves", row.figures.leaves},
           {"degree_volume", levelsJson(row.figures.degreeVolume)},
           {"depth_volume", levelsJson(row.figures.depthVolume)},
-          {"target_error", metadata.targetError},
+          {"target_error", metadata.settings.targetError.weighted()},
           {"coefficients", row.figures.coefficients},
           {"precision", row.field.singlePrecision() ? "float" : "double"},
           {"bytes", row.figures.bytes},
@@ -297,7 +298,8 @@ void runTable(Session& session, const Arguments& arguments) {
   checkWritable(folder.path() / "index.html");
   const std::vector<std::string> meshes = arguments.texts("mesh");
   const std::vector<std::string> names = fileNames(meshes);
-  for (std::size_t n = 0; n < meshes.size(); ++n) buildArguments(session, arguments, n);  // mistakes, before long work
+  for (std::size_t n = 0; n < meshes.size(); ++n)
+    buildArguments(session, arguments, n);  // reports mistakes before the long work
   std::vector<TableRow> rows;
   for (std::size_t n = 0; n < meshes.size(); ++n) rows.push_back(rowOf(session, arguments, n, names[n]));
   const std::vector<RowPictures> pictures = picturesOf(session, chosen, rows);
@@ -306,7 +308,7 @@ void runTable(Session& session, const Arguments& arguments) {
                {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
                {"meshes", Json::array()}};
   for (const TableRow& row : rows) json["meshes"].push_back(jsonOf(row));
-  const InterruptGuard guard;  // until all files are there
+  const InterruptGuard guard;  // Ctrl-C must not interrupt the writing of the files
   for (std::size_t n = 0; n < rows.size(); ++n) {
     folder.write(names[n] + "-degree.png", pictures[n].degree.png);
     folder.write(names[n] + "-depth.png", pictures[n].depth.png);
@@ -335,8 +337,8 @@ Study tableStudy() {
                   "index.html, one page without network that can be mailed, table.md with its pictures, and "
                   "table.json.",
               .run = runTable};
-  for (auto& parameters : {samplingParameters(), buildParametersWithout({"max-steps"}), backendParameters()})
-    for (const Parameter& parameter : parameters) study.parameters.push_back(parameter);
+  for (const auto& parameters : {samplingParameters(), buildParametersWithout({"max-steps"}), backendParameters()})
+    append(study.parameters, parameters);
   return study;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Results for machines.
+// JSON output of commands.
 
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -10,7 +10,7 @@ namespace hpsdf::app {
 
 using Json = nlohmann::ordered_json;
 
-/// Indented, ending in a newline; names that are not UTF-8 are mended rather than refused.
+/// Writes indented JSON and a newline. Bytes that are not UTF-8, which names of files may contain, are replaced.
 void printJson(std::ostream& out, const Json& json);
 
 Json vectorJson(const Vector3& v);

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <filesystem>
+
+#include "hpsdf/detail/nearest_name.h"
 
 namespace hpsdf::app {
 
@@ -13,8 +16,8 @@ std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, 
 std::string vectorText(const Vector3& v, const Box& box) {
   const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
   const double size = box.sizes().maxCoeff();
-  const int more = size > 0 && largest > size ? int(std::log10(largest / size)) : 0;
-  return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + more, 17), v.x(), v.y(), v.z());
+  const int extraDigits = size > 0 && largest > size ? int(std::log10(largest / size)) : 0;
+  return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + extraDigits, 17), v.x(), v.y(), v.z());
 }
 
 std::string summaryRow(std::string_view label, const std::string& value) {
@@ -23,7 +26,7 @@ std::string summaryRow(std::string_view label, const std::string& value) {
 
 std::string grouped(std::uint64_t number) {
   std::string text = std::to_string(number);
-  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
+  for (std::size_t i = text.size(); i > 3;) text.insert(i -= 3, ",");
   return text;
 }
 
@@ -32,7 +35,7 @@ std::string countOf(std::size_t count, std::string_view one, std::string_view ma
 }
 
 std::string shortNumber(double number) {
-  if (!std::isfinite(number)) return fmt::format("{}", number);  // strangers' files hold such
+  if (!std::isfinite(number)) return fmt::format("{}", number);  // fields from other sources may hold them
   const double size = std::abs(number);
   if (number == 0 || (size >= 0.01 && size < 1e5)) return fmt::format("{:.3g}", number);
   std::string mantissa = fmt::format("{:.2e}", number);
@@ -43,17 +46,11 @@ std::string shortNumber(double number) {
   return fmt::format("{}e{}", mantissa, exponent);
 }
 
-std::string lowerExtension(const std::filesystem::path& file) {
-  std::string text = file.extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 std::string shellWord(const std::string& word) {
-  const bool plain = std::ranges::all_of(word, [](unsigned char c) {
+  const bool needsNoQuotes = std::ranges::all_of(word, [](unsigned char c) {
     return std::isalnum(c) || std::string_view("._-/:,=+").find(char(c)) != std::string::npos;
   });
-  if (plain && !word.empty()) return word;
+  if (needsNoQuotes && !word.empty()) return word;
   std::string quoted = "'";
   for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";
@@ -66,6 +63,12 @@ std::string plainName(const std::string& source) {
   std::ranges::replace_if(
       name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
   return name.empty() ? "field" : name;
+}
+
+std::string suggestion(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
+                       std::string_view prefix) {
+  const std::string nearest = nearestName(wanted, known);
+  return nearest.empty() ? std::string(otherwise) : fmt::format("did you mean '{}{}'?", prefix, nearest);
 }
 
 std::string boxText(const Box& box) { return vectorText(box.min(), box) + " to " + vectorText(box.max(), box); }

@@ -1,43 +1,47 @@
 #pragma once
-// Numbers, names and points as people read them.
+// Formats numbers, names and points for people.
 
 #include <cstdint>
-#include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "hpsdf/detail/text.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf::app {
 
-/// 1234567 → "1,234,567"
+/// Separates thousands by commas: 1234567 becomes "1,234,567".
 std::string grouped(std::uint64_t number);
 
-/// "1 face", "1,234 faces"
+/// Chooses the singular or the plural: "1 face", "1,234 faces".
 std::string countOf(std::size_t count, std::string_view one, std::string_view many);
 
-/// Three digits, and a short exponent where it saves zeros: 1e-6, 3.06e-4, 0.125
+/// Writes three significant digits, with an exponent where that is shorter: 1e-6, 3.06e-4, 0.125.
 std::string shortNumber(double number);
 
-/// "(0.1, 0.2, 0.3)"
+/// Writes a point as "(0.1, 0.2, 0.3)".
 std::string vectorText(const Vector3& v);
 
-/// With as many digits more as a place in a box far from the origin needs.
+/// Writes a point of `box` with extra digits where the box is small compared with its distance from the origin.
 std::string vectorText(const Vector3& v, const Box& box);
 
-/// "(0, 0, 0) to (1, 2, 3)", with as many digits more as it lies farther from the origin than it is long.
+/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with the digits of the function above.
 std::string boxText(const Box& box);
 
-/// ".png" of a.PNG
-std::string lowerExtension(const std::filesystem::path& file);
-
-/// "bunny" of bunny.obj, "torus" of builtin:torus,major=0.7: plain characters only, for commands and file names.
+/// Derives a name for files and commands from a mesh file or a shape: "bunny" for bunny.obj, "torus" for
+/// builtin:torus,major=0.7. It consists of letters, digits, '.', '-' and '_'.
 std::string plainName(const std::string& source);
 
-/// A word of a command as a shell takes it, quoted where it must be.
+/// Quotes a word for a shell where it contains characters that a shell would interpret.
 std::string shellWord(const std::string& word);
 
-/// An indented line of a summary.
+/// Formats one indented line of a summary: a label and its value.
 std::string summaryRow(std::string_view label, const std::string& value);
+
+/// Returns "did you mean 'NAME'?" for the known name that is nearest to `wanted`, preceded by `prefix` within the
+/// quotes, or `otherwise` where none is near.
+std::string suggestion(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
+                       std::string_view prefix = "");
 
 }  // namespace hpsdf::app

@@ -46,7 +46,7 @@ void LiveWork::refreshWhenDue() {
     if (!reported_) return;
     explorer_.work = reported_;
   }
-  // what is measured to draw the frame would be asked for again by the next frame
+  // Only commands can be cancelled: a measurement for the frame itself would be started again by the next frame.
   explorer_.work->cancellable = explorer_.running();
   refreshing_ = true;
   refresh_();

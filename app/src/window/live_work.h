@@ -1,5 +1,5 @@
 #pragma once
-// Long work in the explorer: its panels show how far it is and let a person cancel it.
+// Long work in the explorer: the panels show its progress, and a person can cancel it.
 
 #include <atomic>
 #include <chrono>
@@ -13,8 +13,8 @@
 
 namespace hpsdf::app {
 
-/// The session's listener while one lives. From time to time during long work on this thread it calls `refresh`, which
-/// is to pass on what the person does (`Explorer::input`) and show a frame.
+/// Listens to the session's long work during its lifetime. While the thread that made it is working, it calls `refresh`
+/// every 50 ms or so, which must pass input events to `Explorer::input` and show a frame.
 class LiveWork : public WorkListener {
  public:
   LiveWork(Explorer& explorer, std::function<void()> refresh);
@@ -33,7 +33,7 @@ class LiveWork : public WorkListener {
   Explorer& explorer_;
   std::function<void()> refresh_;
   std::thread::id thread_ = std::this_thread::get_id();
-  std::optional<Clock::time_point> last_;  ///< refresh, or the work's beginning
+  std::optional<Clock::time_point> last_;  ///< time of the last refresh, or of the work's beginning
   bool refreshing_ = false;
   std::atomic<bool> cancelled_ = false;
   std::mutex mutex_;

@@ -1,4 +1,4 @@
-// Stands in for window.cpp where GLFW was not there at build time.
+// Replaces window.cpp in a build without GLFW.
 
 #include "window/window.h"
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a person does in the explorer, as a script that does it again.
+// Records what a person does in the explorer as a script that repeats it.
 
 #include <string>
 #include <vector>
@@ -8,16 +8,16 @@
 
 namespace hpsdf::app {
 
-/// Takes down the lines that run while one lives: the explorer's `onCommand` is its own.
+/// Records the lines that the explorer runs during its lifetime. It uses the explorer's `onCommand`.
 class Recording {
  public:
-  /// `lines` come first: those that ran before.
+  /// `lines` have run before and begin the script.
   Recording(Explorer& explorer, std::vector<std::string> lines);
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  /// What is highlighted and read out depends on the pointer, which no other line sets.
+  /// Adds a line that moves the pointer to its present position, on which highlights and the readout depend.
   void notePointer();
 
   std::size_t lines() const { return lines_.size(); }
@@ -28,7 +28,7 @@ class Recording {
 
   Explorer& explorer_;
   std::vector<std::string> lines_;
-  std::array<double, 2> pointer_ = {-1, -1};  ///< as the lines leave it
+  std::array<double, 2> pointer_ = {-1, -1};  ///< position after the recorded lines, pixels
 };
 
 }  // namespace hpsdf::app

@@ -15,7 +15,7 @@
 #include "console/error_text.h"
 #include "console/interrupt.h"
 #include "explorer/explorer.h"
-#include "hpsdf/detail/output_file.h"
+#include "files/text_file.h"
 #include "language/script.h"
 #include "window/live_work.h"
 #include "window/recording.h"
@@ -25,11 +25,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kLookSeconds = 0.2;    // Ctrl-C wakes nobody
-constexpr double kQuietSeconds = 0.06;  // without an event, before a slow picture is drawn in full
-constexpr double kQuickSeconds = 0.04;
-constexpr int kLeastSize = 64, kGreatestSize = 8192;  // as `show` has it
+constexpr double kPollSeconds = 0.2;    // longest wait for an event, because Ctrl-C does not end a wait
+constexpr double kQuietSeconds = 0.06;  // time without an event after which a slow picture is drawn in full
+constexpr double kQuickSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
+constexpr int kLeastSize = 64, kGreatestSize = 8192;  // pixels, the range of `show size`
 
+/// The reason of GLFW's last error.
 std::string glfwProblem() {
   const char* description = nullptr;
   glfwGetError(&description);
@@ -38,7 +39,7 @@ std::string glfwProblem() {
   return text;
 }
 
-/// The desktop.
+/// Initializes GLFW during its lifetime.
 class Desktop {
  public:
   Desktop() {
@@ -53,7 +54,8 @@ class Desktop {
   Desktop& operator=(const Desktop&) = delete;
 };
 
-/// A window with an OpenGL context, which is current only while a picture is shown: the pictures are drawn in another.
+/// A window with an OpenGL context of its own. The context is current only while `show` runs, because the renderer
+/// draws in another one.
 class Screen {
  public:
   Screen(int width, int height, const std::string& title) {
@@ -71,7 +73,7 @@ class Screen {
 
   GLFWwindow* window() const { return window_; }
 
-  /// Pixels; nothing while it is not to be seen.
+  /// The window's size in pixels; nothing while it is minimized.
   std::optional<std::array<int, 2>> size() const {
     std::array<int, 2> size{};
     glfwGetFramebufferSize(window_, &size[0], &size[1]);
@@ -80,6 +82,7 @@ class Screen {
     return size;
   }
 
+  /// Copies a frame into the window, scaled to the window's size.
   void show(const render::Image& image) {
     glfwMakeContextCurrent(window_);
     if (texture_ == 0) {
@@ -115,42 +118,30 @@ void appendUtf8(std::string& text, unsigned code) {
   for (int i = more - 1; i >= 0; --i) add(0x80 | (code >> 6 * i & 0x3f));
 }
 
-/// By the letter on it, wherever the keyboard has that.
+/// The key by its function, or by the letter on it in the present keyboard layout.
 std::optional<Key> keyOf(int key, int scancode) {
-  switch (key) {
-    case GLFW_KEY_ENTER:
-    case GLFW_KEY_KP_ENTER:
-      return Key::enter;
-    case GLFW_KEY_ESCAPE:
-      return Key::escape;
-    case GLFW_KEY_BACKSPACE:
-      return Key::backspace;
-    case GLFW_KEY_DELETE:
-      return Key::remove;
-    case GLFW_KEY_LEFT:
-      return Key::left;
-    case GLFW_KEY_RIGHT:
-      return Key::right;
-    case GLFW_KEY_HOME:
-      return Key::home;
-    case GLFW_KEY_END:
-      return Key::end;
-    case GLFW_KEY_TAB:
-      return Key::tab;
-    default:
-      break;
-  }
+  struct Code {
+    int code;
+    Key key;
+  };
+  static constexpr Code kCodes[] = {{GLFW_KEY_ENTER, Key::enter},   {GLFW_KEY_KP_ENTER, Key::enter},
+                                    {GLFW_KEY_ESCAPE, Key::escape}, {GLFW_KEY_BACKSPACE, Key::backspace},
+                                    {GLFW_KEY_DELETE, Key::remove}, {GLFW_KEY_LEFT, Key::left},
+                                    {GLFW_KEY_RIGHT, Key::right},   {GLFW_KEY_HOME, Key::home},
+                                    {GLFW_KEY_END, Key::end},       {GLFW_KEY_TAB, Key::tab}};
+  if (const auto* known = std::ranges::find(kCodes, key, &Code::code); known != std::end(kCodes)) return known->key;
   const char* letter = glfwGetKeyName(key, scancode);
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// What went wrong, without the places of the script that a widget's line is.
-std::string withoutPlaces(std::string message) {
+/// An error message without the script position that the line of a widget is given.
+std::string withoutPosition(std::string message) {
   for (const std::string_view script : {"panel:1:", "rebuild:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
   return message;
 }
 
+/// The first of hpsdf-0001.png, hpsdf-0002.png, … that is no file yet.
 std::string freeShotName() {
   for (int number = 1;; ++number) {
     std::string name = fmt::format("hpsdf-{:04}.png", number);
@@ -173,7 +164,7 @@ class Window {
   void run() {
     draw(false);
     while (!ended()) {
-      glfwWaitEventsTimeout(explorer_.isStale() ? kQuietSeconds : kLookSeconds);
+      glfwWaitEventsTimeout(explorer_.isStale() ? kQuietSeconds : kPollSeconds);
       const bool happened = takeEvents();
       if (ended()) break;
       if (happened)
@@ -183,9 +174,9 @@ class Window {
     }
   }
 
-  /// The last frame, as the recording leads to it.
+  /// The last frame, which the recorded script ends with.
   render::Image finish() {
-    putAway();
+    endGestures();
     return frame(1);
   }
 
@@ -194,29 +185,29 @@ class Window {
  private:
   bool ended() const { return glfwWindowShouldClose(screen_.window()) || InterruptGuard::interrupted(); }
 
-  static Window& of(GLFWwindow* window) { return *static_cast<Window*>(glfwGetWindowUserPointer(window)); }
+  static Window& windowOf(GLFWwindow* window) { return *static_cast<Window*>(glfwGetWindowUserPointer(window)); }
 
   void listen() {
     GLFWwindow* window = screen_.window();
     glfwSetWindowUserPointer(window, this);
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { of(w).moved(x, y); });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { windowOf(w).moved(x, y); });
     glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) {
-      if (!entered && !of(w).holdsButton()) of(w).move({-1, -1});
+      if (!entered && !windowOf(w).holdsButton()) windowOf(w).move({-1, -1});
     });
     glfwSetMouseButtonCallback(
-        window, [](GLFWwindow* w, int button, int action, int mods) { of(w).clicked(button, action, mods); });
+        window, [](GLFWwindow* w, int button, int action, int mods) { windowOf(w).clicked(button, action, mods); });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turn) {
-      of(w).events_.push_back(Input{.kind = Input::Kind::wheel, .turn = turn});
+      windowOf(w).events_.push_back(Input{.kind = Input::Kind::wheel, .turn = turn});
     });
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
-      if (action != GLFW_RELEASE) of(w).pressed(key, scancode, mods);
+      if (action != GLFW_RELEASE) windowOf(w).pressed(key, scancode, mods);
     });
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code) {
       Input event{.kind = Input::Kind::type};
       appendUtf8(event.text, code);
-      of(w).events_.push_back(event);
+      windowOf(w).events_.push_back(event);
     });
-    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).damaged_ = true; });
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { windowOf(w).damaged_ = true; });
   }
 
   bool holdsButton() const {
@@ -225,7 +216,7 @@ class Window {
     return false;
   }
 
-  /// Where the desktop's units are not pixels, the picture's are.
+  /// Converts a pointer position from the desktop's units into pixels of the frame.
   void moved(double x, double y) {
     int width = 0, height = 0;
     glfwGetWindowSize(screen_.window(), &width, &height);
@@ -234,7 +225,7 @@ class Window {
     move({x * view.width / width, y * view.height / height});
   }
 
-  /// Moves that nobody has looked at yet are one.
+  /// Adds a movement of the pointer; it replaces one that has not been handled yet.
   void move(const std::array<double, 2>& at) {
     if (!events_.empty() && events_.back() && events_.back()->kind == Input::Kind::move) events_.pop_back();
     events_.push_back(Input{.kind = Input::Kind::move, .at = at});
@@ -260,7 +251,7 @@ class Window {
           Input{.kind = Input::Kind::key, .key = *known, .control = control, .shift = (mods & GLFW_MOD_SHIFT) != 0});
   }
 
-  /// Whether there were any.
+  /// Handles all waiting events. Returns false if there were none.
   bool takeEvents() {
     bool happened = std::exchange(damaged_, false);
     const auto size = screen_.size();
@@ -280,7 +271,7 @@ class Window {
     return happened;
   }
 
-  /// The clipboard is the desktop's.
+  /// Passes an event to the explorer, with the desktop's clipboard in both directions.
   void take(const Input& event) {
     if (event.kind == Input::Kind::key && event.control && event.key == Key::v) {
       const char* text = glfwGetClipboardString(screen_.window());
@@ -292,25 +283,25 @@ class Window {
       glfwSetClipboardString(screen_.window(), text.c_str());
   }
 
-  /// In the window, and where the panel is closed that shows it.
-  void tell(const std::string& mistake) {
-    explorer_.message = withoutPlaces(mistake);
+  /// Shows an error in the window and writes it to the terminal, since the readout panel may be closed.
+  void showError(const std::string& error) {
+    explorer_.message = withoutPosition(error);
     explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
   }
 
-  /// What goes wrong is told, and the window stays open.
+  /// Runs an action and shows its error, so that the window stays open.
   template <typename Action>
   void attempt(const Action& action) {
     try {
       action();
     } catch (const Cancelled&) {
-      tell("cancelled: all is as it was");
+      showError("cancelled: nothing has changed");
     } catch (const std::exception& error) {
-      tell(errorText(error));
+      showError(errorText(error));
     }
   }
 
-  /// A view that cannot be drawn gives way to the one before.
+  /// Draws a frame; undoes changes of the view until it can be drawn.
   render::Image frame(int shrink) {
     for (;;) {
       try {
@@ -318,12 +309,12 @@ class Window {
       } catch (const Error& error) {
         if (!explorer_.canUndo()) throw;
         explorer_.run("undo");
-        tell(error.what());
+        showError(error.what());
       }
     }
   }
 
-  /// `roughly`: a picture that takes too long is drawn with fewer pixels for now.
+  /// Draws and shows a frame. `roughly` draws a picture that takes too long with fewer pixels.
   void draw(bool roughly) {
     const bool slow = roughly && fullSeconds_ > kQuickSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kQuickSeconds))), 2, 4) : 1;
@@ -334,7 +325,7 @@ class Window {
     screen_.show(image);
   }
 
-  /// During long work.
+  /// Handles events and shows a frame during long work. Screenshots wait until the work has ended.
   void refresh() {
     glfwPollEvents();
     std::deque<std::optional<Input>> later;
@@ -351,15 +342,17 @@ class Window {
     screen_.show(explorer_.frame());
   }
 
-  void putAway() {
-    attempt([&] { explorer_.letGo(); });  // a button that is let go may start what is cancelled
-    frame(1);                             // the recording leads to a view that can be drawn
+  /// Ends gestures and records the pointer, so that the recording leads to the present frame.
+  void endGestures() {
+    attempt([&] { explorer_.releaseInput(); });  // a released slider may start work
+    frame(1);                                    // undoes a view that cannot be drawn, in the recording too
     explorer_.message.clear();
     recording_.notePointer();
   }
 
+  /// Writes the frame under the next free name.
   void shoot() {
-    putAway();
+    endGestures();
     attempt([&] {
       const std::string name = freeShotName();
       explorer_.run("shot output=" + name);
@@ -371,16 +364,10 @@ class Window {
   Screen screen_;
   Recording recording_;
   LiveWork work_;
-  std::deque<std::optional<Input>> events_;  ///< nothing: a shot is wanted
-  bool damaged_ = false;
-  double fullSeconds_ = 0;  ///< that the last picture took
+  std::deque<std::optional<Input>> events_;  ///< waiting events; an empty one asks for a screenshot
+  bool damaged_ = false;                     ///< the desktop has lost the window's content
+  double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };
-
-void writeFile(const std::string& file, const std::string& text) {
-  OutputFile out(file);
-  out.write(text);
-  out.commit();
-}
 
 }  // namespace
 
@@ -390,14 +377,14 @@ std::size_t showWindow(Session& session, const WindowOptions& options) {
   const InterruptGuard guard;
   Window window(session, options);
   const auto write = [&] {
-    if (options.record) writeFile(*options.record, window.recording().script());
+    if (options.record) writeTextFile(*options.record, window.recording().script());
   };
   try {
     window.run();
     const render::Image last = window.finish();
     if (options.shot) savePng(last, *options.shot);
   } catch (const Cancelled&) {
-    // closed while something was measured for the first frame: there is none
+    // The window was closed during a measurement for the first frame, which therefore does not exist.
   } catch (...) {
     write();
     throw;

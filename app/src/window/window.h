@@ -1,5 +1,5 @@
 #pragma once
-// The explorer in a window of the desktop.
+// The explorer in a desktop window.
 
 #include <optional>
 #include <string>
@@ -10,16 +10,16 @@
 namespace hpsdf::app {
 
 struct WindowOptions {
-  std::string opening;             ///< line of script that makes the field
-  int width = 1280, height = 720;  ///< of the window, in the desktop's units
+  std::string opening;             ///< line of script that loads or builds the field
+  int width = 1280, height = 720;  ///< size of the window, in the desktop's units
   std::string title;
   Backend backend;
-  std::optional<std::string> record;  ///< file for the script that does again what was done
-  std::optional<std::string> shot;    ///< file for the last frame
+  std::optional<std::string> record;  ///< file for the script that repeats the session
+  std::optional<std::string> shot;    ///< file for the last frame, *.png
 };
 
-/// Until the person closes it, or Ctrl-C. Gives the number of lines recorded. Throws `Error` where there is no display,
-/// before the field is made, and where this program was built without a window.
+/// Shows the window until the person closes it or presses Ctrl-C. Returns the number of recorded lines. Throws `Error`
+/// without a display, before the field is made, and in a program that was built without GLFW.
 std::size_t showWindow(Session& session, const WindowOptions& options);
 
 }  // namespace hpsdf::app

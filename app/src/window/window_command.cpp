@@ -1,12 +1,11 @@
 #include "window/window_command.h"
 
-// view: the explorer in a window.
-
 #include <fmt/format.h>
 
-#include "construction/building.h"
+#include "construction/surface.h"
 #include "explorer/view_state.h"
 #include "hpsdf/detail/output_file.h"
+#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "text/json.h"
@@ -38,13 +37,12 @@ void runView(Session& session, const Arguments& arguments) {
 }
 
 void checkView(const Arguments& arguments) {
-  if (arguments.has("shot") && lowerExtension(arguments.text("shot")) != ".png")
-    throw Error(fmt::format("{}: pictures are written as .png", arguments.text("shot")));
+  if (arguments.has("shot")) requirePng(arguments.text("shot"));
 }
 
 }  // namespace
 
-void addViewCommand(Registry& registry) {
+void addWindowCommand(Registry& registry) {
   Command command{
       .name = "view",
       .summary = "Look at a field in a window: turn it, cut it, colour it, build it anew.",
@@ -88,7 +86,7 @@ void addViewCommand(Registry& registry) {
       .action = runView,
       .check = checkView,
       .commandLineOnly = true};
-  for (Parameter& parameter : backendParameters()) command.parameters.push_back(std::move(parameter));
+  append(command.parameters, backendParameters());
   registry.add(std::move(command));
 }
 

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds view.
-void addViewCommand(Registry& registry);
+/// Adds `view`, which opens the explorer in a window.
+void addWindowCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -1,5 +1,5 @@
 #pragma once
-// Fields that jump less where their leaves meet, or not at all.
+// Two methods that reduce or remove the jumps of a field between its leaves.
 
 #include "hpsdf/build_options.h"
 #include "hpsdf/error.h"
@@ -7,32 +7,28 @@
 
 namespace hpsdf {
 
-/// A field after the post-process, and what it took.
+/// The result of weak continuity.
 struct WeaklyContinuous {
   Field field;
   int iterations = 0;
-  double residual = 0;  ///< reached, over the one at the start
-  double change = 0;    ///< √(‖f − f₀‖²/|Ω|): f₀ being a projection, error² = error₀² + change²
+  double residual = 0;  ///< residual at the end divided by that at the start
+  double change = 0;  ///< RMS change √(‖f − f₀‖²/|Ω|); as f₀ is a projection, error² = error₀² + change²
 };
 
-/// The field whose jumps and whose change are least together. It has the same leaves, degrees and bytes; the result
-/// does not depend on `threads` (0: all that the machine offers). Coefficients in float are taken to double and
-/// rounded again at the end. Metadata: λ is noted, ε grows by the change as nearness weighs it, the rounding by the
-/// second one. Bounds are left out: they would have to be found anew.
+/// Minimises the weighted sum of a field's jumps and of its change (Koschier et al. 2017). The result has the same
+/// leaves, degrees and bytes, and does not depend on `threads` (0: all that the machine offers). Float coefficients are
+/// converted to double and rounded again at the end. The metadata gets the weight λ, and its error estimates grow by
+/// the change and the second rounding. Bounds are dropped because they do not hold for the new polynomials.
 ///
-/// Throws `Error` for settings out of range, for a field that is weakly continuous already (f₀ is lost), and where
-/// `maxIterations` do not reach the tolerance; `Cancelled` when asked to stop.
+/// Throws `Error` for options out of range, for a field that is weakly continuous already, because its original
+/// polynomials f₀ are lost, and if `maxIterations` do not reach the tolerance; `Cancelled` when `progress` says so.
 WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& options = {}, int threads = 0,
                                   const Progress& progress = {});
 
-/// A query takes twice as long on average at most, and the gradient's error near faces stays that of the leaves
-/// (docs/decisions.md).
-constexpr double kDefaultBlend = 0.04;
-
-/// The same leaves, blended (`FieldData::blend`): value and gradient are continuous throughout the domain. `width` is
-/// that of the blended zones as a part of a leaf's edges, up to `kMaxBlend`: the wider, the gentler they lead from leaf
-/// to leaf, and the more queries ask several. 0 takes the blending off. Bounds are
-/// left out. Throws `Error` for a width out of range.
+/// Returns the same leaves with blending (`FieldData::blend`), which makes value and gradient continuous throughout the
+/// domain. `width` is the width of the blend zones in edges of a leaf, up to `kMaxBlend`: wider zones are smoother, and
+/// more queries evaluate several leaves. A width of 0 removes the blending. Bounds are dropped because they do not hold
+/// for the new field. Throws `Error` for a width out of range.
 Field blended(const Field& field, double width = kDefaultBlend);
 
 }  // namespace hpsdf

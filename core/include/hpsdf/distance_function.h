@@ -16,41 +16,43 @@
 
 namespace hpsdf {
 
-/// How inside is told from outside.
+/// The test that decides whether a point is inside.
 enum class InsideTest : std::uint8_t {
-  automatic,     ///< whichever of the next two suits the mesh
-  pseudonormal,  ///< by the nearest feature's normal: for closed meshes that do not meet themselves
-  winding,       ///< by the winding number: for any mesh, holes being closed
-  shell,         ///< a wall of some thickness around the surface, which may be open
-  outerHull,     ///< as winding, and faces with the inside on both sides are no surface
+  automatic,     ///< `pseudonormal` if it is certain to be right for the mesh, else `winding`
+  pseudonormal,  ///< pseudonormal of the nearest feature: for closed meshes without self-intersections
+  winding,       ///< winding number above ½: for any mesh; closes holes
+  shell,         ///< a wall of constant thickness around the surface, which may be open
+  outerHull,     ///< as `winding`, but without the triangles that have the inside on both sides
 };
 
-/// Which sign distances have, and why.
+/// The inside test of a distance, and the reason for it.
 struct InsideTestChoice {
-  InsideTest insideTest = InsideTest::pseudonormal;  ///< never automatic
-  std::string reason = {};            ///< half a sentence, such as "the mesh has no holes and does not meet itself"
-  std::optional<Vector3> place = {};  ///< where that is seen, if it is at a place
+  InsideTest insideTest = InsideTest::pseudonormal;  ///< never `automatic`
+  std::string reason = {};  ///< such as "the mesh has no holes and does not intersect itself"; empty if requested
+  std::optional<Vector3> position = {};  ///< a position on the mesh that shows the reason, if there is one
 };
 
-/// Where a signed distance comes from: kept with a field built from it.
+/// The origin of a signed distance; it is stored with a field that is built from it.
 struct Source {
-  std::string name = {};          ///< the mesh file's name without its path, or a shape's spec
-  std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 where there is none
+  std::string name = {};          ///< the mesh file's name without its path, or the shape's specification
+  std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 without a mesh
   std::uint64_t vertices = 0;
   std::uint64_t faces = 0;
-  Box box = {};                      ///< smallest box of the surface in world units; empty where it is not known
-  Normalization normalization = {};  ///< that took the mesh's own units to these
-  InsideTest insideTest = InsideTest::automatic;  ///< as it was chosen; automatic where it is not known
-  double thickness = 0;                           ///< of a shell, in world units
+  Box box = {};                                   ///< smallest box of the surface in world units; empty if unknown
+  Normalization normalization = {};               ///< transform from the mesh's own units to world units
+  InsideTest insideTest = InsideTest::automatic;  ///< the test that was chosen; `automatic` if unknown
+  double thickness = 0;                           ///< thickness of a shell, in world units
 };
 
-/// Any signed distance Φ, evaluated in batches; negative inside. Converts from anything callable, single
-/// (`double(const Vector3&)`) or batched (`void(std::span<const Vector3>, std::span<double>)`). It is called from
-/// several threads at once. Points of one batch lie close together, in a deterministic order.
+/// Any signed distance Φ, negative inside, evaluated in batches.
 ///
-/// A callable with a `Source source() const` hands that on, unless another source is given.
-/// Lvalues are referred to, not copied (an `ExactDistance` is large): they must outlive this object. Temporaries are
-/// kept.
+/// It converts from any callable for single points (`double(const Vector3&)`) or batches
+/// (`void(std::span<const Vector3>, std::span<double>)`). The callable must be thread-safe. The points of a batch lie
+/// close to each other, in a deterministic order. A member function `Source source() const` of the callable provides
+/// the source, unless the constructor gets another one.
+///
+/// Lvalues are referenced, not copied, because an `ExactDistance` is large: they must outlive this object. Temporaries
+/// are moved into it.
 class DistanceFunction {
  public:
   template <typename F>
@@ -76,7 +78,7 @@ class DistanceFunction {
 
   const Source& source() const { return source_; }
 
-  /// Bytes that the callable holds, where it tells by a `std::size_t bytes() const`; else 0.
+  /// Returns the bytes that the callable holds, if it has a member `std::size_t bytes() const`; else 0.
   std::size_t bytes() const { return bytes_; }
 
  private:
@@ -108,7 +110,7 @@ class DistanceFunction {
       return [get](std::span<const Vector3> points, std::span<double> out) { get()(points, out); };
     } else {
       static_assert(std::is_invocable_r_v<double, const Callable&, const Vector3&>,
-                    "a distance takes one point and returns a double, or takes spans of points and of results");
+                    "a distance maps one point to a double, or takes a span of points and a span of results");
       return [get](std::span<const Vector3> points, std::span<double> out) {
         for (std::size_t i = 0; i < points.size(); ++i) out[i] = get()(points[i]);
       };

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -7,10 +9,35 @@
 
 namespace hpsdf {
 
+/// What an `Error` is about, so that callers need not search its message.
+enum class ErrorKind : std::uint8_t {
+  general,  ///< none of the kinds below
+  option,   ///< an option, or a parameter of a shape, has a value that is not accepted
+  file,     ///< a file cannot be read, is damaged, or cannot be written
+  mesh,     ///< a mesh or a shape cannot be used
+  field,    ///< a field cannot be used for what is asked of it
+  limit,    ///< the work would exceed the memory, or a count that the data structures hold
+};
+
 /// Bad input: a file, a mesh, an option. The message is one line that says what is wrong, where, and what to do.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+
+  /// The message is "SUBJECT: PROBLEM", or "PROBLEM" where the subject is empty. The subject is the file, option or
+  /// shape that the error is about, as the caller wrote it: compare it to see whether a message names what it should.
+  Error(ErrorKind kind, const std::string& subject, const std::string& problem)
+      : std::runtime_error(subject.empty() ? problem : subject + ": " + problem), subject_(subject), kind_(kind) {}
+
+  ErrorKind kind() const { return kind_; }
+  const std::string& subject() const { return subject_; }
+
+  /// The message without its subject.
+  std::string problem() const { return what() + (subject_.empty() ? std::size_t{0} : subject_.size() + 2); }
+
+ private:
+  std::string subject_;
+  ErrorKind kind_ = ErrorKind::general;
 };
 
 /// Thrown by a long operation whose `Progress` asked it to stop. Nothing has been written.
@@ -21,22 +48,20 @@ class Cancelled : public std::runtime_error {
 
 /// The link between a long operation and its caller. Both callables may be empty.
 struct Progress {
-  /// Called now and then, by one thread at a time, with what is being done and the estimated fraction done, 0 to 1.
+  /// Receives what is being done and the estimated fraction done, 0 to 1. One thread calls it at a time.
   std::function<void(std::string_view task, double fraction)> report;
 
-  /// Asked often and from any thread; once it answers true the operation throws `Cancelled`.
+  /// The operation asks this often and from any thread; once it answers true the operation throws `Cancelled`.
   std::function<bool()> cancelled;
 
-  // What operations call.
-
-  /// Throws `Cancelled` where that is wanted.
-  void pause() const {
+  /// Operations call this between steps.
+  void throwIfCancelled() const {
     if (cancelled && cancelled()) throw Cancelled();
   }
 
-  /// The same, and reports.
-  void at(std::string_view task, double fraction) const {
-    pause();
+  /// Operations call this where they have progress to report; it throws `Cancelled` as `throwIfCancelled` does.
+  void update(std::string_view task, double fraction) const {
+    throwIfCancelled();
     if (report) report(task, fraction);
   }
 };

@@ -16,53 +16,52 @@
 
 namespace hpsdf {
 
-/// The part of a triangle that holds a closest point.
+/// The part of a triangle on which a closest point lies.
 enum class Feature : std::uint8_t { face, edge, vertex };
 
 struct ClosestPoint {
-  Vector3 point;          ///< on the surface
-  double signedDistance;  ///< negative inside
-  std::uint32_t triangle;
+  Vector3 point;           ///< on the surface
+  double signedDistance;   ///< negative inside
+  std::uint32_t triangle;  ///< index in the mesh
   Feature feature;
 };
 
 struct DistanceOptions {
   InsideTest insideTest = InsideTest::automatic;
-  double thickness = 0;  ///< of a shell, in world units: above 0 for one, else 0
-  int threads = 0;       ///< at most, 0: all. The result does not depend on them.
+  double thickness = 0;  ///< thickness of a shell in world units, above 0; 0 for other tests
+  int threads = 0;       ///< greatest number of threads, 0 for all; the result does not depend on it
 };
 
 /// Exact signed distance to a triangle mesh in double precision.
 ///
-/// Unsigned distance: nearest triangle by a hierarchy of oriented boxes, eight points of a batch at a time.
+/// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, eight points at
+/// a time. The sign comes from an inside test:
+/// - `InsideTest::pseudonormal`: the dot product of x − closest point with the angle-weighted pseudonormal of the
+///   closest feature (Bærentzen & Aanæs 2005). It is right for closed meshes without self-intersections.
+/// - `InsideTest::winding`: a point is inside if the generalised winding number is above ½ (Jacobson et al. 2013). The
+///   decision is that of the exact sum over all triangles. The surface on which the winding number is ½ closes holes
+///   and counts as surface; its distance is |w − ½|/|∇w|, to first order. A closed mesh that is oriented inward has its
+///   inside all around it.
+/// - `InsideTest::outerHull`: the sign, and outside also the distance, are those of `winding`. Inside, triangles with
+///   the inside on both sides, such as inner walls of overlapping bodies, do not count as surface. Along intersections
+///   this is decided for pieces of 1/512 of the mesh's size.
+/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. It suits sheets.
+/// - `InsideTest::automatic`: the first test if it is certain to be right, else the second.
 ///
-/// Sign, one of four, or `InsideTest::automatic`: the first where it is certain to be right, else the second.
-/// * `InsideTest::pseudonormal`: dot product of (x - closest point) with the angle-weighted pseudonormal of the closest
-///   feature (Bærentzen & Aanæs 2005): right for closed meshes that do not meet themselves.
-/// * `InsideTest::winding`: inside is where the generalised winding number is above ½ (Jacobson et al. 2013), decided
-/// as the
-///   sum over all triangles has it. Where the mesh has holes, the surface on which it is ½ closes them and counts as
-///   surface: |w − ½|/|∇w| away, to first order. In a closed mesh that looks inwards, outside and inside are exchanged.
-/// * `InsideTest::outerHull`: the same sign, and outside the same distance, but triangles that have the inside on both
-/// sides, such
-///   as walls within bodies that overlap, are no surface to what is inside. One that meets others counts, or is left
-///   out, up to a five-hundredth of the mesh's size beyond that.
-/// * `InsideTest::shell`: half of the thickness less than the unsigned distance. For sheets.
+/// The lowest index decides between equally near triangles: results depend neither on the order nor on the
+/// grouping of queries, and single and batched queries agree bit for bit.
 ///
-/// Equal distances are decided by the lower triangle index, so that a result depends on neither the order nor the
-/// grouping of queries: single and batched queries agree bit for bit.
-///
-/// A triangle without area (its height within the roundings of its coordinates) answers by its sides and adds nothing
-/// to the pseudonormals. A point that is not finite gets a value that is not finite; the sign is lost where the
-/// distance exceeds the mesh by so much (some 1e15) that all triangles are equally near.
+/// The distance to a degenerate triangle, whose height is within the rounding errors of its coordinates, is that to its
+/// edges; it does not contribute to pseudonormals. A point that is not finite gets a value that is not finite. Signs
+/// are lost at distances of about 10¹⁵ times the mesh's size, where all triangles are equally near.
 ///
 /// Const and thread-safe after construction. Keeps no reference to the mesh.
 class ExactDistance {
  public:
-  /// Throws `Error` for a mesh without triangles, with indices out of range or with non-finite coordinates, for a
-  /// thickness that does not go with the sign, and for a hull of a mesh that meets itself in more than
-  /// two million pairs of triangles, or would be cut into more than 250,000 pieces of a thirty-second of its size.
-  /// Throws `Cancelled`.
+  /// Throws `Error` for a mesh without triangles, with indices out of range or with coordinates that are not finite;
+  /// for a thickness that does not fit the inside test; and for an outer hull of a mesh with more than two million
+  /// pairs of intersecting triangles, or one that would consist of more than 250,000 pieces of 1/32 of its size. Throws
+  /// `Cancelled`.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {}, const Progress& progress = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
@@ -73,22 +72,23 @@ class ExactDistance {
   /// Batched: fastest when neighbours in `points` are neighbours in space. The spans have equal length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
-  /// The nearest point of the triangles, of a hull those that are left. Its signed distance is that of `operator()`:
-  /// beside a closed hole, and of a shell, not the distance to the point.
+  /// Returns the nearest point of the triangles, for an outer hull of its triangles, with the signed distance of
+  /// `operator()`. Beside a closed hole and for a shell, that is not the distance to the point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
   const InsideTestChoice& insideTestChoice() const;
 
-  /// The triangles that distances go to. Of a hull, what is left of a triangle that was cut has vertices of its own.
+  /// Returns the triangles to which distances are measured. For an outer hull, pieces of subdivided triangles have
+  /// vertices of their own.
   TriangleMesh surface() const;
 
-  /// `findCrossings` of the mesh.
-  Crossings crossings(std::size_t limit = kMostCrossings, const Progress& progress = {}) const;
+  /// Returns the crossings of the mesh by `findCrossings`.
+  Crossings crossings(std::size_t limit = kMaxCrossings, const Progress& progress = {}) const;
 
-  /// Name, fingerprint, counts, box and sign of the mesh.
+  /// Returns name, fingerprint, counts, box and inside test of the mesh.
   const Source& source() const;
 
-  /// Bytes held: triangles, hierarchy, pseudonormals, moments of the winding number.
+  /// Returns the bytes held: triangles, hierarchy, pseudonormals, moments of the winding number.
   std::size_t bytes() const;
 
  private:
@@ -96,8 +96,8 @@ class ExactDistance {
   std::unique_ptr<const Data> data_;
 };
 
-/// The instruction set that exact distances run on here, such as "AVX2". It changes the speed alone: the distances are
-/// the same to the bit.
+/// Returns the instruction set that exact distances use on this machine, such as "AVX2". It affects the speed only:
+/// distances are the same to the bit.
 std::string_view instructionSet();
 
 }  // namespace hpsdf

@@ -13,35 +13,35 @@
 
 namespace hpsdf {
 
-/// A hierarchical hp-adaptive signed distance field: immutable; every query is const, thread-safe and allocation-free.
+/// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every query is
+/// const, thread-safe and allocation-free.
 ///
-/// Inside the domain the value is the polynomial of the leaf that holds the point; leaves are half-open, so that every
-/// point has exactly one. The field jumps slightly from leaf to leaf, unless it is blended (`FieldData::blend`): then
-/// f = Σ wₙ fₙ / Σ wₙ over the leaves n that reach a point, fₙ being their polynomials continued beyond their boxes and
-/// wₙ products of smooth steps across their sides, so that value and gradient are continuous throughout the domain;
-/// away from the faces the leaf answers alone, as before, to the bit.
+/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so that every
+/// point lies in exactly one. The field jumps slightly from leaf to leaf unless it is blended (`FieldData::blend`).
+/// Then f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the point, where fₙ are their polynomials, continued
+/// beyond their boxes, and wₙ are products of smooth steps across their faces. Value and gradient are continuous
+/// throughout the domain, and away from the faces the field equals that without blending to the bit.
 ///
-/// Outside the domain it is f(q) + |x - q| with q the closest point of the domain, with the matching gradient: the
-/// value is continuous across the domain's boundary. Jumps between two leaves there go on outwards; a blended field has
-/// none outside either, and its gradient jumps at the boundary alone. It is an upper bound of a 1-Lipschitz field, so
-/// that outside a value is no safe length for a step of sphere tracing. Of infinite points the value is infinite and
-/// the gradient NaN.
+/// Outside the domain the value is f(q) + |x − q|, where q is the domain's closest point, and the gradient matches. The
+/// value is continuous across the domain's boundary; jumps between leaves at the boundary continue outwards. This value
+/// is an upper bound of a 1-Lipschitz field, and hence no safe step for sphere tracing. At infinite points the value is
+/// infinite and the gradient NaN.
 class Field {
  public:
-  /// Takes finished arrays; throws `Error` when they do not make a field (see `FieldData`).
+  /// Takes finished arrays. Throws `Error` if they violate the layout that `FieldData` describes.
   explicit Field(FieldData data);
 
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
-  /// Batched; the spans have equal length. The same results as one at a time.
+  /// Evaluates many points, several times faster than one by one, with the same results. The spans have equal length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
 
-  /// The leaf that holds x, or, for x outside, the domain's closest point.
+  /// Returns the leaf that holds x or, for x outside the domain, the domain's closest point.
   Cell cellAt(const Vector3& x) const;
 
-  /// Calls `visit` for every leaf, in the order of the octree (base cells first to last, children 0 to 7).
+  /// Calls `visit` for every leaf in the order of the octree (base cells first to last, children 0 to 7).
   void forEachCell(const std::function<void(const Cell&)>& visit) const;
 
   const Box& domain() const { return data_.domain; }
@@ -49,13 +49,13 @@ class Field {
   const FieldMetadata& metadata() const { return data_.metadata; }
   bool singlePrecision() const { return data_.coefficients.index() == 1; }
 
-  /// The arrays themselves: for files, uploads and tests.
+  /// Returns the arrays themselves, for files, uploads and tests.
   const FieldData& data() const { return data_; }
 
-  /// Where queries start: for uploads and tests too.
+  /// Returns the grid in which queries start, for uploads and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }
 
-  /// Bytes that queries need: nodes, coefficients, lookup grid, and bounds where they are kept.
+  /// Returns the bytes of nodes, coefficients, lookup grid and, if the field has them, bounds.
   std::size_t bytes() const;
 
  private:
@@ -63,7 +63,7 @@ class Field {
   LookupGrid lookupGrid_;
 };
 
-/// Figures over a whole field.
+/// Sizes of a field and the distribution of its leaves.
 struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;

@@ -6,13 +6,13 @@
 
 namespace hpsdf {
 
-/// Writes a `.hpsdf` file (docs/file-format.md): versioned, little-endian, checksummed; the same field gives the same
-/// bytes. Written under a temporary name beside `file` and renamed, so that an interrupted save leaves the old file.
-/// Throws `Error` naming the file and the reason.
+/// Writes a `.hpsdf` file (docs/file-format.md), which is versioned, little-endian and checksummed. Equal fields give
+/// equal bytes. The file is written under a temporary name in the same folder and renamed, so that an interrupted save
+/// leaves an older file intact. Throws `Error` that names the file and the reason.
 void save(const Field& field, const std::filesystem::path& file);
 
-/// Reads what `save` wrote. Every size is checked against the file's length before memory is taken.
-/// Throws `Error` for a file that is missing, foreign, of another version, truncated or altered.
+/// Reads a file that `save` wrote. Sizes are checked against the file's length before memory is allocated. Throws
+/// `Error` if the file is missing, truncated, altered, of an unknown version or no field at all.
 Field load(const std::filesystem::path& file);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// Where the field is not continuous: its leaves meet at faces without matching there.
+// Jumps of a field: the differences between neighbouring leaves on the faces that they share.
 
 #include <array>
 #include <cstddef>
@@ -13,39 +13,40 @@
 
 namespace hpsdf {
 
-/// How far the limits from two leaves are apart on their face: those of their polynomials or, of a blended field, of
-/// what queries answer just within either.
+/// Size of a jump on one interface. The jump is the difference of the limits from both leaves: the limits of their
+/// polynomials or, in a blended field, of the blended field.
 struct Jump {
-  double rms = 0;  ///< √(∫ jump² dA / area), by a quadrature that is exact for polynomials
-  double max = 0;  ///< greatest at the quadrature's points, along the face's edges and at its corners
+  double rms = 0;  ///< √(∫ jump² dA / area) by a quadrature that is exact for polynomials
+  double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
 };
 
-/// Where two leaves meet: a whole face of the smaller one; if they are of one size, of both.
+/// The face of the smaller of two neighbouring leaves, which the larger one shares.
 struct Interface {
-  std::array<std::uint32_t, 2> cells;  ///< `Cell::id` on the side of smaller and of greater coordinates
+  std::array<std::uint32_t, 2> cells;  ///< `Cell::id` on the lower and on the upper side
   std::array<std::uint8_t, 2> degrees;
   std::array<std::uint8_t, 2> depths;
-  int axis;        ///< 0, 1, 2: across the face
-  Jump value;      ///< of f, in the field's units
-  Jump gradient;   ///< length of the difference of the gradients
-  double area;     ///< in the field's units²
-  Vector3 center;  ///< of the face
-  Vector3 worst;   ///< where f jumps most
+  int axis;        ///< axis that is normal to the face: 0, 1 or 2
+  Jump value;      ///< jump of f in units of length
+  Jump gradient;   ///< length of the jump of ∇f
+  double area;     ///< area of the face in units²
+  Vector3 center;  ///< centre of the face
+  Vector3 worst;   ///< point of the face where f jumps most
 
+  /// Tells whether the leaves differ in size, so that the smaller one's corners hang in the larger one's face.
   bool hanging() const { return depths[0] != depths[1]; }
 };
 
 /// All of a field's interfaces.
 struct Jumps {
-  std::vector<Interface> interfaces;  ///< in the order of the smaller (or lower) cells within the octree
-  std::size_t hanging = 0;            ///< between cells of different size
-  double area = 0;                    ///< of all faces
-  Jump value;                         ///< over all faces: RMS by area, and the greatest
-  Jump gradient;
+  std::vector<Interface> interfaces;  ///< in the octree's order of the smaller or, among equals, the lower leaf
+  std::size_t hanging = 0;            ///< number of interfaces between leaves of different size
+  double area = 0;                    ///< total area in units²
+  Jump value;                         ///< jumps of f over all interfaces
+  Jump gradient;                      ///< jumps of ∇f over all interfaces
 };
 
-/// Measures every interface. The result does not depend on `threads` (0: all that the machine offers).
-/// Throws `Cancelled` when progress says so.
+/// Measures the jumps of all interfaces. The result does not depend on `threads` (0: all that the machine offers).
+/// Throws `Cancelled` when `progress` says so.
 Jumps findJumps(const Field& field, int threads = 0, const Progress& progress = {});
 
 enum class JumpKind : std::uint8_t { value, gradient };
@@ -54,19 +55,21 @@ inline const Jump& jumpOf(const Interface& interface, JumpKind kind) {
   return kind == JumpKind::value ? interface.value : interface.gradient;
 }
 
-/// Indices of the `count` interfaces with the greatest `max`, worst first; of equal ones the earlier.
+/// Returns the indices of the `count` interfaces with the greatest `max`, greatest first; ties keep their order.
 std::vector<std::size_t> worstInterfaces(const Jumps& jumps, JumpKind kind, std::size_t count);
 
-/// By `Cell::id`: the greatest `max` among the leaf's interfaces; 0 for a leaf without and for an internal node.
+/// Returns, by `Cell::id`, the greatest `max` of a leaf's interfaces; 0 for internal nodes and leaves without
+/// interface.
 std::vector<double> worstJumpOfCells(const Field& field, const Jumps& jumps, JumpKind kind);
 
-/// A share of a histogram.
+/// One bin of a histogram of interfaces.
 struct JumpBin {
   std::size_t interfaces = 0;
-  double area = 0;
+  double area = 0;  ///< in units²
 };
 
-/// By the power of ten: bin n holds interfaces whose `max` lies in [10^n, 10^(n+1)). Those without a jump are left out.
+/// Counts interfaces by the order of magnitude of their jumps: bin n holds those with `max` in [10^n, 10^(n+1)).
+/// Interfaces without a jump are left out.
 std::map<int, JumpBin> jumpHistogram(const Jumps& jumps, JumpKind kind);
 
 }  // namespace hpsdf

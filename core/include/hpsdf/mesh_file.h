@@ -8,44 +8,49 @@
 
 namespace hpsdf {
 
-/// Welds equal positions, drops degenerate and duplicate faces and unused vertices (a face on one line that keeps its
-/// neighbours connected is mended by an edge flip instead: dropping it would open the mesh), and turns the *whole* mesh
-/// when its signed volume is negative (never part by part: a cavity's faces look inward on purpose). Of a wall that two
-/// bodies share both faces stay, one each way, so that each body is closed; of a surface given with both its sides one
-/// does. Throws `Error` for indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or
-/// when no face with an area is left.
+/// Prepares a mesh for distances:
+/// - welds vertices of equal position,
+/// - drops degenerate and duplicate triangles and unused vertices. A degenerate triangle that connects its neighbours
+///   is replaced by an edge flip, because dropping it would open the mesh. Of a shared wall both triangles stay, so
+///   that each body is closed; of a surface that is modelled with both sides one stays,
+/// - reverses the whole mesh when its signed volume is negative, and never single components, because the triangles of
+///   a cavity face inward on purpose.
+///
+/// Throws `Error` (mesh) for indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or
+/// when no triangle with an area is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
-/// Reads OBJ, PLY, STL, OFF, 3DS or glTF (through assimp), all meshes of the scene joined under their node transforms,
-/// n-gons triangulated, then `cleaned`.
+/// Reads an OBJ, PLY, STL, OFF, 3DS or glTF file through assimp, joins all meshes of the scene under their node
+/// transforms, triangulates polygons, and returns the mesh `cleaned`.
 ///
-/// Two limits come from assimp: positions pass through `float` (relative 6e-8, which is 0.06 at coordinates near 1e6;
-/// see `coordinateSpacing`), and indices out of range in OFF and PLY files are mended (in glTF files, their faces left
-/// out) silently, so that they cannot be reported.
+/// assimp sets two limits. Positions pass through `float`: a relative error of 6e-8, which is 0.06 at coordinates near
+/// 1e6 (see `coordinateSpacing`). Indices out of range are corrected without notice in OFF and PLY files, and their
+/// faces dropped in glTF files, so that they cannot be reported.
 ///
-/// It reads within the caller's process, without a limit of time or memory, and what brings assimp down brings that
-/// process down: a deeply nested glTF file its stack, others its asserts, which are on in Debian. Some files keep it,
-/// or the cutting of a face with very many corners, above all one that crosses itself, busy for minutes. For files from
-/// strangers do as the program `hpsdf` does, and read in a process of its own.
+/// The file is read in the caller's process without a limit of time or memory. A damaged file can crash assimp: a
+/// deeply nested glTF file overflows its stack, others trigger its asserts, which are on in Debian. Other files keep
+/// assimp, or the triangulation of a polygon with very many corners, busy for minutes. Read untrusted files in a
+/// subprocess, as the program `hpsdf` does.
 ///
-/// Throws `Error` naming the file: missing, a lookup grid, unreadable, empty, not a mesh, beyond float's range or too
-/// small for it, or without area.
+/// Throws `Error` (file or mesh, the subject is `file`) for a file that is missing, a folder, unreadable, empty or not
+/// a mesh, and for a mesh beyond the range of float, too small for it, or without area.
 ImportedMesh importMesh(const std::filesystem::path& file);
 
-/// How far apart the reader keeps coordinates, in mesh units: the spacing of `float` at the largest one of `mesh`,
-/// which was read from `file`; numbers with exponents may be off by twice as much. 0 where that holds floats itself, so
-/// that reading loses nothing (3DS, glTF, binary STL and most binary PLY), and for what is no mesh file.
+/// Distance between adjacent coordinates that the reader can tell apart, in mesh units: the spacing of `float` at the
+/// largest coordinate of `mesh`, which was read from `file`. Numbers with exponents may be off by twice as much.
+/// Returns 0 for a file that itself holds floats (3DS, glTF, binary STL and most binary PLY), so that reading loses
+/// nothing, and for a file that is not a mesh.
 double coordinateSpacing(const std::filesystem::path& file, const TriangleMesh& mesh);
 
-/// The mesh of `importMesh`, or, for a name that starts with `builtin:`, the shape of `shapes::mesh`.
+/// The mesh of `importMesh`, or of `shapes::mesh` for a name that starts with `builtin:`.
 TriangleMesh loadMesh(const std::string& fileOrShape);
 
-/// Writes a mesh as OBJ or binary PLY, by the file's extension, coordinates in double to the last digit. (PLY as text
-/// where its data would begin with the byte of a line feed, which `importMesh` could not read.) The file appears whole
-/// or not at all. Throws `Error` for another extension, and as `OutputFile` does.
+/// Writes a mesh as OBJ or binary PLY, by the file's extension, with coordinates in full double precision. A PLY file
+/// is written as text where its binary data would begin with a line feed, which `importMesh` could not read. The file
+/// appears whole or not at all. Throws `Error` (file) for another extension, and as `OutputFile` does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
 
-/// Throws what `saveMesh` would for the file's name, as far as it can be told beforehand: before long work.
+/// Throws the `Error` of `saveMesh` for the file's name, as far as it is known beforehand. Call it before long work.
 void checkMeshWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

@@ -7,30 +7,36 @@
 namespace hpsdf {
 
 struct RepairedMesh {
-  ImportedMesh imported;          ///< what cleaning did is in the report, too
-  std::size_t turnedFaces = 0;    ///< looked another way than most of their patch
-  std::size_t turnedPatches = 0;  ///< turned as a whole, with their bodies: they looked inwards
-  std::size_t leftEdges = 0;      ///< of two faces that still run the same way: the surface has one side only
+  ImportedMesh imported;            ///< the repaired mesh; its report keeps the counts of cleaning
+  std::size_t reversedFaces = 0;    ///< faces that disagreed with the greater part of their patch
+  std::size_t reversedPatches = 0;  ///< patches of bodies that were oriented inward, reversed as a whole
 };
 
-/// Turns triangles so that inside and outside are told consistently. Positions stay, no triangle is added or left out.
+/// Orients a mesh consistently and outward by reversing triangles. Vertices and triangles are neither added nor
+/// removed.
 ///
-/// Patches are what hangs together by edges of two triangles. Within each, all look the way of the greater part of its
-/// area; one that has one side only, as a Möbius strip, stays as it is.
+/// 1. Patches. A patch is a set of triangles that are connected by edges of exactly two triangles. All triangles of a
+///    patch get the orientation of the greater part of its area. A one-sided patch, such as a Möbius strip, stays
+///    unchanged and keeps its inconsistent edges.
+/// 2. Bodies. A body is a closed patch; or several patches that are closed only in union, with solid material between
+///    them; or any other patch, which is open.
+/// 3. Signed volumes. A body with a negative signed volume is oriented inward. An open body takes part only if its
+///    volume is large enough to be reliable, by the rule of `cleaned`; otherwise it stays unchanged. If there is only
+///    one body, or none is oriented inward, the volumes decide and the algorithm ends here.
+/// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is probed
+///    close to both sides of each body, at points spread over its area. Two patterns decide if at least three quarters
+///    of the points show them:
+///    - At most 0 in front and at least 1 behind: the body is oriented correctly, such as a cavity. It stays.
+///    - At most −1 in front and at least 0 behind: the body would be correct if the whole mesh were reversed, such as
+///      both surfaces of a hollow body that is inside out. It is reversed, unless it is open with a positive volume.
+///    A point with equal winding numbers on both sides does not count: another body cancels this one there. A point
+///    that fits both patterns, because a body of opposite orientation touches there, counts for the pattern that agrees
+///    with the body's volume.
+/// 5. Nesting. If step 4 does not decide, a body that is oriented inward is reversed, unless three quarters of its
+///    points lie within an odd number of other bodies, so that it is a cavity.
 ///
-/// Bodies are closed patches, patches that only together are closed (at every edge as many sides run one way as the
-/// other, with a solid between them), and each other patch.
-///
-/// If any body's volume says that it looks inwards, what winding numbers say of three quarters of its area decides:
-/// - it stays with the outside before it and the inside behind it, such as a cavity;
-/// - it is turned where that is so of the mesh turned as a whole, such as both sides of a hollow body that looks
-///   inwards, unless it is open and its volume says otherwise; where both are so, because it touches another that looks
-///   the other way, it is by its volume;
-/// - of others one that looks inwards is turned, unless it lies within an odd number of other bodies.
-///
-/// Only bodies whose volume is plain are turned, or have something within; open ones as the whole mesh in `cleaned`.
-///
-/// Throws `Error` for a mesh without triangles or of more than 2²⁸, of vertices that do not exist or are not finite.
+/// Throws `Error` for a mesh without triangles or with more than 2²⁸, and for vertices that do not exist or are not
+/// finite.
 RepairedMesh repaired(ImportedMesh imported);
 
 }  // namespace hpsdf

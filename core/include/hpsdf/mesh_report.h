@@ -1,5 +1,5 @@
 #pragma once
-// What is known of a mesh: counts, measures, and where it is no surface of a solid.
+// The state of a mesh: counts, measures, and the defects by which it is not the surface of a solid.
 
 #include <array>
 #include <cstddef>
@@ -12,90 +12,93 @@
 
 namespace hpsdf {
 
-/// What is known about a mesh after import. Counts of edges are of undirected edges.
+/// Counts and measures of a mesh after import. Edges are counted without direction.
 struct MeshReport {
-  std::size_t vertices = 0;  ///< after welding, used by at least one triangle
-  std::size_t faces = 0;     ///< triangles kept
-  std::size_t parts = 0;     ///< connected components (over shared edges)
+  std::size_t vertices = 0;    ///< vertices after welding that at least one triangle uses
+  std::size_t faces = 0;       ///< triangles kept
+  std::size_t components = 0;  ///< sets of triangles that are connected by shared edges
 
-  std::size_t boundaryEdges = 0;      ///< used by one triangle
-  std::size_t nonManifoldEdges = 0;   ///< used by more than two triangles
-  std::size_t inconsistentEdges = 0;  ///< used by two triangles that run the same way along it
+  std::size_t boundaryEdges = 0;      ///< edges of one triangle
+  std::size_t nonManifoldEdges = 0;   ///< edges of more than two triangles
+  std::size_t inconsistentEdges = 0;  ///< edges that two triangles run along in the same direction
 
-  /// Run along by more triangles one way than the other: the rims of holes, and where faces look the wrong way. Without
-  /// any, winding numbers are whole, and inside and outside are told apart though edges may be non-manifold.
+  /// Edges that more triangles run along in one direction than in the other: the boundary of holes, and edges where the
+  /// orientation is wrong. Without any, winding numbers are whole numbers, so that inside and outside are defined
+  /// even where edges are non-manifold.
   std::size_t unbalancedEdges = 0;
 
-  std::size_t weldedVertices = 0;        ///< removed because another has the same position
-  std::size_t unreferencedVertices = 0;  ///< removed because no triangle uses them
-  std::size_t degenerateFaces = 0;       ///< dropped: two equal corners or no area
-  std::size_t flippedFaces = 0;          ///< had no area but hold a neighbour's edge: mended by flipping that edge
-  std::size_t duplicateFaces = 0;        ///< dropped: the same three corners as another
-  Vector3 degeneratePosition = Vector3::Zero();  ///< the middle of the first that was dropped, if there is one
-  Vector3 duplicatePosition = Vector3::Zero();   ///< likewise
-  bool turned = false;                           ///< the whole mesh was turned because its signed volume was negative
+  std::size_t weldedVertices = 0;                ///< vertices removed because another has the same position
+  std::size_t unreferencedVertices = 0;          ///< vertices removed because no triangle uses them
+  std::size_t degenerateFaces = 0;               ///< triangles dropped for two equal corners or no area
+  std::size_t flippedFaces = 0;                  ///< degenerate triangles replaced by an edge flip
+  std::size_t duplicateFaces = 0;                ///< triangles dropped for having the same three corners as another
+  Vector3 degeneratePosition = Vector3::Zero();  ///< centroid of the first degenerate triangle dropped, if any
+  Vector3 duplicatePosition = Vector3::Zero();   ///< centroid of the first duplicate triangle dropped, if any
+  bool reversed = false;                         ///< the whole mesh was reversed: its signed volume was negative
 
-  double volume = 0;  ///< signed volume after turning; meaningful for a closed mesh
-  double area = 0;
-  Box box;
+  double volume = 0;  ///< signed volume after reversal, in cubed mesh units; meaningful for a closed mesh
+  double area = 0;    ///< surface area, in squared mesh units
+  Box box;            ///< bounding box, in mesh units
 
-  /// Every edge is used by exactly two triangles that run opposite ways: inside and outside are defined.
+  /// Every edge belongs to exactly two triangles that run along it in opposite directions.
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Topology and measures of a mesh as it stands (the counts of what cleaning does stay 0).
+/// Topology and measures of a mesh as it is; the counts of what cleaning removes stay 0. Throws `Error` (mesh) for
+/// indices out of range.
 MeshReport inspect(const TriangleMesh& mesh);
 
+/// A mesh after import, and the report on it.
 struct ImportedMesh {
   TriangleMesh mesh;
   MeshReport report;
 };
 
-/// Two triangles that meet elsewhere than in the corners and edges they share: they pass through each other, touch, or
-/// lie on each other.
+/// Two triangles that intersect beyond the corners and edges they share: they pass through each other, touch, or
+/// overlap in one plane.
 struct Crossing {
-  std::array<std::uint32_t, 2> triangles;  ///< the lower index first
-  Vector3 place;                           ///< in both triangles' boxes: the middle of what they share
+  std::array<std::uint32_t, 2> triangles;  ///< indices in the mesh, the lower one first
+  Vector3 position;                        ///< the middle of the intersection of the triangles' boxes
 };
 
 struct Crossings {
-  std::vector<Crossing> found;  ///< by their triangles
-  bool all = true;              ///< none was left out
+  std::vector<Crossing> found;  ///< sorted by triangle indices
+  bool complete = true;         ///< false when the search stopped at its limit
 };
 
-constexpr std::size_t kMostCrossings = 1'000'000;  ///< unless asked for others
+constexpr std::size_t kMaxCrossings = 1'000'000;  ///< default limit of a search for crossings
 
 enum class DefectKind : std::uint8_t {
-  boundaryEdge,      ///< used by one triangle: the rim of a hole, or of a sheet
-  nonManifoldEdge,   ///< used by more than two
-  inconsistentEdge,  ///< used by two that run the same way along it: one of them looks the wrong way
-  pinchedVertex,     ///< fans of triangles meet in it that share no edge there
-  crossing,          ///< two triangles meet beyond what they share
+  boundaryEdge,      ///< an edge of one triangle: the boundary of a hole or of a sheet
+  nonManifoldEdge,   ///< an edge of more than two triangles
+  inconsistentEdge,  ///< an edge of two triangles that run along it in the same direction: one is reversed
+  pinchedVertex,     ///< a vertex at which fans of triangles meet that share no edge there
+  crossing,          ///< two triangles that intersect beyond the corners and edges they share
 };
 constexpr std::size_t kDefectKinds = 5;
 
 struct Defect {
   DefectKind kind;
-  std::array<std::uint32_t, 2> faces;  ///< two of those that are there; the same one twice at a boundary
-  std::array<Vector3, 2> ends;         ///< of the edge; the same place twice of a vertex or a crossing
+  std::array<std::uint32_t, 2> faces;  ///< two of the triangles involved; equal at a boundary edge
+  std::array<Vector3, 2> ends;         ///< end points of the edge; equal for a vertex or a crossing
 };
 
 struct MeshDefects {
-  std::vector<Defect> found;  ///< by kind; edges and vertices by their indices, crossings by their triangles
+  std::vector<Defect> found;  ///< sorted by kind; edges and vertices by vertex index, crossings by triangle index
   std::array<std::size_t, kDefectKinds> counts = {};
-  bool allCrossings = true;
-  /// Of triangles that hang together over edges: the surface folds into itself. But for walls that bodies share, of two
-  /// triangles over the same corners.
-  std::size_t crossingsWithinParts = 0;
-  /// Faces can be turned until no edge is inconsistent.
+  bool allCrossings = true;  ///< false when the search for crossings stopped at its limit
+  /// Crossings of two triangles of one component, at which the surface folds into itself. Shared walls are not counted.
+  std::size_t crossingsWithinComponents = 0;
+  /// Triangles can be reversed such that no edge of two triangles is inconsistent; false for a Möbius strip.
   bool orientable = true;
 
   std::size_t count(DefectKind kind) const { return counts[static_cast<std::size_t>(kind)]; }
-  std::span<const Defect> of(DefectKind kind) const;
+  std::span<const Defect> ofKind(DefectKind kind) const;
 };
 
-/// Everything about a mesh that a solid's surface would not have, with its places. Corners are the same where their
-/// indices are: weld them first. `crossings`: of this mesh. Throws `Error` for indices out of range.
+/// Finds every defect of a mesh by which it is not the surface of a solid, with its position. Triangles share a corner
+/// where its index is the same, so that the mesh must be welded. `crossings` are those of this mesh. Throws `Error`
+/// (mesh) for indices out of range.
 MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings);
 
 }  // namespace hpsdf

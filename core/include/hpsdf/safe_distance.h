@@ -1,12 +1,12 @@
 #pragma once
-// Distances that are safe to go: what is certain about Φ between the samples that a field was made from.
+// Proven bounds of a field's error, and distances from the surface that follow from them.
 //
-// A signed distance never changes faster than the distance between two points: |Φ(x) − Φ(y)| ≤ |x − y|. Every known
-// value bounds it everywhere, from above and from below, and best along the line to the surface. From such bounds and
-// those of the cell's polynomial follow bounds of the field's error over whole cells (`CellBound`).
+// A signed distance is 1-Lipschitz, |Φ(x) − Φ(y)| ≤ |x − y|, so that every exact value bounds Φ everywhere from above
+// and from below. These bounds and those of a leaf's polynomial give a bound of |f − Φ| over the whole leaf
+// (`CellBound`).
 //
-// They hold where Φ is the signed distance of a closed surface without self-intersections. Where the sign is wrong or
-// has no meaning, as beside the holes of an open mesh, Φ jumps, and no bound holds there.
+// The bounds hold if Φ is the signed distance of a closed surface without self-intersections. Near the holes of an open
+// mesh and wherever else the sign is wrong, Φ jumps and no bound holds.
 
 #include <cstdint>
 #include <optional>
@@ -17,33 +17,33 @@
 
 namespace hpsdf {
 
-/// The same field with a bound for each leaf, which takes 24 values of Φ a leaf. Their number is added to
-/// `exactEvaluations`. The result does not depend on `threads` (0: all that the machine offers). Throws `Error` for a
-/// Φ that is not finite, `Cancelled` when asked to stop.
+/// Returns the field with a bound for each leaf. This evaluates Φ 24 times a leaf, which `exactEvaluations` counts. The
+/// result does not depend on `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite, `Cancelled`
+/// when `progress` says so.
 Field withBounds(const Field& field, const DistanceFunction& distance, int threads = 0, const Progress& progress = {});
 
-/// The bound of the leaf that holds x, or, for x outside, the domain's closest point; nothing where the field keeps no
-/// bounds.
+/// Returns the bound of the leaf that holds x or, for x outside the domain, the domain's closest point; nothing if the
+/// field has no bounds.
 std::optional<CellBound> boundAt(const Field& field, const Vector3& x);
 
-/// Nowhere within this distance of x lies the surface: |f| less the bound of the error, 0 where that is not above 0, as
-/// beside the surface. For x outside the domain, that of the domain's closest point less the way to it. Throws `Error`
-/// for a field without bounds.
+/// Returns a distance from x within which the surface certainly does not lie: |f| less the bound of the error, and at
+/// least 0. For x outside the domain, it is that of the domain's closest point less the distance to this point. Throws
+/// `Error` if the field has no bounds.
 double safeDistance(const Field& field, const Vector3& x);
 
-/// How far a ray came.
+/// The result of tracing a ray by safe distances.
 struct SafeTrace {
-  double length = 0;  ///< in the field's units: before it there is no surface
-  /// The surface may be within `slack` of the ray's point there, or within what rounding leaves open, which far from
-  /// the domain may be more; else the ray left the domain.
+  double length = 0;  ///< length of the ray, in the field's units, that certainly does not touch the surface
+  /// Whether the surface may lie within `slack` of the ray at this length. Rounding may add to the slack far from the
+  /// domain. If false, the ray left the domain.
   bool mayTouch = false;
   int steps = 0;
 };
 
-/// Goes along a ray by safe distances until one is shorter than `slack`: it never passes through the surface, though it
-/// may stop where a more exact field would let it pass. From an origin outside of the domain it starts at the wall.
-/// `direction` is taken to unit length. Throws `Error` for a field without bounds, a direction that is none, and a
-/// slack that is not above 0.
+/// Follows a ray by safe distances until one is shorter than `slack`, in the field's units. The ray never passes
+/// through the surface, though it may stop where a more exact field would let it pass. From an origin outside the
+/// domain the march starts where the ray enters the domain. `direction` need not have unit length. Throws `Error` if
+/// the field has no bounds, for a direction of length 0 and for a slack that is not above 0.
 SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& direction, double slack);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// Shapes that need no file: as triangle meshes, and where the distance has a closed form also as that.
+// Built-in shapes: as triangle meshes, and some also as signed distances in closed form.
 
 #include <span>
 #include <string>
@@ -11,13 +11,13 @@
 
 namespace hpsdf::shapes {
 
-/// A number that a shape takes. All lengths are in mesh units.
+/// A numeric parameter of a shape. All lengths are in mesh units.
 struct Parameter {
   std::string name;
   double defaultValue;
   double minimum;
   double maximum;
-  bool whole;  ///< counts: a whole number is expected
+  bool whole;  ///< the parameter is a count and takes whole numbers only
   std::string help;
 };
 
@@ -25,26 +25,28 @@ struct Shape {
   std::string name;
   std::string help;
   std::vector<Parameter> parameters;
-  bool analytic;  ///< `distance` knows this shape
+  bool analytic;  ///< `analytic` accepts this shape
 };
 
-/// All shapes, in the order in which to list them: sphere, torus, box, gear, helix-bowl, marble-run,
-/// structured-bowl.
+/// All shapes in the order in which to list them: sphere, torus, box, gear, helix-bowl, marble-run, structured-bowl.
 std::span<const Shape> catalogue();
 
-/// `spec` is `NAME` or `NAME,parameter=value,…`, with or without a leading `builtin:`; e.g.
-/// "torus,major=0.7,minor=0.3". The mesh is closed, its faces look outward, and it is centred at the origin. Throws
-/// `Error` for an unknown name or parameter or a value out of range, naming the nearest known one.
+/// The mesh of a shape: closed, triangles facing outward, centred at the origin.
+///
+/// @param spec `NAME` or `NAME,parameter=value,…`, with or without a leading `builtin:`, such as
+///   "torus,major=0.7,minor=0.3".
+///
+/// Throws `Error` (option, the subject is `spec`) for an unknown name or parameter, naming the nearest known one, or
+/// for a value out of range.
 TriangleMesh mesh(std::string_view spec);
 
-/// The signed distance in closed form, its `source()` holding name and box, so that a field can be built without a
-/// mesh. Spec as in `mesh`, with or without a leading `analytic:`. Throws `Error` for a shape without a closed form
-/// too.
+/// The signed distance of a shape in closed form, with the shape's name and box as its `source()`. Takes a spec as
+/// `mesh` does, with or without a leading `analytic:`, and throws as it does; also for a shape without a closed form.
 DistanceFunction analytic(std::string_view spec);
 
-/// Exact signed distances, negative inside, of shapes centred at the origin.
+/// Exact signed distances, negative inside, to shapes centred at the origin.
 double sphereDistance(const Vector3& x, double radius);
-double torusDistance(const Vector3& x, double majorRadius, double minorRadius);  ///< axis z
+double torusDistance(const Vector3& x, double majorRadius, double minorRadius);  ///< the torus' axis is z
 double boxDistance(const Vector3& x, const Vector3& halfSize);
 
 }  // namespace hpsdf::shapes

@@ -10,37 +10,37 @@
 
 namespace hpsdf {
 
-/// Beyond this, squares and volumes leave the range of double.
+/// The greatest absolute coordinate of a mesh: beyond it, squares and volumes leave the range of double.
 constexpr double kLargestCoordinate = 1e100;
 
-/// Vertices in mesh units; triangles index them, counter-clockwise seen from outside.
+/// Vertices in mesh units, and triangles that index them counter-clockwise as seen from outside.
 struct TriangleMesh {
   std::vector<Vector3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::string name;  ///< for messages and the field's metadata: the file's name without its path, or the shape's spec
+  std::string name;  ///< the file's name without its path, or the shape's spec; for messages and metadata
 };
 
-/// Throws `Error`, naming mesh, triangle and vertex, for the first triangle that refers to a vertex which does not
-/// exist.
+/// Throws `Error` (mesh) for the first triangle that refers to a vertex which does not exist.
 void requireValidIndices(const TriangleMesh& mesh);
 
-/// Smallest box around the vertices that triangles use. Empty for a mesh without triangles.
+/// Smallest box around the vertices that triangles use; empty for a mesh without triangles.
 Box boundingBox(const TriangleMesh& mesh);
 
-/// Signed volume by the divergence theorem, in cubed mesh units; positive when the faces look outward.
+/// Signed volume by the divergence theorem, in cubed mesh units; positive when the triangles face outward.
 double signedVolume(const TriangleMesh& mesh);
 
-/// Sum of the triangles' areas.
+/// Sum of the triangles' areas, in squared mesh units.
 double surfaceArea(const TriangleMesh& mesh);
 
-/// 64-bit hash of vertices and triangles, the same on every machine. The name does not count.
+/// 64-bit XXH3 hash of vertices and triangles, the same on every machine. The name has no influence.
 std::uint64_t fingerprint(const TriangleMesh& mesh);
 
-/// What takes a surface with this box into [-1, 1]³. Throws `Error` for one without finite extent.
-Normalization normalizing(const Box& surface);
+/// The normalization that maps a surface with this box into [-1, 1]³. Throws `Error` (mesh) for a box without finite
+/// extent.
+Normalization normalizationOf(const Box& surface);
 
-/// The mesh scaled uniformly and centred so that the longest side of its box spans exactly [-1, 1], as the paper does.
-/// Throws `Error` for a mesh without extent.
+/// The mesh scaled uniformly and centred so that the longest side of its box spans exactly [-1, 1] (Koschier et al.
+/// 2016, sec. 4). Throws `Error` (mesh) for a mesh without finite extent.
 TriangleMesh normalized(const TriangleMesh& mesh);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// How wrong a field is: measured at random points against the exact distance, rather than estimated.
+// The error of a field, measured at random points against the exact distance rather than estimated.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,34 +16,34 @@
 
 namespace hpsdf {
 
-/// |f − Φ| over samples.
+/// The distribution of |f − Φ| over samples, in units of length.
 struct ErrorFigures {
   std::size_t samples = 0;
   double rms = 0;
   double mean = 0;
   double max = 0;
-  std::map<double, double> percentiles = {};  ///< 50, 90, 99 and 99.9 → so many percent of the errors are no larger
+  std::map<double, double> percentiles = {};  ///< 50, 90, 99 and 99.9 → percentile
 };
 
-/// Where f and Φ have different signs. Between two zeros that lie within the field's error of each other this must
-/// be so: it is a defect only where |Φ| is beyond that error.
+/// Samples at which f and Φ have different signs. Between the zeros of f and of Φ such samples are inevitable; they are
+/// defects only where |Φ| exceeds the field's error.
 struct SignFigures {
   std::size_t mismatches = 0;
-  double deepest = 0;           ///< largest |Φ| among them
-  double beyond = 0;            ///< the |Φ| from which they count as defects
-  std::size_t beyondCount = 0;  ///< those with a greater |Φ|
+  double farthest = 0;      ///< largest |Φ| of a mismatch
+  double threshold = 0;     ///< the |Φ| beyond which a mismatch is a defect
+  std::size_t defects = 0;  ///< number of mismatches with |Φ| above the threshold
 };
 
-/// Of ∇f: its length at all samples, its angle with ∇Φ at some of them.
+/// The length of ∇f at all samples and its angle with ∇Φ at some of them.
 struct GradientFigures {
   double meanLength = 0;
-  double lengthErrorRms = 0;  ///< of ‖∇f‖ − 1
+  double lengthErrorRms = 0;  ///< RMS of ‖∇f‖ − 1
   double maxLength = 0;
-  std::size_t angles = 0;  ///< samples at which the angle was measured
+  std::size_t angles = 0;  ///< number of samples at which the angle was measured
   double meanAngleDegrees = 0;
-  double angle99Degrees = 0;  ///< 99 percent of the angles are no larger
+  double angle99Degrees = 0;  ///< 99th percentile of the angles
   double maxAngleDegrees = 0;
-  double maxPairSlope = 0;  ///< greatest |f(x) − f(y)|/|x − y| of two neighbours in the list: sees jumps too
+  double maxPairSlope = 0;  ///< greatest |f(x) − f(y)|/|x − y| of consecutive samples, which includes jumps
 };
 
 struct SampleFigures {
@@ -52,19 +52,19 @@ struct SampleFigures {
   GradientFigures gradient;
 };
 
-/// What a field says for certain (`CellBound`), held against samples. Cells without a sample do not count.
+/// The bounds of the cells (`CellBound`), compared with samples. Cells without a sample do not count.
 struct BoundFigures {
-  std::size_t violations = 0;  ///< samples with a greater error than their cell's bound, or a steeper gradient
+  std::size_t violations = 0;  ///< number of samples whose error or gradient exceeds the bound of their cell
   std::size_t cells = 0;
-  double medianBound = 0;  ///< over cells
-  double medianWorst = 0;  ///< over cells, of the greatest error among a cell's samples
+  double medianBound = 0;  ///< median of the cells' error bounds
+  double medianWorst = 0;  ///< median of the cells' greatest sampled errors
 };
 
-/// A bad point, and its cell.
+/// A sample with a large error and its cell.
 struct WorstPoint {
   Vector3 point;
-  double exact;  ///< Φ
-  double value;  ///< f
+  double exact;  ///< Φ at the point
+  double value;  ///< f at the point
   std::uint32_t cell;
   int degree;
   int depth;
@@ -73,36 +73,37 @@ struct WorstPoint {
 };
 
 struct VerifyOptions {
-  std::size_t points = 1'000'000;  ///< half of them uniform, half near the surface; at least 2
-  std::uint64_t seed = 1;
-  double near = 0;         ///< radius of the ball of near points; 0: a hundredth of the surface's longest side
-  double band = 0;         ///< look only where |Φ| is at most this; 0: everywhere
-  double signBound = 0;    ///< `SignFigures::beyond`; 0: ten times the near points' RMS error
-  std::size_t worst = 10;  ///< how many of the worst points to list, each from a cell of its own
-  std::size_t anglePoints = 100'000;  ///< of all points, at which gradients are compared
-  int threads = 0;                    ///< at most; 0: all that the machine offers. The result does not depend on it.
+  std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
+  std::uint64_t seed = 1;             ///< seed of the random points
+  double near = 0;                    ///< distance of near points; 0: a hundredth of the surface's longest side
+  double band = 0;                    ///< greatest |Φ| of samples; 0: samples of the whole domain
+  double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near points
+  std::size_t worst = 10;             ///< number of worst points, each of another cell
+  std::size_t anglePoints = 100'000;  ///< number of samples at which the directions of gradients are compared
+  int threads = 0;                    ///< greatest number of threads; 0: all that the machine offers
 };
 
 struct Verification {
-  double near = 0;        ///< as used
-  SampleFigures uniform;  ///< over points that are uniform in the domain (or the band)
-  SampleFigures nearSurface;
-  std::optional<BoundFigures> bounds;  ///< over both kinds of points; nothing where the field keeps none
-  std::vector<WorstPoint> worst;       ///< by |f − Φ|, of both kinds of points, worst first
+  double near = 0;                     ///< distance of near points that was used
+  SampleFigures uniform;               ///< figures over points that are uniform in the domain or the band
+  SampleFigures nearSurface;           ///< figures over points near the surface
+  std::optional<BoundFigures> bounds;  ///< figures over all points; empty if the field has no bounds
+  std::vector<WorstPoint> worst;       ///< points with the greatest |f − Φ|, greatest first
 };
 
-/// What a field is measured against. What is referred to must live as long.
+/// The exact surface that a field is compared with. The referenced objects must outlive it.
 struct VerifiedSurface {
   const DistanceFunction& distance;                       ///< Φ
-  std::function<Vector3(const Vector3&, double)> normal;  ///< ∇Φ at x, Φ(x) given; zero where it is not known
-  const TriangleMesh& mesh;                               ///< where near points are drawn; of the field's units
+  std::function<Vector3(const Vector3&, double)> normal;  ///< returns ∇Φ from x and Φ(x); zero where it is unknown
+  const TriangleMesh& mesh;                               ///< surface of the near points, in the field's units
 };
 
-/// |f − Φ| at samples; as deterministic as these.
+/// Measures |f − Φ| at samples. The result does not depend on `threads` (0: all that the machine offers).
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads = 0);
 
-/// All figures but jumps, which `findJumps` has. Throws `Error` as the two `sample…` functions do and for options out
-/// of range, `Cancelled` when progress says so.
+/// Measures a field's errors, signs, gradients and bounds; `findJumps` measures its jumps. The result does not depend
+/// on the number of threads. Throws `Error` as `sampleUniform` and `sampleNear` do and for options out of range,
+/// `Cancelled` when `progress` says so.
 Verification verify(const Field& field, const VerifiedSurface& surface, const VerifyOptions& options = {},
                     const Progress& progress = {});
 

@@ -5,18 +5,18 @@
 #include <set>
 #include <span>
 
-namespace hpsdf {
+namespace hpsdf::basis {
 namespace {
 
-/// One point and its images under the symmetries of the cube, all of one weight.
+/// A point that stands for all its images under the symmetries of the cube, each with the same weight.
 struct Orbit {
   double weight;
   double x, y, z;
 };
 
-// Found by ourselves: Levenberg-Marquardt on the moments from random starts, over all kinds of orbits; the numbers of
-// points up to order 11 are those of the literature (F. Witherden, P. Vincent, "On the identification of symmetric
-// quadrature rules for finite element methods", 2015). Tests check the moments.
+// These rules solve the moment equations over all kinds of orbits by Levenberg-Marquardt from random starts. Up to
+// order 11 they have as few points as the rules in F. Witherden, P. Vincent, "On the identification of symmetric
+// quadrature rules for finite element methods", 2015. Tests check the moments.
 constexpr Orbit kOrder5[] = {
     {0.88642659279778391, 0.79582242575422146, 0, 0},
     {0.33518005540166201, 0.75878691063932813, 0.75878691063932813, 0.75878691063932813},
@@ -67,7 +67,7 @@ void addImages(const Orbit& orbit, Cubature& rule) {
   std::ranges::sort(point);
   do {
     for (int signs = 0; signs < 8; ++signs) {
-      std::array<double, 3> image;  // adding 0 turns -0 into 0
+      std::array<double, 3> image;  // Adding 0 turns -0 into 0, so that equal points compare equal.
       for (int axis = 0; axis < 3; ++axis) image[axis] = ((signs >> axis & 1) ? -point[axis] : point[axis]) + 0.0;
       images.insert(image);
     }
@@ -88,4 +88,4 @@ std::optional<Cubature> compactCubature(int order) {
   return all;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::basis

@@ -4,15 +4,18 @@
 
 #include "hpsdf/types.h"
 
-namespace hpsdf {
+namespace hpsdf::basis {
 
-/// What coefficient a of the half of an axis adds to coefficient i of the whole: L_i of the whole is
-/// Σ_a share·L_a/‖L_a‖² of the half above; below, the signs of odd i + a change.
+/// The matrix that joins the projections of an interval's two halves into the projection of the whole interval: entry
+/// (i, a) is the contribution of a half's coefficient a to coefficient i of the whole.
+///
+/// On the upper half L_i((t+1)/2) = Σ_a r_ia L_a(t), so that the entry is r_ia ‖L_a‖² / ‖L_i‖² / 2. On the lower half
+/// the entries with odd i + a have the opposite sign.
 class HalfShares {
  public:
   HalfShares() {
     constexpr int n = kMaxDegree + 2;
-    // L_i((t+1)/2) = Σ_a r[i][a] L_a(t), by the recurrences of L_i and of t·L_a
+    // Expand L_i((t+1)/2) in the L_a(t) by the recurrences of L_i and of t·L_a.
     std::array<std::array<double, n + 1>, n> r{};
     r[0][0] = 1;
     r[1][0] = r[1][1] = 0.5;
@@ -36,4 +39,4 @@ class HalfShares {
   std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2> share_{};
 };
 
-}  // namespace hpsdf
+}  // namespace hpsdf::basis

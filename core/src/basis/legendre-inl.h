@@ -1,9 +1,9 @@
-// Part of legendre.h that works on a number or on a vector of numbers (`Number`): included within a namespace, by
-// legendre.h and, as code for an instruction set must stand where that set is chosen, again for each set that has
-// vectors.
+// The part of legendre.h that works on a number or on a SIMD vector of numbers (`Number`). legendre.h includes this
+// file for numbers. Highway compiles code for one instruction set within that set's namespace, so that files with SIMD
+// code include it there again.
 
-/// values[i] = L_i(t) for i = 0..degree, by the three-term recurrence (paper, eq. 4), here as
-/// L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1): a division a degree would take longer than all the rest.
+/// values[i] = L_i(t) for i = 0..degree, by the three-term recurrence (Koschier et al. 2016, eq. 4) in the form
+/// L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1), whose only division is tabulated: it would take most of the time.
 template <typename Number>
 inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* values) {
   values[0] = Number(1);
@@ -11,11 +11,12 @@ inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* v
   values[1] = t;
   for (int i = 1; i < degree; ++i) {
     const Number product = t * values[i];
-    values[i + 1] = product + (product - values[i - 1]) * Number(kLegendreRatio[i]);
+    values[i + 1] = product + (product - values[i - 1]) * Number(hpsdf::basis::kLegendreRatio[i]);
   }
 }
 
-/// Also derivatives[i] = L_i'(t), by L_i' = L_{i-2}' + (2i-1) L_{i-1}, which holds at the ends of the interval too.
+/// values[i] = L_i(t) and derivatives[i] = L_i'(t) for i = 0..degree, by L_i' = L_{i-2}' + (2i-1) L_{i-1}, which also
+/// holds at t = ±1.
 template <typename Number>
 inline void legendreValuesAndDerivatives(std::type_identity_t<Number> t, int degree, Number* values,
                                          Number* derivatives) {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <numbers>
 
-namespace hpsdf {
+namespace hpsdf::basis {
 
 QuadratureRule gaussLegendre(int n) {
   QuadratureRule rule;
@@ -13,7 +13,7 @@ QuadratureRule gaussLegendre(int n) {
   std::vector<double> values(n + 1);
   std::vector<double> derivatives(n + 1);
   for (int i = 0; i < (n + 1) / 2; ++i) {
-    // Newton from Tricomi's estimate of the i-th largest root; a handful of steps reach rounding.
+    // Newton's method from Tricomi's estimate of the i-th largest root reaches rounding in a few steps.
     double t = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5));
     for (int step = 0; step < 50; ++step) {
       legendreValuesAndDerivatives(t, n, values.data(), derivatives.data());
@@ -31,4 +31,4 @@ QuadratureRule gaussLegendre(int n) {
   return rule;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::basis

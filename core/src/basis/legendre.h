@@ -1,13 +1,13 @@
 #pragma once
-// Legendre polynomials L_i on [-1, 1] (not normalised) and Gauss quadrature on them.
+// Legendre polynomials L_i on [-1, 1], with L_i(1) = 1, and Gauss quadrature.
 
 #include <array>
 #include <type_traits>
 #include <vector>
 
-namespace hpsdf {
+namespace hpsdf::basis {
 
-/// i/(i+1), for the recurrence up to the highest degree that a quadrature of ours needs.
+/// The ratios i/(i+1) of the recurrence, up to the highest degree that a quadrature rule needs.
 constexpr int kMostLegendre = 256;
 constexpr auto kLegendreRatio = [] {
   std::array<double, kMostLegendre> ratio{};
@@ -23,7 +23,7 @@ struct QuadratureRule {
   std::vector<double> weights;
 };
 
-/// The n-point Gauss-Legendre rule: exact for polynomials up to degree 2n-1. Points ascend and are exactly symmetric.
+/// The n-point Gauss-Legendre rule, exact for polynomials up to degree 2n-1. Points ascend and are exactly symmetric.
 QuadratureRule gaussLegendre(int n);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::basis

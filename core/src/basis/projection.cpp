@@ -6,10 +6,10 @@
 
 #include "basis/half_shares.h"
 
-namespace hpsdf {
+namespace hpsdf::basis {
 namespace {
 
-/// The tensor product of an axis rule, z fastest.
+/// The tensor product of an axis rule, with z fastest.
 Cubature product(const QuadratureRule& axis) {
   Cubature all;
   for (std::size_t a = 0; a < axis.points.size(); ++a)
@@ -21,6 +21,7 @@ Cubature product(const QuadratureRule& axis) {
   return all;
 }
 
+/// Tensor product of a rule along each axis. The contractions cost O(n⁴) for n points an axis, a matrix O(n⁶).
 class ProductProjection final : public Projection {
  public:
   ProductProjection(const QuadratureRule& axis, int degree)
@@ -36,15 +37,18 @@ class ProductProjection final : public Projection {
   }
 
   std::vector<double> operator()(std::span<const double> samples) const override {
-    const int n = points_;
-    const int count = degree_ + 1;
-    assert(samples.size() == std::size_t(n) * n * n);
+    assert(samples.size() == std::size_t(points_) * points_ * points_);
+    return contractX(contractY(contractZ(samples)));
+  }
 
-    // z: alongZ[a][b][k]
-    std::vector<double> alongZ(std::size_t(n) * n * count);
+ private:
+  /// [a][b][k] = Σ_c rows[k][c] samples[a][b][c]
+  std::vector<double> contractZ(std::span<const double> samples) const {
+    const int n = points_, count = degree_ + 1;
+    std::vector<double> result(std::size_t(n) * n * count);
     for (int line = 0; line < n * n; ++line) {
       const double* in = &samples[std::size_t(line) * n];
-      double* out = &alongZ[std::size_t(line) * count];
+      double* out = &result[std::size_t(line) * count];
       for (int k = 0; k < count; ++k) {
         const double* row = &rows_[std::size_t(k) * n];
         double sum = 0;
@@ -52,12 +56,16 @@ class ProductProjection final : public Projection {
         out[k] = sum;
       }
     }
+    return result;
+  }
 
-    // y: alongY[a][j][k], j+k ≤ p
-    std::vector<double> alongY(std::size_t(n) * count * count, 0.0);
+  /// [a][j][k] = Σ_b rows[j][b] alongZ[a][b][k], for j+k ≤ p
+  std::vector<double> contractY(const std::vector<double>& alongZ) const {
+    const int n = points_, count = degree_ + 1;
+    std::vector<double> result(std::size_t(n) * count * count, 0.0);
     for (int a = 0; a < n; ++a) {
       for (int j = 0; j < count; ++j) {
-        double* out = &alongY[(std::size_t(a) * count + j) * count];
+        double* out = &result[(std::size_t(a) * count + j) * count];
         for (int b = 0; b < n; ++b) {
           const double factor = rows_[std::size_t(j) * n + b];
           const double* in = &alongZ[(std::size_t(a) * n + b) * count];
@@ -65,10 +73,14 @@ class ProductProjection final : public Projection {
         }
       }
     }
+    return result;
+  }
 
-    // x
-    std::vector<double> coefficients(coefficientCount(degree_), 0.0);
-    double* out = coefficients.data();
+  /// Coefficient (i, j, k) = Σ_a rows[i][a] alongY[a][j][k], for i+j+k ≤ p
+  std::vector<double> contractX(const std::vector<double>& alongY) const {
+    const int n = points_, count = degree_ + 1;
+    std::vector<double> result(coefficientCount(degree_), 0.0);
+    double* out = result.data();
     for (int i = 0; i < count; ++i) {
       for (int j = 0; j < count - i; ++j) {
         const int length = count - i - j;
@@ -80,17 +92,17 @@ class ProductProjection final : public Projection {
         out += length;
       }
     }
-    return coefficients;
+    return result;
   }
 
- private:
-  int points_;                ///< an axis
+  int points_;                ///< number of points of the axis rule
   std::vector<double> rows_;  ///< [i][q] = (2i+1)/2 · w_q · L_i(x_q)
 };
 
-class PlainProjection final : public Projection {
+/// Any cubature, as one matrix.
+class MatrixProjection final : public Projection {
  public:
-  PlainProjection(const Cubature& cubature, int degree)
+  MatrixProjection(const Cubature& cubature, int degree)
       : Projection(cubature, degree), matrix_(points().size() * coefficientCount(degree)) {
     std::vector<double> x(degree + 1), y(degree + 1), z(degree + 1);
     double* row = matrix_.data();
@@ -117,14 +129,14 @@ class PlainProjection final : public Projection {
   std::vector<double> matrix_;  ///< [q][coefficient]
 };
 
-/// Place of (i, j, k) among the coefficients of a degree.
-int placeOf(int i, int j, int k, int degree) {
+/// Index of coefficient (i, j, k) among the coefficients of a degree.
+int indexOf(int i, int j, int k, int degree) {
   const int rest = degree - i;
   return coefficientCount(degree) - coefficientCount(rest) +
          ((rest + 1) * (rest + 2) - (rest - j + 1) * (rest - j + 2)) / 2 + k;
 }
 
-/// Two halves along an axis as one.
+/// Joins the projections of two halves of a box along an axis into the projection of the box.
 std::vector<double> joinedAlong(int axis, const std::vector<double>& below, const std::vector<double>& above,
                                 int degree) {
   static const HalfShares shares;
@@ -134,8 +146,8 @@ std::vector<double> joinedAlong(int axis, const std::vector<double>& below, cons
     const int top = at[axis];
     for (int a = 0; a <= top; ++a) {
       at[axis] = a;
-      const int place = placeOf(at[0], at[1], at[2], degree);
-      whole[index] += shares.below(top, a) * below[place] + shares.above(top, a) * above[place];
+      const int ofHalf = indexOf(at[0], at[1], at[2], degree);
+      whole[index] += shares.below(top, a) * below[ofHalf] + shares.above(top, a) * above[ofHalf];
     }
   });
   return whole;
@@ -153,8 +165,8 @@ std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, 
   return std::make_unique<ProductProjection>(axis, degree);
 }
 
-std::unique_ptr<const Projection> plainProjection(const Cubature& cubature, int degree) {
-  return std::make_unique<PlainProjection>(cubature, degree);
+std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int degree) {
+  return std::make_unique<MatrixProjection>(cubature, degree);
 }
 
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree) {
@@ -178,7 +190,7 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
 
 std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree) {
   std::vector<std::vector<double>> parts(children.begin(), children.end());
-  for (int axis = 0; axis < 3; ++axis) {  // pairs along x, then y, then z
+  for (int axis = 0; axis < 3; ++axis) {  // Join pairs along x, then along y, then along z.
     for (std::size_t pair = 0; pair < parts.size() / 2; ++pair)
       parts[pair] = joinedAlong(axis, parts[2 * pair], parts[2 * pair + 1], degree);
     parts.resize(parts.size() / 2);
@@ -186,4 +198,4 @@ std::vector<double> joined(const std::array<std::vector<double>, 8>& children, i
   return parts[0];
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::basis

@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <limits>
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 
-/// Around points of four lanes, the fourth idle. Empty at first.
+/// Axis-aligned box of points with four lanes, the fourth of which is unused. A new box is empty.
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
@@ -18,10 +18,11 @@ struct FloatBox {
     lower = lower.min(point);
     upper = upper.max(point);
   }
+  /// Half of the surface area, as the surface-area heuristic needs it.
   float area() const {
     const Eigen::Array4f size = upper - lower;
     return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
   }
 };
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

@@ -13,39 +13,39 @@
 
 #include "bvh/float_box.h"
 #include "hpsdf/error.h"
-#include "mesh/message_prefix.h"
+#include "mesh/mesh_error.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-/// What nodes and blocks are made of, numbered: a branch before what is below it.
+/// The branches and blocks of a tree in depth-first order; their positions are the indices of nodes and blocks.
 struct Numbered {
   std::vector<const Branch*> nodes;
-  std::vector<std::array<std::uint32_t, kWidth>> children;  ///< of each node, as in `Node`
-  std::vector<const Branch::Part*> blocks;
+  std::vector<std::array<std::uint32_t, kWidth>> children;  ///< `Node::child` of each node
+  std::vector<const Branch::Child*> blocks;
 
   std::uint32_t add(const Branch& branch) {
     const auto self = static_cast<std::uint32_t>(nodes.size());
     nodes.push_back(&branch);
     children.emplace_back().fill(kEmpty);
     for (int i = 0; i < branch.count; ++i) {
-      const Branch::Part& part = branch.parts[i];
-      const std::uint32_t child = part.branch ? add(*part.branch) : addBlock(part);
-      children[self][i] = child;
+      const Branch::Child& child = branch.children[i];
+      const std::uint32_t index = child.branch ? add(*child.branch) : addBlock(child);
+      children[self][i] = index;  // `add` may have moved `children`, so that it is indexed afterwards
     }
     return self;
   }
 
  private:
-  std::uint32_t addBlock(const Branch::Part& part) {
-    blocks.push_back(&part);
+  std::uint32_t addBlock(const Branch::Child& child) {
+    blocks.push_back(&child);
     return kBlockBit | static_cast<std::uint32_t>(blocks.size() - 1);
   }
 };
 
-/// A box whose axes are `axes`' columns.
+/// A box whose axes are the columns of `axes`.
 struct OrientedBox {
   Eigen::Vector3f center = Eigen::Vector3f::Zero(), half = Eigen::Vector3f::Zero();
   Eigen::Matrix3f axes = Eigen::Matrix3f::Zero();
@@ -53,16 +53,16 @@ struct OrientedBox {
   float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
 };
 
-/// Out of any reach: √kOutOfReach less than nothing along each axis.
-OrientedBox nothing() {
+/// A box that no search reaches: its half sizes are so negative that every squared distance exceeds kOutOfReach.
+OrientedBox unreachableBox() {
   OrientedBox box;
   box.half.setConstant(-2 * std::sqrt(kOutOfReach));
   return box;
 }
 
-/// `extents`: along the axes.
+/// The box with these axes and these extents along them.
 OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
-  // The points, their products with the axes and the sums of those are rounded, of numbers up to √3 each.
+  // Points, their products with the axes and the sums of the products are rounded; each is at most √3.
   constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
   const Eigen::Matrix3d asRounded = axes.cast<double>();
   const Vector3 low = extents.lower.head<3>().cast<double>(), high = extents.upper.head<3>().cast<double>();
@@ -74,16 +74,16 @@ OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
   return box;
 }
 
-/// Fits the boxes of nodes to triangles that lie in the tree's order.
+/// Fits the boxes of nodes to triangles, which are in the tree's order.
 class BoxFitter {
  public:
-  /// `points`: in local coordinates, the fourth lane is 0.
+  /// `points` are the vertices in local coordinates, with a fourth lane of 0.
   BoxFitter(const std::vector<Corners>& triangles, const std::vector<Eigen::Array4f>& points)
       : triangles_(triangles), points_(points) {}
 
   void fit(Node& node, const Branch& branch) const {
     for (int lane = 0; lane < kWidth; ++lane) {
-      const OrientedBox box = lane < branch.count ? boxAround(branch.parts[lane]) : nothing();
+      const OrientedBox box = lane < branch.count ? boxAround(branch.children[lane]) : unreachableBox();
       for (int i = 0; i < 3; ++i) {
         node.field[Node::center + i][lane] = box.center[i];
         node.field[Node::half + i][lane] = box.half[i];
@@ -95,30 +95,31 @@ class BoxFitter {
  private:
   static constexpr std::uint32_t kSamples = 128;
 
-  OrientedBox boxAround(const Branch::Part& part) const {
-    const Eigen::Matrix3f axes = axesOf(part).cast<float>();
+  OrientedBox boxAround(const Branch::Child& child) const {
+    const Eigen::Matrix3f axes = axesOf(child).cast<float>();
     std::array<Eigen::Array4f, 3> rows;
     for (int i = 0; i < 3; ++i) rows[i] << axes.row(i).transpose().array(), 0;
-    FloatBox upright, leaning;
-    for (std::uint32_t slot = part.begin; slot < part.end; ++slot)
+    FloatBox aligned, oriented;
+    for (std::uint32_t slot = child.begin; slot < child.end; ++slot)
       for (const std::uint32_t vertex : triangles_[slot]) {
         const Eigen::Array4f point = points_[vertex];
-        upright.extend(point);
-        leaning.extend(Eigen::Array4f(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]));
+        aligned.extend(point);
+        oriented.extend(Eigen::Array4f(rows[0] * point[0] + rows[1] * point[1] + rows[2] * point[2]));
       }
-    const OrientedBox uprightBox = boxFrom(Eigen::Matrix3f::Identity(), upright);
-    const OrientedBox leaningBox = boxFrom(axes, leaning);
-    return leaningBox.area() < uprightBox.area() ? leaningBox : uprightBox;
+    const OrientedBox alignedBox = boxFrom(Eigen::Matrix3f::Identity(), aligned);
+    const OrientedBox orientedBox = boxFrom(axes, oriented);
+    return orientedBox.area() < alignedBox.area() ? orientedBox : alignedBox;
   }
 
-  /// The mean normal, the widest direction across it, and the third. Of large parts some triangles tell enough.
-  Eigen::Matrix3d axesOf(const Branch::Part& part) const {
-    const std::uint32_t step = 1 + (part.end - part.begin) / kSamples;
-    const Eigen::Vector4f reference = points_[triangles_[part.begin][0]];
+  /// The mean normal, the direction of the greatest extent perpendicular to it, and the third axis. A sample of the
+  /// triangles suffices for large ranges.
+  Eigen::Matrix3d axesOf(const Branch::Child& child) const {
+    const std::uint32_t step = 1 + (child.end - child.begin) / kSamples;
+    const Eigen::Vector4f reference = points_[triangles_[child.begin][0]];
     Eigen::Vector4f doubledArea = Eigen::Vector4f::Zero(), sum = Eigen::Vector4f::Zero();
     Eigen::Matrix4f products = Eigen::Matrix4f::Zero();
     float count = 0;
-    for (std::uint32_t slot = part.begin; slot < part.end; slot += step) {
+    for (std::uint32_t slot = child.begin; slot < child.end; slot += step) {
       std::array<Eigen::Vector4f, 3> corners;
       for (int k = 0; k < 3; ++k) {
         corners[k] = points_[triangles_[slot][k]].matrix() - reference;
@@ -156,26 +157,27 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::v
 }  // namespace
 
 void requireSurface(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty())
-    throw Error(messagePrefix(mesh.name) + "no faces; a distance needs at least one triangle");
+  if (mesh.triangles.empty()) throw mesh::meshError(mesh.name, "no faces; a distance needs at least one triangle");
   if (mesh.triangles.size() > Hierarchy::kMaxTriangles)
-    throw Error(messagePrefix(mesh.name) + std::to_string(mesh.triangles.size()) + " faces are more than the " +
-                std::to_string(Hierarchy::kMaxTriangles) + " that a distance takes; simplify the mesh first");
+    throw mesh::meshError(mesh.name, std::to_string(mesh.triangles.size()) + " faces are more than the " +
+                                         std::to_string(Hierarchy::kMaxTriangles) +
+                                         " that a distance takes; simplify the mesh first");
   requireValidIndices(mesh);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     if (!mesh.vertices[v].allFinite())
-      throw Error(messagePrefix(mesh.name) + "vertex " + std::to_string(v + 1) +
-                  " has a coordinate that is not a finite number; repair or export the mesh again");
+      throw mesh::meshError(mesh.name,
+                            "vertex " + std::to_string(v + 1) +
+                                " has a coordinate that is not a finite number; repair or export the mesh again");
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
-  // halved first: the box of any finite mesh has a finite center, size and scale
+  // Corners are halved before they are added, so that center and size of any finite box are finite.
   center_ = box.min() / 2 + box.max() / 2;
   const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
 
   const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
-  frames_ = Array<TriangleFrame>(mesh.triangles.size());
+  frames_ = detail::Array<TriangleFrame>(mesh.triangles.size());
   Numbered numbered;
   tbb::parallel_invoke(
       [&] {
@@ -191,12 +193,12 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
 
   const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
   const BoxFitter fitter(triangles_, points);
-  nodes_ = Array<Node>(numbered.nodes.size());
+  nodes_ = detail::Array<Node>(numbered.nodes.size());
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) {
     fitter.fit(nodes_[n], *numbered.nodes[n]);
     std::copy(numbered.children[n].begin(), numbered.children[n].end(), nodes_[n].child);
   });
-  blocks_ = Array<Block>(numbered.blocks.size());
+  blocks_ = detail::Array<Block>(numbered.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks_.size(),
                     [&](std::size_t b) { fill(blocks_[b], numbered.blocks[b]->begin, numbered.blocks[b]->end); });
 }
@@ -245,4 +247,4 @@ std::size_t Hierarchy::bytes() const {
   return sizeOf(frames_) + sizeOf(nodes_) + sizeOf(blocks_) + sizeOf(triangles_) + sizeOf(vertices_);
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

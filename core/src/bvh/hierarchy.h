@@ -12,35 +12,36 @@
 #include "hpsdf/types.h"
 #include "util/array.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 
-/// Throws `Error`, naming the mesh, unless a hierarchy can be made of it: it has triangles, not too many, of vertices
+/// Throws `Error` (mesh) unless the mesh has at least one and at most `Hierarchy::kMaxTriangles` triangles, of vertices
 /// that exist, and all coordinates are finite.
 void requireSurface(const TriangleMesh& mesh);
 
 /// The nearest triangle of a point.
 struct Nearest {
-  std::uint32_t place = 0;  ///< see `Hierarchy::frameAt`; to start a neighbour's search from
-  FramePoint point;         ///< the point in that triangle's frame
+  std::uint32_t triangleRef = 0;  ///< reference of the triangle, see `Hierarchy::frameAt`
+  FramePoint point;               ///< the query point relative to that triangle's frame
 };
 
-constexpr int kPacket = 8;  ///< points that search together
+constexpr int kPacket = 8;  ///< points of a packet
 
-/// Four oriented boxes as float, in coordinates that put the mesh into [-1, 1]³: 256 bytes.
+/// Four oriented boxes in single precision and local coordinates, which map the mesh into [-1, 1]³; 256 bytes.
 struct alignas(64) Node {
   enum Field { center = 0, axes = 3, half = 12, fields = 15 };
   float field[fields][kWidth];
-  /// Another node, or a block of triangles (kBlockBit), or nothing (kEmpty; its box is out of any reach).
+  /// The index of a node, the index of a block with kBlockBit set, or kEmpty, whose box no search reaches.
   std::uint32_t child[kWidth];
 };
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
-/// Square of a distance beyond those of all points that are searched by float. The boxes of empty children are farther.
+/// A squared distance that exceeds those of all points for which the search uses single precision. The boxes of empty
+/// children are still farther away.
 constexpr float kOutOfReach = 1e33f;
 
-/// Up to four triangles as float, in the same coordinates: a `TriangleFrame` without its normal. Unused lanes repeat
-/// the last triangle.
+/// Up to four triangles in single precision and local coordinates: the fields of `TriangleFrame` without the normal.
+/// Unused lanes repeat the last triangle.
 struct alignas(32) Block {
   enum Field {
     origin = 0,
@@ -54,58 +55,60 @@ struct alignas(32) Block {
     fields
   };
   float field[fields][kWidth];
-  std::uint32_t first;  ///< its first triangle's frame; the others follow
+  std::uint32_t first;  ///< slot of the first triangle; the others follow it
   std::uint32_t count;
 };
 
-/// Hierarchy of oriented boxes over triangles, four to a node.
+/// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children a node.
 ///
-/// Nodes and blocks only decide what to skip: they are float, and every bound allows for the rounding, so that all
-/// triangles are left over that can be the nearest to rounding. Among those the answer is the minimum by (squared
-/// distance in double, mesh index): it depends neither on the tree nor on where a search started nor on the
-/// instruction set.
+/// Nodes and blocks only decide which triangles to skip. They are single precision, and every bound allows for its
+/// rounding, so that no triangle that may be the nearest is skipped. Among the remaining triangles the answer is the
+/// minimum by (squared distance in double, mesh index). It depends neither on the tree nor on the seeds of a search nor
+/// on the instruction set.
 class Hierarchy {
  public:
   Hierarchy() = default;
 
-  /// Of what `requireSurface` accepts. `box`: the mesh's.
+  /// Builds the hierarchy of a mesh that `requireSurface` accepts; `box` is the mesh's bounding box.
   Hierarchy(const TriangleMesh& mesh, const Box& box);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// The triangle at a place: number `place % kWidth` of block `place / kWidth`.
-  const TriangleFrame& frameAt(std::uint32_t place) const { return frames_[slotAt(place)]; }
+  /// The triangle with a reference: number `triangleRef % kWidth` of block `triangleRef / kWidth`.
+  const TriangleFrame& frameAt(std::uint32_t triangleRef) const { return frames_[slotAt(triangleRef)]; }
 
   std::span<const Node> nodes() const { return nodes_; }
   std::span<const Block> blocks() const { return blocks_; }
 
-  /// A triangle's number in the hierarchy's order, in which a block's triangles follow one another.
-  std::uint32_t slotAt(std::uint32_t place) const { return blocks_[place / kWidth].first + place % kWidth; }
+  /// The slot of a triangle: its number in the hierarchy's order, in which the triangles of a block are adjacent.
+  std::uint32_t slotAt(std::uint32_t triangleRef) const {
+    return blocks_[triangleRef / kWidth].first + triangleRef % kWidth;
+  }
 
-  // By slot; neighbours on the surface are mostly neighbours in memory.
+  // Frames and triangles are indexed by slot: most neighbours on the surface are neighbours in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
-  std::span<const std::array<std::uint32_t, 3>> triangles() const { return triangles_; }  ///< indices of `vertices`
-  std::span<const Vector3> vertices() const { return vertices_; }  ///< those in use, in the order of their first use
+  std::span<const std::array<std::uint32_t, 3>> triangles() const { return triangles_; }  ///< as indices of `vertices`
+  std::span<const Vector3> vertices() const { return vertices_; }  ///< vertices in use, in the order of first use
 
   std::size_t bytes() const;
 
-  /// x in the boxes' coordinates.
+  /// Local coordinates of x: those of nodes and blocks.
   Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
   double scale() const { return scale_; }
 
  private:
-  /// Makes triangles_ and vertices_.
+  /// Fills triangles_ and vertices_ from the mesh, in the tree's order.
   void sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order);
-  /// The block of slots [begin, end).
+  /// Fills a block with the triangles of slots [begin, end).
   void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
 
-  Array<TriangleFrame> frames_;
-  Array<Node> nodes_;
-  Array<Block> blocks_;
+  detail::Array<TriangleFrame> frames_;
+  detail::Array<Node> nodes_;
+  detail::Array<Block> blocks_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_
-  double scale_ = 1;  ///< 1/half of the longest side of the mesh's box
+  double scale_ = 1;  ///< 2 / longest side of the mesh's box
 };
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

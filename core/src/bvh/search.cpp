@@ -11,19 +11,19 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bvh/search.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// Highway requires these after foreach_target.h.
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// A level leaves at most three children waiting (see kMaxLevel in triangle_tree.cpp); four more are written at its
-/// end.
+/// Each of at most 64 levels (see `makeTriangleTree`) leaves at most three children on the stack, and four more entries
+/// are written at its end.
 constexpr std::size_t kStackSize = 3 * 64 + 8;
 
 template <class V>
@@ -36,7 +36,7 @@ struct SquaredBounds {
   hn::Vec<D> lower, upper;
 };
 
-/// Square of the distance to an oriented box. `field(i)` is the box's i-th number.
+/// Squared distance to an oriented box; `field(i)` is the i-th field of `Node` for that box.
 template <class D, class Fields>
 HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields& field) {
   const auto wx = p.x - field(Node::center), wy = p.y - field(Node::center + 1), wz = p.z - field(Node::center + 2);
@@ -50,8 +50,8 @@ HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields&
   return sum;
 }
 
-/// Bounds of the squared distance to a triangle, but for the rounding of the point and of the triangle's numbers.
-/// `field(i)` is the triangle's i-th number.
+/// Bounds of the squared distance to a triangle; `field(i)` is the i-th field of `Block` for that triangle. The bounds
+/// include the rounding of this function, but not that of the point's and the triangle's coordinates to float.
 template <class D, class Fields>
 HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point, const Fields& field) {
   const auto zero = hn::Zero(d);
@@ -70,8 +70,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   const auto fromB = p - length, rightAlong = apexAlong - length;
   const auto right = unit(hn::MulAdd(fromB, rightAlong, q * apexAcross) * field(Block::inverseRight));
   const auto rightP = hn::NegMulAdd(right, rightAlong, fromB), rightQ = hn::NegMulAdd(right, apexAcross, q);
-  // Rounding may put a point beyond a sharp corner inside both its sides: within the base as well, it is inside up to
-  // rounding.
+  // Rounding may put a point beyond a sharp corner on the inner side of both edges there. A point whose projection also
+  // falls within the base is inside up to rounding.
   const auto inside = hn::And(hn::And(q > zero, base == zero),
                               hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
   const auto side = hn::Min(hn::MulAdd(base, base, q * q), hn::Min(hn::MulAdd(leftP, leftP, leftQ * leftQ),
@@ -83,20 +83,21 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   return {squared - rounding, squared + rounding};
 }
 
-/// (√upper + δ)²: what a lower bound must not exceed to be nearer than a triangle with that upper bound.
+/// (√upper + δ)²: a triangle or box with a greater lower bound is farther than a triangle with this upper bound.
 template <class D>
 HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   const auto distance = hn::Sqrt(upper) + hn::Set(d, delta);
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
-/// A point in a triangle's frame, as `locate` of triangle_frame.h has it: the same operations in the same order, none
-/// of them fused, so that the results are the same to the bit on every instruction set.
+/// Result of `locateLanes`: the squared distances to a triangle and the members of `FramePoint`, for each lane.
 template <class D>
 struct Located {
   hn::Vec<D> squared, height, side[3], inside;
 };
 
+/// Locates points relative to a triangle, as `locate` of triangle_frame.h does. The operations are the same in the same
+/// order and none is fused, so that every instruction set yields the same bits.
 template <class D>
 HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::Vec<D>>& point) {
   const auto number = [&](double value) HWY_ATTR { return hn::Set(d, value); };
@@ -122,7 +123,7 @@ HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::V
   return at;
 }
 
-/// Whether a lower bound is within its limit for any of the points.
+/// Returns true if the lower bound is within the limit for any of the points.
 template <int Lanes>
 HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   const hn::CappedTag<float, Lanes> d;
@@ -133,7 +134,7 @@ HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   return !hn::AllFalse(d, within);
 }
 
-/// Computes the distances to the candidates in double, keeps what is nearer, and empties the list.
+/// Computes the distances to the candidates in double precision, keeps the nearest triangles, and empties the list.
 template <int Lanes>
 HWY_INLINE void settle(Search<Lanes>& s) {
   const hn::CappedTag<double, Lanes> d;
@@ -142,7 +143,7 @@ HWY_INLINE void settle(Search<Lanes>& s) {
     if (!anyInReach<Lanes>(s.lower[c], s.limit)) continue;
     const TriangleFrame& frame = s.hierarchy.frameAt(s.candidates[c]);
     const auto triangle = hn::Set(d, static_cast<double>(frame.triangle));
-    const auto placed = hn::Set(d, static_cast<double>(s.candidates[c]));
+    const auto triangleRef = hn::Set(d, static_cast<double>(s.candidates[c]));
     for (std::size_t at = 0; at < Lanes; at += kStep) {
       const auto found =
           locateLanes(d, frame,
@@ -157,7 +158,7 @@ HWY_INLINE void settle(Search<Lanes>& s) {
       };
       keep(s.squared, found.squared);
       keep(s.triangle, triangle);
-      keep(s.place, placed);
+      keep(s.triangleRef, triangleRef);
       keep(s.height, found.height);
       for (int side = 0; side < 3; ++side) keep(s.side[side], found.side[side]);
       keep(s.inside, found.inside);
@@ -166,7 +167,7 @@ HWY_INLINE void settle(Search<Lanes>& s) {
   s.count = 0;
 }
 
-/// For points too far for float: every triangle is a candidate.
+/// The search for points that exceed the range of float: every triangle is a candidate.
 template <int Lanes>
 void tryAll(Search<Lanes>& s) {
   const auto& blocks = s.hierarchy.blocks();
@@ -187,25 +188,26 @@ HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
   return false;
 }
 
-/// Brings what is needed next into the cache while other work goes on.
+/// Prefetches an object that is probably needed next into the cache.
 template <class T>
-HWY_INLINE void fetch(const T* what) {
-  for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(what) + line);
+HWY_INLINE void prefetch(const T* object) {
+  for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(object) + line);
 }
 
-HWY_INLINE void fetchChild(const Node* nodes, const Block* blocks, std::uint32_t child) {
+HWY_INLINE void prefetchChild(const Node* nodes, const Block* blocks, std::uint32_t child) {
   static_assert(sizeof(Node) == sizeof(Block));
-  fetch(child & kBlockBit ? reinterpret_cast<const Node*>(blocks + (child & ~kBlockBit)) : nodes + child);
+  prefetch(child & kBlockBit ? reinterpret_cast<const Node*>(blocks + (child & ~kBlockBit)) : nodes + child);
 }
 
-/// Children that wait for their visit, those of one node farthest first, so that the nearest comes off next.
+/// The children that the traversal still has to visit. Those of one node are pushed farthest first, so that the nearest
+/// is popped next.
 template <class Entry>
 class Stack {
  public:
   bool empty() const { return top_ == 0; }
   const Entry& pop() { return entries_[--top_]; }
 
-  /// Room for four entries more, of which `grow` lets the first `count` stay.
+  /// Space for four entries above the top. The caller fills it and keeps the first `count` of them by `grow(count)`.
   Entry* room() { return entries_.data() + top_; }
   void grow(int count) { top_ += count; }
 
@@ -214,19 +216,20 @@ class Stack {
   std::size_t top_ = 0;
 };
 
-/// Where four children go in a stack's room: by descending key, and behind those in reach what is not (key < 0).
-/// Comparing all with all takes no branch, of which most would be mispredicted.
-HWY_INLINE std::array<int, kWidth> placesOf(const float* key) {
+/// The rank of each of four children by descending key; children out of reach have a negative key and come last. All
+/// pairs are compared without branches, most of which would be mispredicted.
+HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
              over31 = key[3] > key[1], over32 = key[3] > key[2];
   return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
-/// Visits the seeds and then what is within reach when its turn comes; settles the search.
+/// Traverses the hierarchy: visits the seeds, then every node and block that is still within reach when it is popped,
+/// and settles the remaining candidates.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
-HWY_INLINE void walk(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode, const VisitBlock& visitBlock,
-                     const InReach& inReach) {
+HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode,
+                         const VisitBlock& visitBlock, const InReach& inReach) {
   for (int i = 0; i < s.seeds; ++i) visitBlock(s.seed[i]);
   for (std::uint32_t current = 0;;) {
     if (!(current & kBlockBit))
@@ -243,7 +246,8 @@ HWY_INLINE void walk(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& vis
   }
 }
 
-struct Waiting {
+/// A child of a node and the lower bound of its squared distance to the point.
+struct Pending {
   float lower;
   std::uint32_t child;
 };
@@ -255,10 +259,10 @@ void runOne(Search<1>& s) {
   const Block* blocks = s.hierarchy.blocks().data();
   const Point<hn::Vec<decltype(d)>> point{hn::Set(d, s.point[0][0]), hn::Set(d, s.point[1][0]),
                                           hn::Set(d, s.point[2][0])};
-  Stack<Waiting> stack;
+  Stack<Pending> stack;
   HWY_ALIGN float lower[kWidth];
-  const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
-    const Block& block = blocks[place];
+  const auto visitBlock = [&](std::uint32_t blockIndex) HWY_ATTR {
+    const Block& block = blocks[blockIndex];
     HWY_ALIGN float limit[kWidth];
     for (std::size_t at = 0; at < kWidth; at += kStep) {
       const auto bounds = triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, block.field[f] + at); });
@@ -270,34 +274,35 @@ void runOne(Search<1>& s) {
       if (!(lower[i] <= s.limit[0])) continue;
       s.limit[0] = std::min(s.limit[0], limit[i]);
       s.lower[s.count][0] = lower[i];
-      s.candidates[s.count++] = place * kWidth + i;
+      s.candidates[s.count++] = blockIndex * kWidth + i;
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
     for (std::size_t at = 0; at < kWidth; at += kStep)
       hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Load(d, node.field[f] + at); }), d, lower + at);
-    Waiting* const room = stack.room();
+    Pending* const room = stack.room();
     int hits = 0;
     for (float& key : lower) {
       hits += key <= s.limit[0];
       key = key <= s.limit[0] ? key : -1;
     }
-    const std::array<int, kWidth> places = placesOf(lower);
-    for (int child = 0; child < kWidth; ++child) room[places[child]] = {lower[child], node.child[child]};
+    const std::array<int, kWidth> ranks = ranksOf(lower);
+    for (int child = 0; child < kWidth; ++child) room[ranks[child]] = {lower[child], node.child[child]};
     stack.grow(hits);
   };
-  walk(s, stack, visitNode, visitBlock, [&](const Waiting& next) HWY_ATTR { return next.lower <= s.limit[0]; });
+  traverse(s, stack, visitNode, visitBlock, [&](const Pending& next) HWY_ATTR { return next.lower <= s.limit[0]; });
 }
 
 using PacketTag = hn::CappedTag<float, kPacket>;
 constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
 
-struct PacketWaiting {
+/// A child of a node and the lower bounds of its squared distances to the points of a packet.
+struct PendingOfPacket {
   alignas(32) float lower[kPacket];
   std::uint32_t child;
 };
 
-/// The least of the lower bounds that are within their limit; -1 if none is.
+/// The least lower bound among those within their limit; -1 if none is.
 HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
   const auto none = hn::Set(d, kOutOfReach);
   auto all = none;
@@ -309,78 +314,96 @@ HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limi
   return hn::GetLane(hn::IfThenElse(all < none, all, hn::Set(d, -1.0f)));
 }
 
+/// The arrays of a hierarchy as pointers that stay in registers during the search.
+struct Arrays {
+  explicit Arrays(const Hierarchy& hierarchy)
+      : nodes(hierarchy.nodes().data()), blocks(hierarchy.blocks().data()), frames(hierarchy.frames().data()) {}
+
+  const Node* nodes;
+  const Block* blocks;
+  const TriangleFrame* frames;
+};
+
+using PacketPoint = Point<hn::Vec<PacketTag>>;
+
+HWY_INLINE PacketPoint pointAt(PacketTag d, const Search<kPacket>& s, std::size_t at) {
+  return {hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
+}
+
+/// Adds the triangles of a block that may be nearest to any of the points to the candidates. All triangles are computed
+/// before any is rejected, without branches, because the outcome is hard to predict.
+HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std::uint32_t blockIndex) {
+  const PacketTag d;
+  const Block& block = arrays.blocks[blockIndex];
+  HWY_ALIGN float lower[kWidth][kPacket];
+  for (std::size_t at = 0; at < kPacket; at += kLanes) {
+    const PacketPoint point = pointAt(d, s, at);
+    auto upper = hn::Set(d, kOutOfReach);
+    HWY_UNROLL(4)
+    for (int i = 0; i < kWidth; ++i) {
+      const auto bounds = triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
+      hn::Store(bounds.lower, d, lower[i] + at);
+      upper = hn::Min(upper, bounds.upper);
+    }
+    hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, upper, s.delta)), d, s.limit + at);
+  }
+  if (s.count + kWidth > s.kCapacity) settle(s);
+  for (std::uint32_t i = 0; i < kWidth; ++i) {
+    std::copy_n(lower[i], kPacket, s.lower[s.count]);
+    s.candidates[s.count] = blockIndex * kWidth + i;
+    const bool kept = anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
+    s.count += kept;
+    prefetch(arrays.frames + block.first + (kept ? i : 0));
+  }
+}
+
+/// Pushes the children of a node that are within reach of any of the points.
+HWY_INLINE void visitNodeOfPacket(const Search<kPacket>& s, const Arrays& arrays, const Node& node,
+                                  Stack<PendingOfPacket>& stack) {
+  const PacketTag d;
+  HWY_ALIGN float lower[kWidth][kPacket];
+  for (std::size_t at = 0; at < kPacket; at += kLanes) {
+    const PacketPoint point = pointAt(d, s, at);
+    HWY_UNROLL(4)
+    for (int child = 0; child < kWidth; ++child)
+      hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); }), d,
+                lower[child] + at);
+  }
+  float key[kWidth];
+  HWY_UNROLL(4)
+  for (int child = 0; child < kWidth; ++child) key[child] = leastInReach(d, lower[child], s.limit);
+  PendingOfPacket* const room = stack.room();
+  const std::array<int, kWidth> ranks = ranksOf(key);
+  int hits = 0;
+  HWY_UNROLL(4)
+  for (int child = 0; child < kWidth; ++child) {
+    PendingOfPacket& pending = room[ranks[child]];
+    std::copy_n(lower[child], kPacket, pending.lower);
+    pending.child = node.child[child];
+    const bool hit = key[child] >= 0;
+    hits += hit;
+    prefetchChild(arrays.nodes, arrays.blocks, hit ? node.child[child] : 0);
+  }
+  stack.grow(hits);
+}
+
 void runPacket(Search<kPacket>& s) {
   if (s.tooFar) return tryAll(s);
-  const PacketTag d;
-  using V = hn::Vec<PacketTag>;
-  const Node* nodes = s.hierarchy.nodes().data();
-  const Block* blocks = s.hierarchy.blocks().data();
-  const TriangleFrame* frames = s.hierarchy.frames().data();
-  Stack<PacketWaiting> stack;
-  const auto pointAt = [&](std::size_t at) HWY_ATTR {
-    return Point<V>{hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
-  };
-  // All is computed first, and without branches: what comes out is hard to predict.
-  const auto visitBlock = [&](std::uint32_t place) HWY_ATTR {
-    const Block& block = blocks[place];
-    HWY_ALIGN float lower[kWidth][kPacket];
-    for (std::size_t at = 0; at < kPacket; at += kLanes) {
-      const Point<V> point = pointAt(at);
-      auto upper = hn::Set(d, kOutOfReach);
-      HWY_UNROLL(4)
-      for (int i = 0; i < kWidth; ++i) {
-        const auto bounds = triangleDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, block.field[f][i]); });
-        hn::Store(bounds.lower, d, lower[i] + at);
-        upper = hn::Min(upper, bounds.upper);
-      }
-      hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, upper, s.delta)), d, s.limit + at);
-    }
-    if (s.count + kWidth > s.kCapacity) settle(s);
-    for (std::uint32_t i = 0; i < kWidth; ++i) {
-      std::copy_n(lower[i], kPacket, s.lower[s.count]);
-      s.candidates[s.count] = place * kWidth + i;
-      const bool kept = anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
-      s.count += kept;
-      fetch(frames + block.first + (kept ? i : 0));
-    }
-  };
-  const auto visitNode = [&](const Node& node) HWY_ATTR {
-    HWY_ALIGN float lower[kWidth][kPacket];
-    for (std::size_t at = 0; at < kPacket; at += kLanes) {
-      const Point<V> point = pointAt(at);
-      HWY_UNROLL(4)
-      for (int child = 0; child < kWidth; ++child)
-        hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); }), d,
-                  lower[child] + at);
-    }
-    float key[kWidth];
-    HWY_UNROLL(4)
-    for (int child = 0; child < kWidth; ++child) key[child] = leastInReach(d, lower[child], s.limit);
-    PacketWaiting* const room = stack.room();
-    const std::array<int, kWidth> places = placesOf(key);
-    int hits = 0;
-    HWY_UNROLL(4)
-    for (int child = 0; child < kWidth; ++child) {
-      PacketWaiting& waiting = room[places[child]];
-      std::copy_n(lower[child], kPacket, waiting.lower);
-      waiting.child = node.child[child];
-      const bool hit = key[child] >= 0;
-      hits += hit;
-      fetchChild(nodes, blocks, hit ? node.child[child] : 0);
-    }
-    stack.grow(hits);
-  };
-  walk(s, stack, visitNode, visitBlock,
-       [&](const PacketWaiting& next) HWY_ATTR { return anyInReach<kPacket>(next.lower, s.limit); });
+  const Arrays arrays(s.hierarchy);
+  Stack<PendingOfPacket> stack;
+  traverse(
+      s, stack, [&](const Node& node) HWY_ATTR { visitNodeOfPacket(s, arrays, node, stack); },
+      [&](std::uint32_t blockIndex) HWY_ATTR { visitBlockOfPacket(s, arrays, blockIndex); },
+      [&](const PendingOfPacket& next) HWY_ATTR { return anyInReach<kPacket>(next.lower, s.limit); });
 }
 
 }  // namespace
 }  // namespace HWY_NAMESPACE
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 
 HWY_EXPORT(runOne);
 HWY_EXPORT(runPacket);
@@ -394,13 +417,13 @@ Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x) {
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest) {
   Search<kPacket> search(hierarchy, points);
-  for (const Nearest& start : nearest) search.addSeed(start.place);
+  for (const Nearest& start : nearest) search.addSeed(start.triangleRef);
   run(search);
   for (int lane = 0; lane < kPacket; ++lane) nearest[lane] = search.result(lane);
 }
 
 std::string_view instructionSet() {
-  // lower bits are better sets
+  // Highway numbers better instruction sets by lower bits.
   return hwy::TargetName(static_cast<std::int64_t>(
       std::uint64_t{1} << std::countr_zero(static_cast<std::uint64_t>(hwy::SupportedTargets() & HWY_TARGETS))));
 }
@@ -411,40 +434,40 @@ void run(Search<kPacket>& search) { HWY_DYNAMIC_DISPATCH(runPacket)(search); }
 template <int Lanes>
 Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& points) : hierarchy(tree) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  double reach = 1;
+  double largest = 1;
   for (int lane = 0; lane < Lanes; ++lane) {
     const Vector3 local = hierarchy.local(points[lane]);
     for (int axis = 0; axis < 3; ++axis) {
       exact[axis][lane] = points[lane][axis];
       point[axis][lane] = static_cast<float>(local[axis]);
-      tooFar |= !(std::abs(local[axis]) < 1e15);  // also for NaN, which `reach` passes over
-      reach = std::max(reach, std::abs(local[axis]));
+      tooFar |= !(std::abs(local[axis]) < 1e15);  // This is also true for NaN, which std::max ignores.
+      largest = std::max(largest, std::abs(local[axis]));
     }
     limit[lane] = kOutOfReach;
     squared[lane] = kInfinity;
     triangle[lane] = kInfinity;
   }
-  delta = 32 * std::numeric_limits<float>::epsilon() * static_cast<float>(reach);
+  delta = 32 * std::numeric_limits<float>::epsilon() * static_cast<float>(largest);
 }
 
 template <int Lanes>
-void Search<Lanes>::addSeed(std::uint32_t near) {
-  const std::uint32_t block = near / kWidth;
+void Search<Lanes>::addSeed(std::uint32_t seedRef) {
+  const std::uint32_t block = seedRef / kWidth;
   if (std::find(seed.begin(), seed.begin() + seeds, block) == seed.begin() + seeds) seed[seeds++] = block;
 }
 
 template <int Lanes>
 Nearest Search<Lanes>::result(int lane) const {
-  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // a point that is not finite
+  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // The point is not finite.
     const TriangleFrame& frame = hierarchy.frameAt(0);
     return {0, locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane]))};
   }
-  return {static_cast<std::uint32_t>(place[lane]),
+  return {static_cast<std::uint32_t>(triangleRef[lane]),
           {height[lane], {side[0][lane], side[1][lane], side[2][lane]}, inside[lane] != 0}};
 }
 
 template struct Search<1>;
 template struct Search<kPacket>;
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh
 #endif

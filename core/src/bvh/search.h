@@ -1,6 +1,7 @@
 #pragma once
-// A search for nearest triangles, vectorised: it walks the hierarchy in float, collects the triangles that may be the
-// nearest, and measures those in double, in the same operations on every instruction set.
+// The SIMD search for nearest triangles. It traverses the hierarchy in single precision, collects the triangles that
+// may be the nearest as candidates, and measures those in double precision by the same operations on every instruction
+// set.
 
 #include <array>
 #include <cstdint>
@@ -8,39 +9,40 @@
 
 #include "bvh/hierarchy.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 
-/// `Lanes` points on their way through the hierarchy. Squares of float are of distances in the hierarchy's coordinates.
+/// State of the search for the nearest triangles of `Lanes` points. Single-precision distances are in the hierarchy's
+/// local coordinates and squared.
 template <int Lanes>
 struct Search {
-  static constexpr int kCapacity = 96;  ///< candidates between two settlements
+  static constexpr int kCapacity = 96;  ///< most candidates that wait for `settle`
 
   Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
-  /// A place whose block, probably near, is to be visited first.
-  void addSeed(std::uint32_t near);
+  /// Visits the block of a triangle that is probably near before all others: a tight bound from the start.
+  void addSeed(std::uint32_t triangleRef);
 
-  /// Lane by lane: the nearest triangle.
+  /// The nearest triangle of the point in a lane, once `run` has finished.
   Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
-  bool tooFar = false;  ///< float coordinates or their squares would overflow: all triangles are tried
+  bool tooFar = false;  ///< single precision would overflow, so that all triangles are candidates
 
-  alignas(64) float point[3][Lanes];
-  alignas(64) float limit[Lanes];  ///< squares above are out of reach
-  float delta;                     ///< bounds what rounding does to a distance
-  int seeds = 0;
-  std::array<std::uint32_t, Lanes> seed;  ///< blocks to visit first, once each
+  alignas(64) float point[3][Lanes];      ///< the points in local coordinates
+  alignas(64) float limit[Lanes];         ///< squared distance above which nothing can be nearest
+  float delta;                            ///< bound of the rounding error of a distance
+  int seeds = 0;                          ///< number of blocks in `seed`
+  std::array<std::uint32_t, Lanes> seed;  ///< distinct blocks to visit first
 
-  int count = 0;
-  std::array<std::uint32_t, kCapacity> candidates;  ///< places
-  alignas(64) float lower[kCapacity][Lanes];        ///< of each candidate: bound of its squared distance
+  int count = 0;                                    ///< number of candidates
+  std::array<std::uint32_t, kCapacity> candidates;  ///< triangle references
+  alignas(64) float lower[kCapacity][Lanes];        ///< lower bounds of the candidates' squared distances
 
-  // in double: the points, and what is best among the candidates settled so far
+  // Double precision, in mesh units: the points, and the nearest triangle of each among the settled candidates.
   alignas(64) double exact[3][Lanes];
   alignas(64) double squared[Lanes];
   alignas(64) double triangle[Lanes];  ///< index in the mesh
-  alignas(64) double place[Lanes];
+  alignas(64) double triangleRef[Lanes];
   alignas(64) double height[Lanes];
   alignas(64) double side[3][Lanes];
   alignas(64) double inside[Lanes];  ///< 1 or 0
@@ -49,19 +51,19 @@ struct Search {
 extern template struct Search<1>;
 extern template struct Search<kPacket>;
 
-/// Runs the search by the best instruction set at hand.
+/// Runs the search with the best instruction set of this processor.
 void run(Search<1>& search);
 void run(Search<kPacket>& search);
 
 /// The triangle nearest to x.
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 
-/// The same for `kPacket` points that lie close together, by one search. `nearest` on entry: triangles to start from,
-/// such as the results for points nearby.
+/// The nearest triangles of a packet of points that lie close to each other, by one search. On entry `nearest` holds
+/// triangles to start from, such as the results for neighbouring points; on return it holds the results.
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest);
 
-/// The one in use, such as "AVX2".
+/// The name of the instruction set in use, such as "AVX2".
 std::string_view instructionSet();
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

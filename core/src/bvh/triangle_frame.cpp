@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 namespace {
 
 double inverseSquare(double squaredLength) {
@@ -35,9 +35,9 @@ TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t tri
   frame.origin = a;
   frame.length = base.norm();
   frame.along = frame.length > 0 ? Vector3(base / frame.length) : Vector3::UnitX();
-  // The cross product is exact for faces along the axes. Of a sliver it may lean along the base by more than a
-  // rounding: taken out before and after scaling. Leaning across the base, it moves no point of the triangle by more
-  // than that.
+  // The cross product is exact for triangles parallel to two axes. For a sliver it may have a component along the base
+  // that exceeds a rounding; it is removed before and after scaling. An error across the base moves no point of the
+  // triangle by more than a rounding.
   const auto withoutBase = [&](const Vector3& v) -> Vector3 { return v - frame.along * frame.along.dot(v); };
   const Vector3 normal = withoutBase(frame.along.cross(apex));
   const double height = normal.norm();
@@ -53,4 +53,4 @@ TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t tri
   return frame;
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

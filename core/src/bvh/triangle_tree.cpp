@@ -8,21 +8,22 @@
 
 #include "bvh/float_box.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::bvh {
 namespace {
 
 constexpr std::uint32_t kLeafSize = kWidth;
 constexpr int kBins = 16;
-constexpr float kNarrowest = 1e-30f;  ///< extents below would give bins no width
+constexpr float kNarrowest = 1e-30f;  ///< smallest extent of centers that bins can divide
 
-/// Below this level nodes are halved by count, so that no input makes the tree deeper than kMaxLevel + 32 levels
-/// (2^32 triangles, each level at least halves a range).
+/// From this level on ranges are halved by count, so that no input makes the tree deeper than kMaxLevel + 32 levels:
+/// each further level at least halves a range of at most 2^32 triangles.
 constexpr int kMaxLevel = 32;
 
-constexpr std::uint32_t kSamples = 1024;                           ///< of a range, enough to choose where to split it
-constexpr float kNoPart = std::numeric_limits<float>::infinity();  ///< cost of one without triangles
-constexpr std::uint32_t kWorthATask = 4096;                        // triangles
+constexpr std::uint32_t kSamples = 1024;                              ///< triangles of a range that choose the split
+constexpr float kEmptyCost = std::numeric_limits<float>::infinity();  ///< cost of a part without triangles
+constexpr std::uint32_t kParallel = 4096;  ///< triangles above which the children are built in parallel
 
+/// A triangle's box and index.
 struct Item {
   FloatBox box;
   std::uint32_t triangle;
@@ -30,6 +31,7 @@ struct Item {
   Eigen::Array4f doubledCenter() const { return box.lower + box.upper; }
 };
 
+/// A range of items, with the box of their boxes and the box of their doubled centers.
 struct Range {
   std::uint32_t begin = 0, end = 0;
   FloatBox box = {};
@@ -42,7 +44,7 @@ struct Range {
   }
 };
 
-/// Where the centers of a range lie, as numbers from 0 to `count` along each axis.
+/// Maps the centers of a range to numbers from 0 to `count` along each axis.
 struct Bins {
   explicit Bins(const Range& range)
       : count(static_cast<int>(std::clamp<std::uint32_t>(range.size() / 2, 4, kBins))), origin(range.centers.lower) {
@@ -56,8 +58,8 @@ struct Bins {
   Eigen::Array4f origin, perUnit;
 };
 
-/// Top-down: a node's range is split where the surface-area heuristic is least, then the part of largest area again,
-/// until there are four.
+/// Builds a tree top-down. A node's range is split where the surface-area heuristic is least, and then the part of the
+/// largest area is split again until there are four parts.
 class Builder {
  public:
   explicit Builder(std::vector<Item>& items) : items_(items) {}
@@ -77,19 +79,19 @@ class Builder {
     ranges[0] = whole;
     branch->count = divide(ranges, level);
     const auto buildPart = [&](int i) {
-      Branch::Part& part = branch->parts[i];
-      part.begin = ranges[i].begin;
-      part.end = ranges[i].end;
-      if (ranges[i].size() > kLeafSize) part.branch = build(ranges[i], level + 1);
+      Branch::Child& child = branch->children[i];
+      child.begin = ranges[i].begin;
+      child.end = ranges[i].end;
+      if (ranges[i].size() > kLeafSize) child.branch = build(ranges[i], level + 1);
     };
-    if (whole.size() > kWorthATask)
+    if (whole.size() > kParallel)
       tbb::parallel_for(0, branch->count, buildPart);
     else
       for (int i = 0; i < branch->count; ++i) buildPart(i);
     return branch;
   }
 
-  /// The number of parts that `parts[0]` now is in.
+  /// Divides `parts[0]` into up to kWidth parts and returns their number.
   int divide(std::array<Range, kWidth>& parts, int level) {
     int count = 1;
     while (count < kWidth) {
@@ -144,10 +146,10 @@ class Builder {
       box.extend(other.box);
       count += other.count;
     }
-    float cost() const { return count > 0 ? box.area() * static_cast<float>(count) : kNoPart; }
+    float cost() const { return count > 0 ? box.area() * static_cast<float>(count) : kEmptyCost; }
   };
 
-  /// Axis, and the first bin of the upper part; 0 where all centers share one bin.
+  /// The axis and the first bin of the upper part at the best split; bin 0 where all centers share one bin.
   std::pair<int, int> bestCut(const Range& range, const Bins& bins) const {
     Bin filled[3][kBins];
     const std::uint32_t step = 1 + range.size() / kSamples;
@@ -162,7 +164,7 @@ class Builder {
     float bestCost = std::numeric_limits<float>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       if (bins.perUnit[axis] == 0) continue;
-      std::array<float, kBins> above;  // cost of the part from a bin on
+      std::array<float, kBins> above;  // cost of the part that begins at a bin
       Bin part;
       for (int bin = bins.count - 1; bin > 0; --bin) {
         part.extend(filled[axis][bin]);
@@ -203,4 +205,4 @@ TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points,
   return tree;
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::bvh

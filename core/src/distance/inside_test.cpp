@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,111 +13,126 @@
 #include <vector>
 
 #include "mesh/directed_edges.h"
-#include "mesh/face_sets.h"
+#include "mesh/disjoint_sets.h"
 #include "surface/crossings.h"
 
 namespace hpsdf::distance {
 namespace {
 
-constexpr int kLattice = 16;  // places along each axis
-/// Of coordinates of order 1: of two triangles nearer than that, distances may round to be the same.
+using bvh::Hierarchy;
+using sign::BoundaryEdges;
+using sign::Pseudonormals;
+using sign::WindingSign;
+
+constexpr int kLattice = 16;  // points along each axis
+/// Distance, for coordinates of order 1, of two triangles to which the distances from a point may round to the same.
 constexpr double kTooNear = 0x1p-44;
-/// Of the sum of an edge's unit normals, the angle between its faces: above a face, beside such an edge, the product
-/// that decides is half its square, which is to be far above what rounds.
+/// Least length of a pseudonormal. At an edge it is the angle between the two faces. The dot product that decides the
+/// sign beside such an edge is half the square of the angle, which has to be far above rounding errors.
 constexpr double kSharp = 1e-6;
 
-/// Whether an open mesh has an inside at any place of a lattice, which reaches beyond it, for it may be flat.
-bool surroundsAny(const Inside& inside, const Box& mesh) {
+/// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the box, which may be
+/// flat.
+bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
   const Box box(mesh.min() - beyond, mesh.max() + beyond);
-  std::vector<Vector3> places;
   const Vector3 size = box.sizes();
-  for (int z = 0; z < kLattice; ++z)
-    for (int y = 0; y < kLattice; ++y)
-      for (int x = 0; x < kLattice; ++x)
-        places.push_back(box.min() + size.cwiseProduct((Vector3(x, y, z) + Vector3::Constant(0.5)) / kLattice));
-  return std::ranges::count(inside.contains(places), 1) > 0;
+  std::atomic<bool> any = false;
+  tbb::parallel_for(0, kLattice * kLattice * kLattice, [&](int i) {
+    const Vector3 index(i % kLattice, i / kLattice % kLattice, i / (kLattice * kLattice));
+    if (!any && winding.isInside(box.min() + size.cwiseProduct((index + Vector3::Constant(0.5)) / kLattice)))
+      any = true;
+  });
+  return any;
 }
 
-/// The greatest triangle of each piece of the surface, by their slots.
-std::vector<std::uint32_t> greatestOfPieces(const Hierarchy& hierarchy, const std::vector<Side>& sides) {
+/// Returns the slot of the largest triangle of each component that is connected by edges of two consistent triangles.
+std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
+                                               const std::vector<mesh::DirectedEdge>& sides) {
   const auto frames = hierarchy.frames();
-  FaceSets pieces(frames.size());
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    if (edge.size() == 2 && edge[0].rising != edge[1].rising) pieces.join(edge[0].face, edge[1].face);
+  mesh::DisjointSets components(frames.size());
+  mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> edge) {
+    if (edge.size() == 2 && edge[0].rising != edge[1].rising) components.join(edge[0].face, edge[1].face);
   });
   const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
-  std::vector<std::uint32_t> greatest(frames.size());
+  std::vector<std::uint32_t> largest(frames.size());  // by the lowest slot of the component, which comes first
   for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
-    const std::uint32_t first = pieces.first(slot);  // no later than this one
-    if (first == slot || area(slot) > area(greatest[first])) greatest[first] = slot;
+    const std::uint32_t first = components.first(slot);
+    if (first == slot || area(slot) > area(largest[first])) largest[first] = slot;
   }
   std::vector<std::uint32_t> slots;
   for (std::uint32_t slot = 0; slot < frames.size(); ++slot)
-    if (pieces.first(slot) == slot) slots.push_back(greatest[slot]);
+    if (components.first(slot) == slot) slots.push_back(largest[slot]);
   return slots;
 }
 
-/// A place on a piece of the surface that has not the outside before it and the inside behind it.
-std::optional<Vector3> misplaced(const Hierarchy& hierarchy, const std::vector<std::uint32_t>& pieces,
-                                 const Inside& inside) {
-  std::vector<char> wrong(pieces.size());
-  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) { wrong[i] = !inside.boundsInside(pieces[i]); });
-  const auto first = std::ranges::find(wrong, 1);
-  if (first == wrong.end()) return std::nullopt;
-  return hierarchy.frames()[pieces[std::size_t(first - wrong.begin())]].origin;
+/// Returns the lowest of `count` indices for which test(index) holds, if there is one. Tests them in parallel.
+template <typename Test>
+std::optional<std::size_t> firstWhere(std::size_t count, const Test& test) {
+  std::vector<char> holds(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { holds[i] = test(i); });
+  const auto first = std::ranges::find(holds, 1);
+  if (first == holds.end()) return std::nullopt;
+  return static_cast<std::size_t>(first - holds.begin());
 }
 
-/// The first corner where the pseudonormal of it, or of the edge from there, is next to nothing.
-std::optional<Vector3> tooSharp(const Hierarchy& hierarchy, const Pseudonormals& normals) {
-  const auto triangles = hierarchy.triangles();
-  std::vector<char> sharp(triangles.size());
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t slot) {
-    for (std::uint32_t k = 0; k < 3; ++k)
-      sharp[slot] |= normals.ofVertex(triangles[slot][k]).norm() < kSharp ||
-                     normals.ofEdge(hierarchy, static_cast<std::uint32_t>(slot), k).norm() < kSharp;
-  });
-  const auto first = std::ranges::find(sharp, 1);
-  if (first == sharp.end()) return std::nullopt;
-  return hierarchy.frames()[std::size_t(first - sharp.begin())].origin;
+/// Returns true if the pseudonormal of a vertex or edge of a triangle is dominated by rounding errors.
+bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot) {
+  bool sharp = false;
+  for (std::uint32_t k = 0; k < 3; ++k)
+    sharp |= normals.ofVertex(hierarchy.triangles()[slot][k]).norm() < kSharp ||
+             normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
+  return sharp;
 }
 
 }  // namespace
 
 ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
-  const auto byWinding = [](std::string reason, std::optional<Vector3> place, Inside inside) {
-    return ChosenInsideTest{.choice = {InsideTest::winding, std::move(reason), place}, .inside = std::move(inside)};
+  const auto byWinding = [](std::string reason, std::optional<Vector3> position, WindingSign winding) {
+    return ChosenInsideTest{.choice = {InsideTest::winding, std::move(reason), position},
+                            .winding = std::move(winding)};
   };
-  const std::vector<Side> sides = sidesByEdge(hierarchy.triangles());
-  BoundaryEdges rims(hierarchy, sides);
-  if (const std::size_t open = rims.size(); open > 0) {
-    Inside inside(hierarchy, mesh, std::move(rims));
-    std::string reason = std::to_string(open) + (open == 1 ? " edge has" : " edges have");
-    reason += " a side without a neighbour, and ";
-    reason += surroundsAny(inside, boundingBox(mesh))
+  const auto frames = hierarchy.frames();
+
+  // Holes need the winding number.
+  const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(hierarchy.triangles());
+  BoundaryEdges edges(hierarchy, sides);
+  if (const std::size_t unbalanced = edges.size(); unbalanced > 0) {
+    WindingSign winding(hierarchy, mesh, std::move(edges));
+    std::string reason = std::to_string(unbalanced);
+    reason += unbalanced == 1 ? " edge is" : " edges are";
+    reason += " unbalanced (holes or reversed faces), and ";
+    reason += enclosesAnyPoint(winding, boundingBox(mesh))
                   ? "holes are closed where the winding number is 1/2"
-                  : "the faces surround nothing that was found: a shell would give them a thickness";
-    return byWinding(std::move(reason), std::nullopt, std::move(inside));
+                  : "the faces enclose nothing: a shell would give them a thickness";
+    return byWinding(std::move(reason), std::nullopt, std::move(winding));
   }
-  // All that follows is about what rounds: normals would then speak of another surface.
-  const auto thin = std::ranges::find_if_not(hierarchy.frames(), hasArea);
-  if (thin != hierarchy.frames().end())
-    return byWinding("a face is thinner than what coordinates round", thin->origin,
-                     Inside(hierarchy, mesh, std::move(rims)));
-  const Crossings crossings = findCrossings(hierarchy, 1, kTooNear, progress);
+
+  // Rounding errors, and surfaces nearer than these, would make pseudonormals those of another surface.
+  const auto thin = std::ranges::find_if_not(frames, bvh::hasArea);
+  if (thin != frames.end())
+    return byWinding("a face is thinner than the rounding errors of its corners", thin->origin,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+  const Crossings crossings = surface::findCrossings(hierarchy, 1, kTooNear, progress);
   if (!crossings.found.empty())
-    return byWinding("the mesh meets itself, so that normals may mislead", crossings.found[0].place,
-                     Inside(hierarchy, mesh, std::move(rims)));
-  const std::vector<std::uint32_t> pieces = greatestOfPieces(hierarchy, sides);
-  if (pieces.size() > 1) {
-    Inside inside(hierarchy, mesh, std::move(rims));
-    if (const auto place = misplaced(hierarchy, pieces, inside))
-      return byWinding("a part looks the wrong way, or lies within another", place, std::move(inside));
+    return byWinding("the mesh intersects itself, so that normals may mislead", crossings.found[0].position,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+
+  // Components must be nested and oriented like solids and their cavities.
+  const std::vector<std::uint32_t> largest = largestOfComponents(hierarchy, sides);
+  if (largest.size() > 1) {
+    WindingSign winding(hierarchy, mesh, std::move(edges));
+    const auto isWrong = [&](std::size_t i) { return !winding.separatesOutsideFromInside(largest[i]); };
+    if (const auto wrong = firstWhere(largest.size(), isWrong))
+      return byWinding("a component is oriented the wrong way, or lies within another", frames[largest[*wrong]].origin,
+                       std::move(winding));
   }
   Pseudonormals normals(hierarchy);
-  if (const auto place = tooSharp(hierarchy, normals))
-    return byWinding("an edge or corner is too sharp for normals", place, Inside(hierarchy, mesh, std::move(rims)));
-  return {.choice = {InsideTest::pseudonormal, "the mesh has no holes and does not meet itself"},
+  const auto tooSharp = [&](std::size_t slot) { return isSharp(hierarchy, normals, static_cast<std::uint32_t>(slot)); };
+  if (const auto sharp = firstWhere(frames.size(), tooSharp))
+    return byWinding("an edge or corner is too sharp for normals", frames[*sharp].origin,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+  return {.choice = {InsideTest::pseudonormal, "the mesh has no holes and does not intersect itself"},
           .normals = std::move(normals)};
 }
 

@@ -4,27 +4,28 @@
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"
 #include "hpsdf/triangle_mesh.h"
-#include "sign/inside.h"
 #include "sign/pseudonormals.h"
+#include "sign/winding_sign.h"
 
 namespace hpsdf::distance {
 
-/// A choice with what gives that sign; the other is empty.
+/// A choice of inside test with the data that it needs; the data of the other test are empty.
 struct ChosenInsideTest {
   InsideTestChoice choice;
-  Inside inside = {};
-  Pseudonormals normals = {};
+  sign::WindingSign winding = {};
+  sign::Pseudonormals normals = {};
 };
 
-/// Which sign suits a mesh: the pseudonormal's where it is certain to be that of the winding number, which is cheaper
-/// to trust than to ask.
+/// Chooses pseudonormals where their sign is certain to be that of the winding number, which is more expensive.
 ///
-/// It is certain (Bærentzen & Aanæs 2005) of a mesh that has no rim and does not meet itself, nor come so near itself
-/// that distances round to the same, if every piece of its surface has the outside before it and the inside behind it,
-/// and no edge or corner is so sharp that its pseudonormal is rounding. Pieces are what hangs together by edges of two
-/// faces: along one of them neither changes.
+/// It is certain (Bærentzen & Aanæs 2005) if
+/// * every edge is balanced, so that the mesh has no holes;
+/// * the mesh neither intersects itself nor comes so near itself that distances to two triangles may round to the same;
+/// * each component, connected by edges of two consistent triangles, has the outside in front and the inside behind it,
+///   which one triangle tells for all of it;
+/// * no edge or vertex is so sharp that its pseudonormal is dominated by rounding errors.
 ///
 /// Throws `Cancelled`.
-ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress);
+ChosenInsideTest chooseInsideTest(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress);
 
 }  // namespace hpsdf::distance

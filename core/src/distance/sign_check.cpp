@@ -13,10 +13,10 @@
 namespace hpsdf {
 namespace {
 
-constexpr std::size_t kTogether = 16;  // places of one piece of work
+constexpr std::size_t kChunk = 16;  // points of one parallel task
 
-/// Even numbers in a box, odd ones beside a triangle.
-Vector3 placeOf(const TriangleMesh& mesh, const Box& box, Random random, std::size_t number) {
+/// Returns the random point with a number: even numbers lie in the box, odd ones beside a triangle.
+Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
   if (number % 2 == 0) return random.inBox(box);
   const auto count = static_cast<double>(mesh.triangles.size());
   const auto& [a, b, c] = mesh.triangles[static_cast<std::size_t>(random.unit() * count)];
@@ -26,18 +26,18 @@ Vector3 placeOf(const TriangleMesh& mesh, const Box& box, Random random, std::si
   return foot + random.inBall(0.01 * box.sizes().maxCoeff());
 }
 
-/// Of some of the places; the same in whatever order they are added.
+/// Counts over a set of points. The sum of several tallies does not depend on their order.
 struct Tally {
   std::size_t tooNear = 0;
   std::size_t wrong = 0;
-  double depth = 0;       ///< of the wrong ones, the greatest
-  std::size_t worst = 0;  ///< the number of the first that is so deep
+  double worstDistance = 0;  ///< greatest distance of a wrong point
+  std::size_t worst = 0;     ///< lowest number of a wrong point at that distance
 
   void add(const Tally& other) {
     tooNear += other.tooNear;
     wrong += other.wrong;
-    if (other.depth < depth || (other.depth == depth && other.worst >= worst)) return;
-    depth = other.depth;
+    if (other.worstDistance < worstDistance || (other.worstDistance == worstDistance && other.worst >= worst)) return;
+    worstDistance = other.worstDistance;
     worst = other.worst;
   }
 };
@@ -45,41 +45,41 @@ struct Tally {
 }  // namespace
 
 double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
-  distance::AngleSum angles;
+  sign::AngleSum angles;
   for (const auto& [a, b, c] : mesh.triangles)
-    addHalfAngle(mesh.vertices[a] - x, mesh.vertices[b] - x, mesh.vertices[c] - x, angles);
+    addHalfSolidAngle(mesh.vertices[a] - x, mesh.vertices[b] - x, mesh.vertices[c] - x, angles);
   return angles.value() / (2 * std::numbers::pi);
 }
 
-SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std::size_t places, std::uint64_t seed,
+SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std::size_t points, std::uint64_t seed,
                     const Progress& progress) {
   const MeshReport report = inspect(mesh);
-  const double level = report.unbalancedEdges == 0 && report.volume < 0 ? -0.5 : 0.5;  // of one that looks inwards
+  const double level = report.unbalancedEdges == 0 && report.volume < 0 ? -0.5 : 0.5;  // -0.5 if oriented inward
   const Box& surface = distance.source().box;
   const double size = surface.sizes().maxCoeff();
   const Vector3 beyond = Vector3::Constant(0.1 * size);
   const Box box(surface.min() - beyond, surface.max() + beyond);
-  SignCheck check{.places = places, .nearest = 1e-6 * size};
+  SignCheck check{.points = points, .tolerance = 1e-6 * size};
   Tally all;
   std::mutex adding;
-  forEachChunk(places, kTogether, progress, "asking all triangles",
-               [&](std::size_t, std::size_t first, std::size_t count) {
-                 Tally tally;
-                 for (std::size_t i = first; i < first + count; ++i) {
-                   const Vector3 place = placeOf(mesh, box, Random(seed, i), i);
-                   const double found = distance(place), away = std::abs(found);
-                   if (!(away > check.nearest))
-                     tally.add({.tooNear = 1});
-                   else if ((found < 0) != (windingNumber(mesh, place) > level))
-                     tally.add({.wrong = 1, .depth = away, .worst = i});
-                 }
-                 const std::lock_guard lock(adding);
-                 all.add(tally);
-               });
+  detail::forEachChunk(points, kChunk, progress, "summing winding numbers",
+                       [&](std::size_t, std::size_t first, std::size_t count) {
+                         Tally tally;
+                         for (std::size_t i = first; i < first + count; ++i) {
+                           const Vector3 x = randomPoint(mesh, box, detail::Random(seed, i), i);
+                           const double found = distance(x), away = std::abs(found);
+                           if (!(away > check.tolerance))
+                             tally.add({.tooNear = 1});
+                           else if ((found < 0) != (windingNumber(mesh, x) > level))
+                             tally.add({.wrong = 1, .worstDistance = away, .worst = i});
+                         }
+                         const std::lock_guard lock(adding);
+                         all.add(tally);
+                       });
   check.tooNear = all.tooNear;
   check.wrong = all.wrong;
-  check.depth = all.depth;
-  if (all.wrong > 0) check.worst = placeOf(mesh, box, Random(seed, all.worst), all.worst);
+  check.worstDistance = all.worstDistance;
+  if (all.wrong > 0) check.worst = randomPoint(mesh, box, detail::Random(seed, all.worst), all.worst);
   return check;
 }
 

@@ -1,35 +1,52 @@
 #pragma once
-// How much a cell's error counts, and what it adds up to.
+// The weights of the cells' errors, their totals and the goal of a construction.
 
 #include <algorithm>
 #include <cmath>
 
 #include "hpsdf/build_options.h"
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
-/// κ, by the mean of a cell's field (paper, eq. 10).
+/// The weight κ of a cell, by the mean of its field (paper, eq. 10).
 struct Nearness {
   NearnessKind kind = NearnessKind::polynomial;
   double exponent = 0;  ///< θ
-  double diagonal = 1;  ///< d, of the domain
+  double diagonal = 1;  ///< d, length of the domain's diagonal
+
+  Nearness() = default;
+  Nearness(NearnessKind theKind, double theExponent, double theDiagonal)
+      : kind(theKind), exponent(theExponent), diagonal(theDiagonal) {}
+  Nearness(const BuildOptions& settings, const Box& domain)
+      : Nearness(settings.nearnessKind, settings.nearness, domain.diagonal().norm()) {}
 
   double weight(double mean) const {
-    const double away = std::abs(mean) / diagonal;
-    if (kind == NearnessKind::exponential) return std::exp(-exponent * away);
-    return std::pow(std::clamp(1 - away, 0.0, 1.0), exponent);
+    const double distance = std::abs(mean) / diagonal;
+    if (kind == NearnessKind::exponential) return std::exp(-exponent * distance);
+    return std::pow(std::clamp(1 - distance, 0.0, 1.0), exponent);
+  }
+
+  void becomeExponential(double theta) {
+    kind = NearnessKind::exponential;
+    exponent = theta;
+  }
+  /// False for a kind that a damaged file holds.
+  bool isKnown() const { return kind <= NearnessKind::exponential; }
+  void storeIn(BuildOptions& settings) const {
+    settings.nearness = exponent;
+    settings.nearnessKind = kind;
   }
 };
 
-/// What a cell adds to the totals: nothing where it lies outside the narrow band.
+/// The contribution of a cell to the totals: nothing where it lies outside the narrow band.
 struct CellError {
-  double weighted = 0;  ///< ε*_e, by nearness
-  double squared = 0;   ///< ε_e
+  double weighted = 0;  ///< ε*_e: the squared error times κ, in units^5
+  double squared = 0;   ///< ε_e, in units^5
   double volume = 0;
-  bool near = false;  ///< the cell may hold points near the surface, see `BuildOptions::nearError`
+  bool near = false;  ///< the cell may hold points near the surface, see `NearFarError::nearDistance`
 };
 
-/// Over all leaves.
+/// Sums over all leaves, in units^5 and units^3.
 struct ErrorTotals {
   double weighted = 0;
   double nearSquared = 0, nearVolume = 0;
@@ -42,10 +59,10 @@ struct ErrorTotals {
   }
 };
 
-/// What the construction is to reach; all lengths in the field's own units.
+/// The errors at which the construction ends, in the field's own units.
 struct ErrorGoal {
-  double weighted = 0;                   ///< τ; ignored where near and far are asked for
-  double nearSquare = 0, farSquare = 0;  ///< mean squares asked for; 0: no such goal
+  double weighted = 0;                   ///< τ in units^5; 0 where errors by distance are asked for
+  double nearSquare = 0, farSquare = 0;  ///< mean squares to reach, in units^2; 0: not asked for
 
   bool byDistance() const { return nearSquare > 0; }
   bool nearReached(const ErrorTotals& totals) const { return totals.nearSquared <= nearSquare * totals.nearVolume; }
@@ -53,9 +70,9 @@ struct ErrorGoal {
   bool reached(const ErrorTotals& totals) const {
     return byDistance() ? nearReached(totals) && farReached(totals) : totals.weighted <= weighted;
   }
-  /// All squares times a factor.
+  /// The goal with all squares multiplied by a factor.
   ErrorGoal times(double factor) const { return {weighted * factor, nearSquare * factor, farSquare * factor}; }
-  /// Where totals times a factor are above it, those.
+  /// The goal raised to the totals times a factor, where these are above it.
   ErrorGoal relaxedTo(const ErrorTotals& totals, double factor) const {
     if (!byDistance()) return {std::max(weighted, totals.weighted * factor), 0, 0};
     const auto meanSquare = [](double squared, double volume) { return volume > 0 ? squared / volume : 0; };
@@ -64,4 +81,4 @@ struct ErrorGoal {
   }
 };
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

@@ -6,28 +6,29 @@
 #include <span>
 #include <vector>
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// One triangle's side, filed under its undirected edge.
-struct Side {
-  std::uint64_t edge;  ///< lower vertex in the high half, higher vertex in the low half
-  std::uint32_t face;
-  bool rising;  ///< runs from the lower to the higher vertex
+/// One edge of one triangle, with its direction.
+struct DirectedEdge {
+  std::uint64_t edge;  ///< key of the undirected edge: lower vertex in the high half, higher vertex in the low half
+  std::uint32_t face;  ///< index of the triangle
+  bool rising;         ///< the direction is from the lower to the higher vertex
 
   std::uint32_t low() const { return static_cast<std::uint32_t>(edge >> 32); }
   std::uint32_t high() const { return static_cast<std::uint32_t>(edge); }
 };
 
-/// All sides but those between equal vertices, those of one edge side by side, by their faces.
-std::vector<Side> sidesByEdge(std::span<const std::array<std::uint32_t, 3>> triangles);
+/// The directed edges of all triangles, sorted by undirected edge and then by face. Edges between equal vertices are
+/// left out.
+std::vector<DirectedEdge> directedEdgesOf(std::span<const std::array<std::uint32_t, 3>> triangles);
 
-/// Of sides by edge: calls visit(those of one edge) for each edge.
+/// Calls visit(directed edges of one undirected edge) for each undirected edge of a list that is sorted by edge.
 template <typename Visit>
-void forEachEdge(std::span<const Side> sides, const Visit& visit) {
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
-    while (end < sides.size() && sides[end].edge == sides[begin].edge) ++end;
-    visit(sides.subspan(begin, end - begin));
+void forEachEdge(std::span<const DirectedEdge> edges, const Visit& visit) {
+  for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+    while (end < edges.size() && edges[end].edge == edges[begin].edge) ++end;
+    visit(edges.subspan(begin, end - begin));
   }
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -5,202 +5,218 @@
 #include <cstdlib>
 
 #include "mesh/directed_edges.h"
-#include "mesh/face_sets.h"
+#include "mesh/disjoint_sets.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-Triangle sorted(Triangle corners) {
-  std::ranges::sort(corners);
-  return corners;
+Triangle sorted(Triangle t) {
+  std::ranges::sort(t);
+  return t;
 }
 
-/// Whether the corners are an even number of swaps from being sorted.
+/// Returns true if an even number of exchanges sorts the corners. Triangles with the same corners have the same
+/// orientation if both are even or both are odd.
 bool isEven(const Triangle& t) { return (t[0] < t[1]) == ((t[1] < t[2]) == (t[0] < t[2])); }
 
-/// Faces over the same corners.
+/// The triangles with the same three corners.
 struct Group {
-  std::uint32_t first;     ///< of all
-  std::uint32_t opposite;  ///< the first that looks the other way than that, or `first`
-  int along = 1;           ///< so many look as the first does,
-  int against = 0;         ///< so many the other way
+  std::uint32_t first;          ///< the lowest triangle
+  std::uint32_t firstReversed;  ///< the lowest triangle oriented opposite to `first`, or `first` if there is none
+  int same = 1;                 ///< number of triangles with the orientation of `first`
+  int reversed = 0;             ///< number of triangles with the opposite orientation
 
-  bool looksBothWays() const { return against > 0; }
-  std::uint32_t kept() const { return against > along ? opposite : first; }
-  int excess() const { return std::abs(along - against); }  ///< so many more look as the kept one does
+  bool hasBothOrientations() const { return reversed > 0; }
+  /// The first triangle with the more frequent orientation.
+  std::uint32_t representative() const { return reversed > same ? firstReversed : first; }
+  /// How many more triangles have the representative's orientation than the opposite one.
+  int excess() const { return std::abs(same - reversed); }
 };
 
 struct Groups {
   std::vector<Group> all;
-  std::vector<std::uint32_t> of;  ///< each face's
-  std::vector<Side> sides;        ///< of those that are kept, by edge; `Side::face` is the group
+  std::vector<std::uint32_t> groupOf;  ///< the group of each triangle
+  std::vector<DirectedEdge> edges;     ///< those of the representatives; `DirectedEdge::face` is the group
 };
 
+/// Groups triangles by their corners. The edges are left out where no two triangles have the same corners.
 Groups groupsOf(std::span<const Triangle> triangles) {
-  std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // the corners sorted, and the face
+  std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // sorted corners, and the triangle
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
     const auto [a, b, c] = sorted(triangles[f]);
     order[f] = {a, b, c, f};
   }
   std::ranges::sort(order);
-  Groups groups{.all = {}, .of = std::vector<std::uint32_t>(triangles.size()), .sides = {}};
+  Groups groups{.all = {}, .groupOf = std::vector<std::uint32_t>(triangles.size()), .edges = {}};
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint32_t f = order[i][3];
     if (i == 0 || !std::equal(order[i].begin(), order[i].begin() + 3, order[i - 1].begin())) {
-      groups.all.push_back({.first = f, .opposite = f});
+      groups.all.push_back({.first = f, .firstReversed = f});
     } else {
       Group& group = groups.all.back();
       const bool agrees = isEven(triangles[f]) == isEven(triangles[group.first]);
-      if (!agrees && !group.looksBothWays()) group.opposite = f;
-      ++(agrees ? group.along : group.against);
+      if (!agrees && !group.hasBothOrientations()) group.firstReversed = f;
+      ++(agrees ? group.same : group.reversed);
     }
-    groups.of[f] = static_cast<std::uint32_t>(groups.all.size() - 1);
+    groups.groupOf[f] = static_cast<std::uint32_t>(groups.all.size() - 1);
   }
   if (groups.all.size() == triangles.size()) return groups;
-  std::vector<Triangle> kept;
-  for (const Group& group : groups.all) kept.push_back(triangles[group.kept()]);
-  groups.sides = sidesByEdge(kept);
+  std::vector<Triangle> representatives;
+  for (const Group& group : groups.all) representatives.push_back(triangles[group.representative()]);
+  groups.edges = directedEdgesOf(representatives);
   return groups;
 }
 
-/// Calls visit(a set of these groups, the sides there) for each edge that one of some groups has, 1 in `chosen`.
+/// Calls visit(set, directed edges there) for each edge of a chosen group, whose entry in `chosen` is 1; `set` is the
+/// set of the first chosen group at the edge.
 template <typename Visit>
-void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, FaceSets& sets, const Visit& visit) {
-  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
-    const auto first = std::ranges::find_if(edge, [&](const Side& side) { return chosen[side.face]; });
+void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, DisjointSets& sets, const Visit& visit) {
+  forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
+    const auto first = std::ranges::find_if(edge, [&](const DirectedEdge& e) { return chosen[e.face]; });
     if (first != edge.end()) visit(sets.first(first->face), edge);
   });
 }
 
-/// Sets of some groups that hang together by edges, each by its lowest group.
-FaceSets setsOf(const Groups& groups, const std::vector<char>& chosen) {
-  FaceSets sets(groups.all.size());
-  forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const Side> edge) {
-    for (const Side& side : edge)
-      if (chosen[side.face]) sets.join(set, side.face);
+/// The sets of chosen groups that are connected by edges.
+DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen) {
+  DisjointSets sets(groups.all.size());
+  forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
+    for (const DirectedEdge& e : edge)
+      if (chosen[e.face]) sets.join(set, e.face);
   });
   return sets;
 }
 
-int insideTestOf(const Side& side) { return side.rising ? 1 : -1; }
+/// The contribution of a directed edge to the balance of its edge, which is 0 where as many triangles run along it in
+/// one direction as in the other.
+int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
-/// Of each group: whether it is of a wall.
+/// Marks the groups that are shared walls. A connected set of groups with both orientations is one if other triangles
+/// surround it and balance its edges, counted once for each group or with all their duplicates.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
-  for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].looksBothWays();
-  FaceSets sets = setsOf(groups, both);
-  struct Around {
-    bool others = false;                       // faces that look one way only, along the set's edges
-    bool unbalanced = false, asGiven = false;  // those, of each group one; and all of them
+  for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();
+  DisjointSets sets = connectedSets(groups, both);
+  struct Surroundings {
+    bool exist = false;                   // A group with one orientation has an edge in common with the set.
+    bool unbalanced = false;              // Some edge is unbalanced by one triangle of each such group.
+    bool unbalancedByDuplicates = false;  // Some edge is unbalanced by all triangles of such groups.
   };
-  std::vector<Around> around(groups.all.size());
-  forEachEdgeOf(groups, both, sets, [&](std::uint32_t set, std::span<const Side> edge) {
-    int balance = 0, asGiven = 0;
-    for (const Side& side : edge) {
-      if (both[side.face]) continue;
-      around[set].others = true;
-      balance += insideTestOf(side);
-      asGiven += insideTestOf(side) * groups.all[side.face].excess();
+  std::vector<Surroundings> surroundings(groups.all.size());
+  forEachEdgeOf(groups, both, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
+    int balance = 0, withDuplicates = 0;
+    for (const DirectedEdge& e : edge) {
+      if (both[e.face]) continue;
+      surroundings[set].exist = true;
+      balance += direction(e);
+      withDuplicates += direction(e) * groups.all[e.face].excess();
     }
-    around[set].unbalanced |= balance != 0;
-    around[set].asGiven |= asGiven != 0;
+    surroundings[set].unbalanced |= balance != 0;
+    surroundings[set].unbalancedByDuplicates |= withDuplicates != 0;
   });
   std::vector<char> walls(groups.all.size());
   for (std::uint32_t g = 0; g < walls.size(); ++g) {
-    const Around& here = around[sets.first(g)];
-    walls[g] = both[g] && here.others && !(here.unbalanced && here.asGiven);
+    const Surroundings& here = surroundings[sets.first(g)];
+    walls[g] = both[g] && here.exist && !(here.unbalanced && here.unbalancedByDuplicates);
   }
   return walls;
 }
 
-/// How many faces of a group stay.
-struct Stay {
-  int asKept = 1;  ///< of those that look as the kept one does
-  int turned = 0;  ///< of the others
+/// How many triangles of a group stay.
+struct Kept {
+  int same = 1;      ///< triangles with the representative's orientation
+  int reversed = 0;  ///< triangles with the opposite orientation
 
-  int excess() const { return asKept - turned; }
+  int excess() const { return same - reversed; }
 };
 
-/// Of several faces of a group drops those without which fewer edges are unbalanced, from the outlines of what is too
-/// many inwards.
-void dropStrays(const Groups& groups, const std::vector<char>& several, std::vector<Stay>& stay) {
-  std::vector<int> balances;                                         // of each edge
-  std::vector<std::array<std::size_t, 3>> edges(groups.all.size());  // of each group
-  std::vector<std::array<int, 3>> signs(groups.all.size());
+/// Drops triangles of groups in `several` as long as that leaves fewer edges unbalanced, so that
+/// such sets shrink from their outline inwards.
+void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& several, std::vector<Kept>& kept) {
+  // Number the edges, and compute the balance of each.
+  std::vector<int> balances;
+  std::vector<std::array<std::size_t, 3>> edgesOfGroup(groups.all.size());
+  std::vector<std::array<int, 3>> directions(groups.all.size());
   std::vector<std::uint8_t> count(groups.all.size());
-  forEachEdge(groups.sides, [&](std::span<const Side> edge) {
+  forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
     int balance = 0;
-    for (const Side& side : edge) {
-      balance += insideTestOf(side) * stay[side.face].excess();
-      edges[side.face][count[side.face]] = balances.size();
-      signs[side.face][count[side.face]++] = insideTestOf(side);
+    for (const DirectedEdge& e : edge) {
+      balance += direction(e) * kept[e.face].excess();
+      edgesOfGroup[e.face][count[e.face]] = balances.size();
+      directions[e.face][count[e.face]++] = direction(e);
     }
     balances.push_back(balance);
   });
-  const auto drops = [&](std::size_t g) {
+
+  const auto dropOne = [&](std::size_t g) {
     int fewer = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const int balance = balances[edges[g][k]];
-      fewer += int(balance != 0) - int(balance != signs[g][k]);
+      const int balance = balances[edgesOfGroup[g][k]];
+      fewer += int(balance != 0) - int(balance != directions[g][k]);
     }
     if (fewer <= 0) return false;
-    for (std::size_t k = 0; k < 3; ++k) balances[edges[g][k]] -= signs[g][k];
-    --stay[g].asKept;
+    for (std::size_t k = 0; k < 3; ++k) balances[edgesOfGroup[g][k]] -= directions[g][k];
+    --kept[g].same;
     return true;
   };
-  for (bool any = true; any;) {  // each time fewer edges are unbalanced
+  // Each round but the last leaves fewer edges unbalanced, so that this ends.
+  for (bool any = true; any;) {
     any = false;
     for (std::size_t g = 0; g < groups.all.size(); ++g)
-      while (several[g] && stay[g].asKept > 1 && drops(g)) any = true;
+      while (several[g] && kept[g].same > 1 && dropOne(g)) any = true;
   }
 }
 
-/// One of each group, or one each way; but where bodies share them that look the same way there, all but strays: where
-/// with one more edges would be unbalanced.
-std::vector<Stay> stayOf(const Groups& groups, const std::vector<char>& walls) {
+/// The triangles of each group that stay: at least one, or one of each orientation in a wall. Connected groups with
+/// more triangles keep them all, except unbalancing duplicates, where more edges would be unbalanced otherwise: bodies
+/// share them.
+std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
+  // Find the groups with more triangles than necessary, and drop unbalancing duplicates from them.
   std::vector<char> several(groups.all.size());
-  std::vector<Stay> least(groups.all.size()), stay(groups.all.size());
+  std::vector<Kept> least(groups.all.size()), kept(groups.all.size());
   for (std::uint32_t g = 0; g < several.size(); ++g) {
     const Group& group = groups.all[g];
-    const auto [fewer, more] = std::minmax(group.along, group.against);
-    several[g] = walls[g] ? group.along + group.against > 2 : !group.looksBothWays() && group.along > 1;
+    const auto [fewer, more] = std::minmax(group.same, group.reversed);
+    several[g] = walls[g] ? group.same + group.reversed > 2 : !group.hasBothOrientations() && group.same > 1;
     least[g] = {1, walls[g]};
-    stay[g] = several[g] ? Stay{more, fewer} : least[g];
+    kept[g] = several[g] ? Kept{more, fewer} : least[g];
   }
-  dropStrays(groups, several, stay);
-  FaceSets sets = setsOf(groups, several);
-  std::vector<int> lost(groups.all.size());  // edges
-  forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const Side> edge) {
+  dropUnbalancingDuplicates(groups, several, kept);
+
+  // Reduce connected groups to the least where that unbalances no more edges than it balances.
+  DisjointSets sets = connectedSets(groups, several);
+  std::vector<int> unbalancedByLeast(groups.all.size());
+  forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
     int withLeast = 0, balance = 0;
-    for (const Side& side : edge) {
-      withLeast += insideTestOf(side) * least[side.face].excess();
-      balance += insideTestOf(side) * stay[side.face].excess();
+    for (const DirectedEdge& e : edge) {
+      withLeast += direction(e) * least[e.face].excess();
+      balance += direction(e) * kept[e.face].excess();
     }
-    lost[set] += int(withLeast != 0) - int(balance != 0);
+    unbalancedByLeast[set] += int(withLeast != 0) - int(balance != 0);
   });
-  for (std::uint32_t g = 0; g < stay.size(); ++g)
-    if (lost[sets.first(g)] <= 0) stay[g] = least[g];
-  return stay;
+  for (std::uint32_t g = 0; g < kept.size(); ++g)
+    if (unbalancedByLeast[sets.first(g)] <= 0) kept[g] = least[g];
+  return kept;
 }
 
 }  // namespace
 
-bool areTwins(const Triangle& one, const Triangle& other) { return sorted(one) == sorted(other); }
+bool haveSameCorners(const Triangle& one, const Triangle& other) { return sorted(one) == sorted(other); }
 
-std::vector<char> superfluousFaces(std::span<const Triangle> triangles) {
+std::vector<char> redundantFaces(std::span<const Triangle> triangles) {
   const Groups groups = groupsOf(triangles);
   if (groups.all.size() == triangles.size()) return std::vector<char>(triangles.size());
-  const std::vector<Stay> stay = stayOf(groups, wallsOf(groups));
-  std::vector<Stay> seen(groups.all.size(), Stay{0, 0});
-  std::vector<char> superfluous(triangles.size());
+  const std::vector<Kept> kept = keptOf(groups, wallsOf(groups));
+  std::vector<Kept> seen(groups.all.size(), Kept{0, 0});
+  std::vector<char> redundant(triangles.size());
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
-    const std::uint32_t g = groups.of[f];
-    const bool asKept = isEven(triangles[f]) == isEven(triangles[groups.all[g].kept()]);
-    superfluous[f] = asKept ? seen[g].asKept++ >= stay[g].asKept : seen[g].turned++ >= stay[g].turned;
+    const std::uint32_t g = groups.groupOf[f];
+    const bool agrees = isEven(triangles[f]) == isEven(triangles[groups.all[g].representative()]);
+    redundant[f] = agrees ? seen[g].same++ >= kept[g].same : seen[g].reversed++ >= kept[g].reversed;
   }
-  return superfluous;
+  return redundant;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -5,21 +5,21 @@
 #include <span>
 #include <vector>
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// Over the same corners, whichever way they look.
-bool areTwins(const std::array<std::uint32_t, 3>& one, const std::array<std::uint32_t, 3>& other);
+/// Returns true for triangles with the same corners, whatever their orientation.
+bool haveSameCorners(const std::array<std::uint32_t, 3>& one, const std::array<std::uint32_t, 3>& other);
 
-/// Which of the faces over the same corners are too many, of each 1.
+/// Marks the triangles to drop, with 1, where several triangles have the same corners.
 ///
-/// One stays of those that look the same way, unless bodies share them: then all without which along fewer edges as
-/// many sides would run one way as the other. What is given once more besides is dropped, from its outline inwards.
-/// Where they look both ways, they are
-/// - the wall between two bodies that touch, where the faces around them hold each other's edges without them: one each
-///   way stays, so that each body is closed;
-/// - otherwise a surface given with both its sides, as programs for drawing do: one stays that looks the way of most,
-///   the first where these are as many.
-/// What hangs together by edges is one or the other.
-std::vector<char> superfluousFaces(std::span<const std::array<std::uint32_t, 3>> triangles);
+/// Where all of them have one orientation, one stays. More stay where bodies share them, so that dropping them would
+/// leave more edges unbalanced; of these, duplicates that unbalance edges are dropped.
+///
+/// Where both orientations occur, the triangles that are connected by edges are one of two things:
+/// - a shared wall, if the surrounding triangles balance its edges without it. One triangle of each orientation stays,
+///   so that each body is closed;
+/// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle stays: the first with
+///   the more frequent orientation.
+std::vector<char> redundantFaces(std::span<const std::array<std::uint32_t, 3>> triangles);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

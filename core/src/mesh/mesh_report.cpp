@@ -2,16 +2,19 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "mesh/directed_edges.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/duplicates.h"
-#include "mesh/face_sets.h"
 #include "mesh/patches.h"
 
 namespace hpsdf {
 namespace {
+
+using mesh::DirectedEdge;
 
 std::size_t countUsedVertices(const TriangleMesh& mesh) {
   std::vector<bool> used(mesh.vertices.size(), false);
@@ -20,61 +23,66 @@ std::size_t countUsedVertices(const TriangleMesh& mesh) {
   return static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
 }
 
-/// Which corner of a triangle a vertex is, numbered through all triangles.
+/// The defect of an edge, if it has one.
+std::optional<DefectKind> defectOf(std::span<const DirectedEdge> edge) {
+  if (edge.size() == 1) return DefectKind::boundaryEdge;
+  if (edge.size() > 2) return DefectKind::nonManifoldEdge;
+  if (edge[0].rising == edge[1].rising) return DefectKind::inconsistentEdge;
+  return std::nullopt;
+}
+
+void addEdges(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std::vector<Defect>& found) {
+  mesh::forEachEdge(edges, [&](std::span<const DirectedEdge> edge) {
+    if (const auto kind = defectOf(edge))
+      found.push_back({*kind,
+                       {edge.front().face, edge.back().face},
+                       {mesh.vertices[edge.front().low()], mesh.vertices[edge.front().high()]}});
+  });
+}
+
+/// The number of a triangle's corner at a vertex; the corners of all triangles are numbered consecutively.
 std::uint32_t cornerOf(const TriangleMesh& mesh, std::uint32_t face, std::uint32_t vertex) {
   const auto& triangle = mesh.triangles[face];
   return 3 * face + static_cast<std::uint32_t>(std::ranges::find(triangle, vertex) - triangle.begin());
 }
 
-void addEdges(const TriangleMesh& mesh, std::span<const Side> sides, std::vector<Defect>& found) {
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    const auto add = [&](DefectKind kind) {
-      found.push_back({kind,
-                       {edge.front().face, edge.back().face},
-                       {mesh.vertices[edge.front().low()], mesh.vertices[edge.front().high()]}});
-    };
-    if (edge.size() == 1)
-      add(DefectKind::boundaryEdge);
-    else if (edge.size() > 2)
-      add(DefectKind::nonManifoldEdge);
-    else if (edge[0].rising == edge[1].rising)
-      add(DefectKind::inconsistentEdge);
-  });
-}
-
-/// Corners of one vertex belong to one fan where their triangles share an edge there.
-void addPinched(const TriangleMesh& mesh, std::span<const Side> sides, std::vector<Defect>& found) {
-  FaceSets fans(3 * mesh.triangles.size());
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    for (const Side& side : edge.subspan(1))
+/// Adds the vertices at which more than one fan of triangles meets. Corners of one vertex are in one fan where their
+/// triangles share an edge there.
+void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std::vector<Defect>& found) {
+  // Join corners into fans.
+  mesh::DisjointSets fans(3 * mesh.triangles.size());
+  mesh::forEachEdge(edges, [&](std::span<const DirectedEdge> edge) {
+    for (const DirectedEdge& other : edge.subspan(1))
       for (const std::uint32_t vertex : {edge.front().low(), edge.front().high()})
-        fans.join(cornerOf(mesh, edge.front().face, vertex), cornerOf(mesh, side.face, vertex));
+        fans.join(cornerOf(mesh, edge.front().face, vertex), cornerOf(mesh, other.face, vertex));
   });
+
+  // Find a corner of a second fan at each vertex.
   constexpr std::uint32_t kNone = 0xffffffff;
-  struct Fans {
-    std::uint32_t first = kNone, other = kNone;  // a corner of each
+  struct Corners {
+    std::uint32_t first = kNone, ofOtherFan = kNone;
   };
-  std::vector<Fans> at(mesh.vertices.size());
+  std::vector<Corners> cornersAt(mesh.vertices.size());
   for (std::uint32_t corner = 0; corner < 3 * mesh.triangles.size(); ++corner) {
-    Fans& here = at[mesh.triangles[corner / 3][corner % 3]];
+    Corners& here = cornersAt[mesh.triangles[corner / 3][corner % 3]];
     if (here.first == kNone)
       here.first = corner;
-    else if (here.other == kNone && fans.first(corner) != fans.first(here.first))
-      here.other = corner;
+    else if (here.ofOtherFan == kNone && fans.first(corner) != fans.first(here.first))
+      here.ofOtherFan = corner;
   }
-  for (std::size_t v = 0; v < at.size(); ++v)
-    if (at[v].other != kNone)
-      found.push_back(
-          {DefectKind::pinchedVertex, {at[v].first / 3, at[v].other / 3}, {mesh.vertices[v], mesh.vertices[v]}});
+  for (std::size_t v = 0; v < cornersAt.size(); ++v)
+    if (const auto [first, other] = cornersAt[v]; other != kNone)
+      found.push_back({DefectKind::pinchedVertex, {first / 3, other / 3}, {mesh.vertices[v], mesh.vertices[v]}});
 }
 
-/// How many are of triangles of one part, but for walls.
-std::size_t foldsAmong(const TriangleMesh& mesh, std::span<const Side> sides, const Crossings& crossings) {
+/// The number of crossings of two triangles of one component, without those of shared walls.
+std::size_t countFolds(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, const Crossings& crossings) {
   if (crossings.found.empty()) return 0;
-  FaceSets parts = partsOf(mesh.triangles.size(), sides);
+  mesh::DisjointSets components = mesh::componentsOf(mesh.triangles.size(), edges);
   return static_cast<std::size_t>(std::ranges::count_if(crossings.found, [&](const Crossing& crossing) {
     const auto [one, other] = crossing.triangles;
-    return parts.first(one) == parts.first(other) && !areTwins(mesh.triangles[one], mesh.triangles[other]);
+    return components.first(one) == components.first(other) &&
+           !mesh::haveSameCorners(mesh.triangles[one], mesh.triangles[other]);
   }));
 }
 
@@ -89,41 +97,34 @@ MeshReport inspect(const TriangleMesh& mesh) {
   report.area = surfaceArea(mesh);
   report.box = boundingBox(mesh);
 
-  const std::vector<Side> sides = sidesByEdge(mesh.triangles);
-  report.parts = partsOf(mesh.triangles.size(), sides).count();
-  forEachEdge(sides, [&](std::span<const Side> edge) {
-    if (2 * std::ranges::count(edge, true, &Side::rising) != std::ssize(edge)) ++report.unbalancedEdges;
-    switch (edge.size()) {
-      case 1:
-        ++report.boundaryEdges;
-        break;
-      case 2:
-        if (edge[0].rising == edge[1].rising) ++report.inconsistentEdges;
-        break;
-      default:
-        ++report.nonManifoldEdges;
-    }
+  const std::vector<DirectedEdge> edges = mesh::directedEdgesOf(mesh.triangles);
+  report.components = mesh::componentsOf(mesh.triangles.size(), edges).count();
+  mesh::forEachEdge(edges, [&](std::span<const DirectedEdge> edge) {
+    if (2 * std::ranges::count(edge, true, &DirectedEdge::rising) != std::ssize(edge)) ++report.unbalancedEdges;
+    const std::optional<DefectKind> defect = defectOf(edge);
+    report.boundaryEdges += defect == DefectKind::boundaryEdge;
+    report.nonManifoldEdges += defect == DefectKind::nonManifoldEdge;
+    report.inconsistentEdges += defect == DefectKind::inconsistentEdge;
   });
   return report;
 }
 
-std::span<const Defect> MeshDefects::of(DefectKind kind) const {
+std::span<const Defect> MeshDefects::ofKind(DefectKind kind) const {
   const auto first = std::ranges::lower_bound(found, kind, {}, &Defect::kind);
   return {first, count(kind)};
 }
 
 MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings) {
   requireValidIndices(mesh);
-  const std::vector<Side> sides = sidesByEdge(mesh.triangles);
+  const std::vector<DirectedEdge> edges = mesh::directedEdgesOf(mesh.triangles);
   MeshDefects defects;
-  defects.allCrossings = crossings.all;
-  defects.orientable = std::ranges::count(patchesOf(mesh.triangles.size(), sides).oneSided, 1) == 0;
-  addEdges(mesh, sides, defects.found);
-  addPinched(mesh, sides, defects.found);
-
-  defects.crossingsWithinParts = foldsAmong(mesh, sides, crossings);
+  defects.allCrossings = crossings.complete;
+  defects.orientable = std::ranges::count(mesh::patchesOf(mesh.triangles.size(), edges).oneSided, 1) == 0;
+  defects.crossingsWithinComponents = countFolds(mesh, edges, crossings);
+  addEdges(mesh, edges, defects.found);
+  addPinchedVertices(mesh, edges, defects.found);
   for (const Crossing& crossing : crossings.found)
-    defects.found.push_back({DefectKind::crossing, crossing.triangles, {crossing.place, crossing.place}});
+    defects.found.push_back({DefectKind::crossing, crossing.triangles, {crossing.position, crossing.position}});
   std::ranges::stable_sort(defects.found, {}, &Defect::kind);
   for (const Defect& defect : defects.found) ++defects.counts[static_cast<std::size_t>(defect.kind)];
   return defects;

@@ -6,23 +6,24 @@
 #include <vector>
 
 #include "mesh/directed_edges.h"
-#include "mesh/face_sets.h"
+#include "mesh/disjoint_sets.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// The parts of a surface: what hangs together by edges of however many faces. `sides`: by edge, of so many faces.
-FaceSets partsOf(std::size_t faces, std::span<const Side> sides);
+/// The components of a surface: sets of triangles that are connected by edges of any number of triangles. `edges` are
+/// the directed edges of `faces` triangles, sorted by edge.
+DisjointSets componentsOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
-/// The patches of a surface: what hangs together by edges of exactly two faces. Within one, faces can be turned until
-/// all look the same way, unless it is one-sided, as a Möbius strip is.
+/// The patches of a surface: sets of triangles that are connected by edges of exactly two triangles. The triangles of a
+/// patch can be reversed until all agree in orientation, unless the patch is one-sided, as a Möbius strip is.
 struct Patches {
   std::size_t count = 0;
-  std::vector<std::uint32_t> of;  ///< each face's, numbered by their lowest faces
-  std::vector<char> against;      ///< 1 for faces that look the other way than their patch's lowest face
-  std::vector<char> oneSided;     ///< 1 for patches whose faces cannot be made to agree
+  std::vector<std::uint32_t> patchOf;  ///< the patch of each triangle; patches are numbered by their lowest triangles
+  std::vector<char> against;           ///< 1 for triangles oriented opposite to their patch's lowest triangle
+  std::vector<char> oneSided;          ///< 1 for patches that have no consistent orientation
 };
 
-/// `sides`: by edge, of so many faces.
-Patches patchesOf(std::size_t faces, std::span<const Side> sides);
+/// `edges` are the directed edges of `faces` triangles, sorted by edge.
+Patches patchesOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

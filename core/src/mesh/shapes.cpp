@@ -12,14 +12,15 @@
 #include <utility>
 
 #include "hpsdf/detail/nearest_name.h"
+#include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::shapes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kShortest = 1e-3;  // lengths: far enough apart for all parts of a shape to stay exact in double
-constexpr double kLongest = 1e3;
+// Lengths between these limits differ little enough for all parts of a shape to be accurate in double precision.
+constexpr double kShortest = 1e-3, kLongest = 1e3;
 
 Parameter length(std::string name, double defaultValue, std::string help) {
   return {std::move(name), defaultValue, kShortest, kLongest, false, std::move(help)};
@@ -34,7 +35,8 @@ const std::vector<Shape>& shapeList() {
   static const std::vector<Shape> list = {
       {"sphere",
        "an icosahedron subdivided towards a sphere",
-       {length("radius", 1, "radius"), count("subdivisions", 6, 0, 9, "each makes four faces of one, from 20")},
+       {length("radius", 1, "radius"),
+        count("subdivisions", 6, 0, 9, "times that each of 20 faces is divided into four")},
        true},
       {"torus",
        "a ring around the axis z",
@@ -51,32 +53,34 @@ const std::vector<Shape>& shapeList() {
       {"gear",
        "a spur gear with a bore, along the axis z",
        {count("teeth", 12, 3, 500, "number of teeth"), length("radius", 1, "outer radius, at the tips"),
-        length("tooth-depth", 0.22, "from the tips down to the roots"), length("hole", 0.3, "radius of the bore"),
+        length("tooth-depth", 0.22, "height of the teeth, from root to tip"), length("hole", 0.3, "radius of the bore"),
         length("thickness", 0.5, "full size along z"),
-        count("segments", 8, 1, 64, "steps along each tip and each root; even ones put a corner mid-tip")},
+        count("segments", 8, 1, 64,
+              "steps along each tip and each root; an even number puts a corner in the middle of a tip")},
        false},
       {"helix-bowl",
        "a bowl, open towards +z, with a groove that runs down in a spiral; 329k faces with cells=143",
-       {length("radius", 1, "of the rim, outside"), length("height", 0.8, "of the bowl's outside"),
-        length("thickness", 0.1, "of the wall beside the groove"),
-        length("depth", 0.06, "of the groove, below thickness"),
-        count("turns", 4, 1, 64, "of the groove around the axis"),
-        count("cells", 48, 8, 700, "of the mesh from the middle to the rim")},
+       {length("radius", 1, "outer radius of the opening"), length("height", 0.8, "outer height of the bowl"),
+        length("thickness", 0.1, "thickness of the wall beside the groove"),
+        length("depth", 0.06, "depth of the groove, below thickness"),
+        count("turns", 4, 1, 64, "turns of the groove around the axis"),
+        count("cells", 48, 8, 700, "cells of the mesh from the middle to the edge")},
        false},
       {"marble-run",
        "a channel, open towards +z, that winds down around the axis z; 53k faces with steps=255,sides=12",
-       {length("radius", 1, "outer radius of the turns"), length("height", 1, "that it descends"),
-        length("width", 0.16, "of the channel, outside"),
-        length("thickness", 0.02, "of its wall, below half of the width"), count("turns", 4, 1, 64, "around the axis"),
-        count("steps", 96, 8, 1024, "a turn"), count("sides", 8, 2, 64, "steps around the channel's half circle")},
+       {length("radius", 1, "outer radius of the turns"), length("height", 1, "height by which it descends"),
+        length("width", 0.16, "outer width of the channel"),
+        length("thickness", 0.02, "thickness of its wall, below half of the width"),
+        count("turns", 4, 1, 64, "turns around the axis"), count("steps", 96, 8, 1024, "steps in a turn"),
+        count("sides", 8, 2, 64, "steps around the channel's half circle")},
        false},
       {"structured-bowl",
        "a bowl, open towards +z, with fine bumps all over its inside; 4.1M faces with cells=506,bumps=40",
-       {length("radius", 1, "of the rim, outside"), length("height", 0.8, "of the bowl's outside"),
-        length("thickness", 0.1, "of the wall under the highest bumps"),
-        length("depth", 0.03, "from their tops to their valleys, below thickness"),
-        count("bumps", 8, 1, 200, "across the bowl, each with smaller ones on it"),
-        count("cells", 48, 8, 700, "of the mesh from the middle to the rim")},
+       {length("radius", 1, "outer radius of the opening"), length("height", 0.8, "outer height of the bowl"),
+        length("thickness", 0.1, "thickness of the wall under the highest bumps"),
+        length("depth", 0.03, "height of the bumps from valley to top, below thickness"),
+        count("bumps", 8, 1, 200, "bumps across the bowl, each with smaller bumps on it"),
+        count("cells", 48, 8, 700, "cells of the mesh from the middle to the edge")},
        false},
   };
   return list;
@@ -85,19 +89,16 @@ const std::vector<Shape>& shapeList() {
 // ---------------------------------------------------------------------------------------------------------------------
 // Specs
 
+/// The end of a message about an unknown name in a list of shapes or parameters.
 template <typename List>
-std::vector<std::string> namesOf(const List& list) {
+std::string suggestion(std::string_view wanted, const List& list) {
   std::vector<std::string> names;
-  for (const auto& item : list) names.push_back(item.name);
-  return names;
-}
-
-/// "; did you mean NAME?" where a known name is near, else "; known: all of them".
-std::string suggestion(std::string_view wanted, const std::vector<std::string>& known) {
-  if (const std::string near = nearestName(wanted, known); !near.empty()) return "; did you mean " + near + "?";
   std::string all;
-  for (const std::string& name : known) all += (all.empty() ? "" : ", ") + name;
-  return "; known: " + all;
+  for (const auto& item : list) {
+    names.push_back(item.name);
+    all += (all.empty() ? "" : ", ") + item.name;
+  }
+  return "; " + didYouMean(wanted, names, "known: " + all);
 }
 
 std::string format(double x) {
@@ -106,87 +107,107 @@ std::string format(double x) {
   return {text.data(), end};
 }
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
-
-/// A spec taken apart: the shape, and the value of every parameter.
+/// A parsed spec: the shape and the value of every parameter.
 struct Request {
-  const Shape* shape;
-  std::string text;  ///< without prefix
-  std::map<std::string, double, std::less<>> values;
+  std::string spec;  ///< the spec as the caller wrote it
+  std::string text;  ///< the spec without prefix
+  const Shape* shape = nullptr;
+  std::map<std::string, double, std::less<>> values = {};
 
   double operator[](std::string_view name) const { return values.find(name)->second; }
   unsigned whole(std::string_view name) const { return static_cast<unsigned>((*this)[name]); }
+  [[noreturn]] void fail(const std::string& problem) const { throw Error(ErrorKind::option, spec, problem); }
 };
 
-[[noreturn]] void fail(std::string_view spec, const std::string& problem) {
-  throw Error("shape '" + std::string(spec) + "': " + problem);
-}
-
-double parseValue(const Parameter& parameter, std::string_view text, std::string_view spec) {
+double parseValue(const Request& request, const Parameter& parameter, std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
       (parameter.whole && value != std::floor(value)))
-    fail(spec, parameter.name + "='" + std::string(text) + "' is not a " + (parameter.whole ? "whole " : "") +
-                   "number; give one like " + parameter.name + "=" + format(parameter.defaultValue));
+    request.fail(parameter.name + "='" + std::string(text) + "' is not a " + (parameter.whole ? "whole " : "") +
+                 "number; give one like " + parameter.name + "=" + format(parameter.defaultValue));
   if (value < parameter.minimum || value > parameter.maximum)
-    fail(spec, parameter.name + "=" + std::string(text) + " is out of range; give " + format(parameter.minimum) +
-                   " to " + format(parameter.maximum));
+    request.fail(parameter.name + "=" + std::string(text) + " is out of range; give " + format(parameter.minimum) +
+                 " to " + format(parameter.maximum));
   return value;
 }
 
-void assign(Request& request, std::string_view item, std::vector<std::string>& seen, std::string_view spec) {
+/// Parses one item "parameter=value" and sets the value.
+void assign(Request& request, std::string_view item) {
   const std::size_t equals = item.find('=');
   const std::string_view name = trimmed(item.substr(0, equals));
   const std::vector<Parameter>& known = request.shape->parameters;
-  const auto parameter = std::find_if(known.begin(), known.end(), [&](const Parameter& p) { return p.name == name; });
+  const auto parameter = std::ranges::find(known, name, &Parameter::name);
   if (parameter == known.end())
-    fail(spec,
-         request.shape->name + " has no parameter '" + std::string(name) + "'" + suggestion(name, namesOf(known)));
+    request.fail(request.shape->name + " has no parameter '" + std::string(name) + "'" + suggestion(name, known));
   if (equals == std::string_view::npos)
-    fail(spec, parameter->name + " has no value; write " + parameter->name + "=" + format(parameter->defaultValue));
-  if (std::find(seen.begin(), seen.end(), name) != seen.end())
-    fail(spec, parameter->name + " is given twice; give it once");
-  seen.emplace_back(name);
-  request.values.find(name)->second = parseValue(*parameter, trimmed(item.substr(equals + 1)), spec);
+    request.fail(parameter->name + " has no value; write " + parameter->name + "=" + format(parameter->defaultValue));
+  if (request.values.contains(name)) request.fail(parameter->name + " is given twice; give it once");
+  request.values[parameter->name] = parseValue(request, *parameter, trimmed(item.substr(equals + 1)));
 }
 
-/// Relations between parameters that no single range can express.
-void requireSoundProportions(const Request& request, std::string_view spec);
+/// The factor by which a regular polygon of n corners must be scaled to have the area of its circumcircle.
+double equalAreaFactor(double n) { return std::sqrt((2 * kPi / n) / std::sin(2 * kPi / n)); }
+
+void requireSoundBowl(const Request& request) {
+  if (request["depth"] >= request["thickness"])
+    request.fail("the relief cuts through the wall; make depth smaller than thickness");
+  // The inner sheet is sound if the wall is thinner than the least radius of curvature, which is that in the middle.
+  if (request["thickness"] >= request["radius"] * request["radius"] / (2 * request["height"]))
+    request.fail("the wall is thicker than the bowl is wide at its bottom; make thickness or height smaller");
+}
+
+void requireSoundRun(const Request& request) {
+  if (request["thickness"] >= request["width"] / 2)
+    request.fail("the wall fills the channel; make thickness smaller than half of the width");
+  if (request["width"] >= request["radius"]) request.fail("the channel meets the axis; make width smaller than radius");
+  if (request["turns"] > 1 && request["height"] / request["turns"] <= request["width"] / 2)
+    request.fail("the turns meet; make height larger, or turns or width smaller");
+}
+
+/// Throws `Error` for parameters that contradict each other although each is within its range.
+void requireSoundProportions(const Request& request) {
+  if (request.shape->name.ends_with("-bowl")) requireSoundBowl(request);
+  if (request.shape->name == "marble-run") requireSoundRun(request);
+  if (request.shape->name == "torus") {
+    if (request["minor"] >= request["major"]) request.fail("the tube meets the axis; make minor smaller than major");
+    if (request["minor"] * equalAreaFactor(request["sides"]) >= request["major"])
+      request.fail("a tube with so few sides meets the axis; make minor smaller or sides larger");
+  }
+  if (request.shape->name == "gear") {
+    if (request["tooth-depth"] >= request["radius"])
+      request.fail("the teeth reach the axis; make tooth-depth smaller than radius");
+    if (request["hole"] >= request["radius"] - request["tooth-depth"])
+      request.fail("the bore cuts the roots of the teeth; make hole smaller than radius - tooth-depth");
+  }
+}
 
 Request parse(std::string_view spec, std::string_view prefix) {
   std::string_view rest = trimmed(spec);
   if (rest.starts_with(prefix)) rest.remove_prefix(prefix.size());
-  Request request{nullptr, std::string(rest), {}};
+  Request request{.spec = std::string(spec), .text = std::string(rest)};
 
   std::size_t comma = rest.find(',');
   const std::string_view name = trimmed(rest.substr(0, comma));
   const std::vector<Shape>& list = shapeList();
-  const auto shape = std::find_if(list.begin(), list.end(), [&](const Shape& s) { return s.name == name; });
-  if (shape == list.end())
-    fail(spec, "there is no shape '" + std::string(name) + "'" + suggestion(name, namesOf(list)));
+  const auto shape = std::ranges::find(list, name, &Shape::name);
+  if (shape == list.end()) request.fail("there is no shape '" + std::string(name) + "'" + suggestion(name, list));
   request.shape = &*shape;
-  for (const Parameter& parameter : shape->parameters) request.values[parameter.name] = parameter.defaultValue;
-
-  std::vector<std::string> seen;
   while (comma != std::string_view::npos) {
     rest.remove_prefix(comma + 1);
     comma = rest.find(',');
-    assign(request, rest.substr(0, comma), seen, spec);
+    assign(request, rest.substr(0, comma));
   }
-  requireSoundProportions(request, spec);
+  for (const Parameter& parameter : shape->parameters)
+    request.values.try_emplace(parameter.name, parameter.defaultValue);
+  requireSoundProportions(request);
   return request;
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Meshes
 
-/// Point `i` of `n` on the unit circle; exact on the axes, so that boxes and symmetry planes are.
+/// Point `i` of `n` on the unit circle. Points on the axes are exact, so that bounding boxes and symmetry planes are.
 Eigen::Vector2d onCircle(double i, double n) {
   const double quarters = 4 * i / n;
   if (quarters == std::floor(quarters)) {
@@ -204,11 +225,11 @@ void addQuad(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t
 }
 
 TriangleMesh icosahedron() {
-  const double phi = std::numbers::phi;  // in this position its edges' midpoints lie on the axes
+  const double phi = std::numbers::phi;  // With these vertices midpoints of edges lie on the axes.
   TriangleMesh mesh;
   mesh.vertices = {{-1, phi, 0},  {1, phi, 0},  {-1, -phi, 0}, {1, -phi, 0}, {0, -1, phi},  {0, 1, phi},
                    {0, -1, -phi}, {0, 1, -phi}, {phi, 0, -1},  {phi, 0, 1},  {-phi, 0, -1}, {-phi, 0, 1}};
-  // Three corners at mutual distance 2, the edge length, are a face.
+  // Three vertices are a face if their mutual distances are 2, the edge length.
   const auto joined = [&](std::uint32_t a, std::uint32_t b) {
     return (mesh.vertices[a] - mesh.vertices[b]).norm() < 2.1;
   };
@@ -224,7 +245,7 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-/// Every face in four, new vertices at the arcs' middles on the unit sphere.
+/// Divides every triangle into four, with new vertices on the unit sphere in the middle of each edge's arc.
 void subdivide(TriangleMesh& mesh) {
   std::unordered_map<std::uint64_t, std::uint32_t> middles;
   middles.reserve(3 * mesh.triangles.size() / 2);
@@ -247,9 +268,9 @@ void subdivide(TriangleMesh& mesh) {
   mesh.triangles = std::move(finer);
 }
 
-// Sphere and torus are meshed so that mesh and smooth shape have the same volume. With the vertices on the surface
-// every face would lie inside it, a bias that grows to a whole sagitta; this way the deviations cancel on average and
-// their RMS is a third as large.
+// The meshes of sphere and torus have the volume of the smooth shape. With vertices on the smooth surface every face
+// would lie inside it, by up to a sagitta; with equal volumes the deviations cancel on average and their RMS is a third
+// as large.
 
 TriangleMesh sphereMesh(const Request& request) {
   TriangleMesh mesh = icosahedron();
@@ -259,13 +280,11 @@ TriangleMesh sphereMesh(const Request& request) {
   return mesh;
 }
 
-/// Factor that gives a regular polygon of n corners the area of its circle.
-double equalAreaFactor(double n) { return std::sqrt((2 * kPi / n) / std::sin(2 * kPi / n)); }
-
 TriangleMesh torusMesh(const Request& request) {
   const std::uint32_t segments = request.whole("segments");
   const std::uint32_t sides = request.whole("sides");
-  // By Pappus the tube's polygon must have its circle's area; and slices across the axis are polygons themselves.
+  // By Pappus's theorem the volumes agree if the tube's cross-section has its circle's area. Cross-sections
+  // perpendicular to the axis are polygons as well.
   const double tube = request["minor"] * equalAreaFactor(sides);
   const double around = equalAreaFactor(segments);
   TriangleMesh mesh;
@@ -292,7 +311,7 @@ Vector3 boxHalfSize(const Request& request) {
 TriangleMesh boxMesh(const Request& request) {
   const Vector3 half = boxHalfSize(request);
   TriangleMesh mesh;
-  for (unsigned corner = 0; corner < 8; ++corner)  // bits: x, y, z
+  for (unsigned corner = 0; corner < 8; ++corner)  // The bits of `corner` select the sides along x, y and z.
     mesh.vertices.emplace_back(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
                                corner & 4 ? half.z() : -half.z());
   addQuad(mesh, 0, 4, 6, 2);  // -x
@@ -304,14 +323,14 @@ TriangleMesh boxMesh(const Request& request) {
   return mesh;
 }
 
-/// A corner of the gear's outline: its place on the circle in turns of the whole pitch, and its distance from the axis.
+/// A corner of the gear's outline.
 struct OutlinePoint {
-  double turn;
-  double radius;
+  double turn;    ///< angle about the axis, in tooth pitches
+  double radius;  ///< distance from the axis
 };
 
-/// The outline anticlockwise. Of a tooth's pitch the tip takes 0.26, each straight flank 0.13, the root the rest.
-/// The turn grows from point to point, so that outline and bore pair up corner by corner.
+/// The outline counter-clockwise. The tip takes 0.26 of a tooth's pitch, each straight flank 0.13, the root the rest.
+/// The angle grows from point to point, so that each corner of the outline has a corner of the bore at the same angle.
 std::vector<OutlinePoint> gearOutline(unsigned teeth, unsigned segments, double tip, double root) {
   constexpr double kTip = 0.26;
   constexpr double kFlank = 0.13;
@@ -337,7 +356,7 @@ TriangleMesh gearMesh(const Request& request) {
       for (const double z : {-top, top}) mesh.vertices.emplace_back(radius * direction.x(), radius * direction.y(), z);
   }
   const auto corners = static_cast<std::uint32_t>(mesh.vertices.size());
-  for (std::uint32_t a = 0; a < corners; a += 4) {  // at each turn: outline below, above, bore below, above
+  for (std::uint32_t a = 0; a < corners; a += 4) {  // Each angle has four vertices: bottom and top of outline and bore.
     const std::uint32_t b = (a + 4) % corners;
     addQuad(mesh, a, b, b + 1, a + 1);          // outline
     addQuad(mesh, a + 1, b + 1, b + 3, a + 3);  // top
@@ -347,38 +366,39 @@ TriangleMesh gearMesh(const Request& request) {
   return mesh;
 }
 
-/// Moved so that its box is about the origin.
+/// The mesh translated so that its box is centred at the origin.
 TriangleMesh centred(TriangleMesh mesh) {
   const Vector3 center = boundingBox(mesh).center();
   for (Vector3& v : mesh.vertices) v -= center;
   return mesh;
 }
 
-/// A point of the unit disc for one of the square [-1, 1]²: cells of a grid keep about the same size, and there is no
-/// pole where they shrink.
+/// Maps a point of the square [-1, 1]² to the unit disc. Cells of a grid keep about the same size, without a pole at
+/// which they would shrink.
 Eigen::Vector2d onDisc(double x, double y) { return {x * std::sqrt(1 - y * y / 2), y * std::sqrt(1 - x * x / 2)}; }
 
-/// A wall between two sheets over the unit disc, `inside` above `outside`, joined along their rims.
+/// A closed wall between two sheets over the unit disc, `inside` above `outside`, which a strip connects along their
+/// boundaries.
 template <typename Sheet>
 TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& outside) {
   const std::uint32_t n = 2 * cells, row = n + 1, sheet = row * row;
   TriangleMesh mesh;
   mesh.vertices.reserve(std::size_t{2} * sheet);
   mesh.triangles.reserve(std::size_t{4} * n * n + std::size_t{8} * n);
-  for (const Sheet& place : {inside, outside})
+  for (const Sheet& positionAt : {inside, outside})
     for (std::uint32_t j = 0; j <= n; ++j)
       for (std::uint32_t i = 0; i <= n; ++i)
-        mesh.vertices.push_back(place(onDisc((double(i) - cells) / cells, (double(j) - cells) / cells)));
+        mesh.vertices.push_back(positionAt(onDisc((double(i) - cells) / cells, (double(j) - cells) / cells)));
   for (std::uint32_t j = 0; j < n; ++j)
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::array<std::uint32_t, 4> at = {j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i};
-      // diagonals towards the square's corners, where two sides of a cell lie on the rim
+      // Diagonals point towards the square's corners, because two sides of the cells there lie on the boundary.
       const std::uint32_t first = (i < cells) == (j < cells) ? 0 : 1;
       const auto corner = [&](std::uint32_t k) { return at[(first + k) % 4]; };
       addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
       addQuad(mesh, sheet + corner(0), sheet + corner(3), sheet + corner(2), sheet + corner(1));
     }
-  const auto rim = [&](std::uint32_t k) {  // anticlockwise from the corner (-1, -1)
+  const auto boundary = [&](std::uint32_t k) {  // Vertex k of the boundary, counter-clockwise from (-1, -1).
     const std::uint32_t along = k % n;
     switch (k / n % 4) {
       case 0:
@@ -391,11 +411,12 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
         return (n - along) * row;
     }
   };
-  for (std::uint32_t k = 0; k < 4 * n; ++k) addQuad(mesh, rim(k + 1), rim(k), sheet + rim(k), sheet + rim(k + 1));
+  for (std::uint32_t k = 0; k < 4 * n; ++k)
+    addQuad(mesh, boundary(k + 1), boundary(k), sheet + boundary(k), sheet + boundary(k + 1));
   return mesh;
 }
 
-/// A paraboloid's wall, its inside lowered by relief(point of the unit disc), from 0 to 1 of the depth.
+/// The wall of a paraboloid whose inner sheet is lowered by relief(point of the unit disc), a fraction of the depth.
 template <typename Relief>
 TriangleMesh bowlMesh(const Request& request, const Relief& relief) {
   const double radius = request["radius"], height = request["height"];
@@ -416,8 +437,9 @@ TriangleMesh helixBowlMesh(const Request& request) {
   return bowlMesh(request, [turns](const Eigen::Vector2d& d) {
     const double fromMiddle = d.norm();
     const double phase = 2 * kPi * turns * fromMiddle - std::atan2(d.y(), d.x());
-    const double begun = std::clamp(2 * turns * fromMiddle - 1, 0.0, 1.0);  // a spiral has no end in the middle
-    return begun * begun * (3 - 2 * begun) * (0.5 + 0.5 * std::cos(phase));
+    // The groove fades out in the middle, where the spiral has no defined direction.
+    const double fade = std::clamp(2 * turns * fromMiddle - 1, 0.0, 1.0);
+    return fade * fade * (3 - 2 * fade) * (0.5 + 0.5 * std::cos(phase));
   });
 }
 
@@ -433,7 +455,8 @@ TriangleMesh marbleRunMesh(const Request& request) {
   const double outer = request["width"] / 2, inner = outer - request["thickness"];
   const std::uint32_t sides = request.whole("sides"), loop = 2 * (sides + 1);
   const std::uint32_t steps = request.whole("turns") * request.whole("steps");
-  std::vector<Eigen::Vector2d> section;  // away from the axis, and up: outside from lip to lip, and back inside
+  // The cross-section (outwards, upwards) runs along the outside from lip to lip and back along the inside.
+  std::vector<Eigen::Vector2d> section;
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(outer * onCircle(sides + i, 2.0 * sides));
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(inner * onCircle(2.0 * sides - i, 2.0 * sides));
   TriangleMesh mesh;
@@ -450,44 +473,12 @@ TriangleMesh marbleRunMesh(const Request& request) {
       const std::uint32_t a = step * loop + i, b = step * loop + (i + 1) % loop;
       addQuad(mesh, a, b, b + loop, a + loop);
     }
-  for (std::uint32_t i = 0; i < sides; ++i) {  // the two ends
+  for (std::uint32_t i = 0; i < sides; ++i) {  // Close the two ends.
     const std::uint32_t last = steps * loop, back = loop - 1 - i;
     addQuad(mesh, i, back, back - 1, i + 1);
     addQuad(mesh, last + i, last + i + 1, last + back - 1, last + back);
   }
   return centred(std::move(mesh));
-}
-
-void requireSoundBowl(const Request& request, std::string_view spec) {
-  if (request["depth"] >= request["thickness"])
-    fail(spec, "the relief cuts through the wall; make depth smaller than thickness");
-  // the radius of curvature in the middle, where it is least
-  if (request["thickness"] >= request["radius"] * request["radius"] / (2 * request["height"]))
-    fail(spec, "the wall is thicker than the bowl is wide at its bottom; make thickness or height smaller");
-}
-
-void requireSoundRun(const Request& request, std::string_view spec) {
-  if (request["thickness"] >= request["width"] / 2)
-    fail(spec, "the wall fills the channel; make thickness smaller than half of the width");
-  if (request["width"] >= request["radius"]) fail(spec, "the channel meets the axis; make width smaller than radius");
-  if (request["turns"] > 1 && request["height"] / request["turns"] <= request["width"] / 2)
-    fail(spec, "the turns meet; make height larger, or turns or width smaller");
-}
-
-void requireSoundProportions(const Request& request, std::string_view spec) {
-  if (request.shape->name.ends_with("-bowl")) requireSoundBowl(request, spec);
-  if (request.shape->name == "marble-run") requireSoundRun(request, spec);
-  if (request.shape->name == "torus") {
-    if (request["minor"] >= request["major"]) fail(spec, "the tube meets the axis; make minor smaller than major");
-    if (request["minor"] * equalAreaFactor(request["sides"]) >= request["major"])
-      fail(spec, "a tube with so few sides meets the axis; make minor smaller or sides larger");
-  }
-  if (request.shape->name == "gear") {
-    if (request["tooth-depth"] >= request["radius"])
-      fail(spec, "the teeth reach the axis; make tooth-depth smaller than radius");
-    if (request["hole"] >= request["radius"] - request["tooth-depth"])
-      fail(spec, "the bore cuts the roots of the teeth; make hole smaller than radius - tooth-depth");
-  }
 }
 
 }  // namespace
@@ -529,7 +520,7 @@ DistanceFunction analytic(std::string_view spec) {
     setBox(half);
     return {[half](const Vector3& x) { return boxDistance(x, half); }, source};
   }
-  fail(spec, "no distance in closed form is known; use builtin:" + request.text);
+  request.fail("no distance in closed form is known; use builtin:" + request.text);
 }
 
 double sphereDistance(const Vector3& x, double radius) { return x.norm() - radius; }

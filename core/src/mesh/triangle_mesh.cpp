@@ -2,63 +2,23 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-#include <xxhash.h>
 
-#include <array>
-#include <bit>
 #include <cmath>
-#include <memory>
-#include <new>
+#include <span>
 
 #include "hpsdf/error.h"
-#include "mesh/message_prefix.h"
+#include "mesh/mesh_error.h"
+#include "util/checked_file.h"
 
 namespace hpsdf {
 namespace {
 
-/// Streams numbers into XXH3 as little-endian bytes, whatever the machine's own order.
-class Hasher {
- public:
-  Hasher() : state_(XXH3_createState()) {
-    if (!state_) throw std::bad_alloc();
-    XXH3_64bits_reset(state_.get());
-  }
-
-  void add(std::uint64_t bits) { addBytes(bits, 8); }
-  void add(std::uint32_t bits) { addBytes(bits, 4); }
-  void add(double x) { add(std::bit_cast<std::uint64_t>(x + 0.0)); }  // + 0.0 turns -0.0 into 0.0
-
-  std::uint64_t digest() {
-    flush();
-    return XXH3_64bits_digest(state_.get());
-  }
-
- private:
-  struct Free {
-    void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-  };
-
-  void addBytes(std::uint64_t bits, std::size_t count) {
-    if (filled_ + count > buffer_.size()) flush();
-    for (std::size_t i = 0; i < count; ++i) buffer_[filled_ + i] = static_cast<unsigned char>(bits >> (8 * i));
-    filled_ += count;
-  }
-
-  void flush() {
-    XXH3_64bits_update(state_.get(), buffer_.data(), filled_);
-    filled_ = 0;
-  }
-
-  std::unique_ptr<XXH3_state_t, Free> state_;
-  std::array<unsigned char, 4096> buffer_;  ///< to come: a call for each number would take longer than the hash
-  std::size_t filled_ = 0;
-};
-
-/// Throws `Error`, its message after `prefix`, for a surface without finite extent.
-double longestSide(const Box& surface, const std::string& prefix) {
+/// The longest side of a surface's box. Throws `Error` about `subject` for a surface without finite extent.
+double longestSide(const Box& surface, const std::string& subject) {
   const double longest = surface.isEmpty() ? 0 : surface.sizes().maxCoeff();
   if (!(longest > 0) || !std::isfinite(longest))
-    throw Error(prefix + "the surface cannot be normalized, for it has no finite extent; check its vertices");
+    throw Error(ErrorKind::mesh, subject,
+                "the surface cannot be normalized, for it has no finite extent; check its vertices");
   return longest;
 }
 
@@ -68,9 +28,10 @@ void requireValidIndices(const TriangleMesh& mesh) {
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
     for (const std::uint32_t v : mesh.triangles[f])
       if (v >= mesh.vertices.size())
-        throw Error(messagePrefix(mesh.name) + "face " + std::to_string(f + 1) + " refers to vertex " +
-                    std::to_string(std::uint64_t{v} + 1) + ", but there are only " +
-                    std::to_string(mesh.vertices.size()) + "; repair or export the mesh again");
+        throw mesh::meshError(mesh.name, "face " + std::to_string(f + 1) + " refers to vertex " +
+                                             std::to_string(std::uint64_t{v} + 1) + ", but there are only " +
+                                             std::to_string(mesh.vertices.size()) +
+                                             "; repair or export the mesh again");
 }
 
 Box boundingBox(const TriangleMesh& mesh) {
@@ -88,8 +49,8 @@ Box boundingBox(const TriangleMesh& mesh) {
 double signedVolume(const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
   if (box.isEmpty()) return 0;
-  // Of tetrahedra between each face and one apex. For a closed mesh any apex will do; the box's centre keeps the terms
-  // small, so that a mesh far from the origin loses no digits.
+  // The volume is the sum over tetrahedra between each triangle and one apex. A closed mesh has the same volume for any
+  // apex; the box's centre keeps the terms small, so that a mesh far from the origin loses no digits.
   const Vector3 apex = box.center();
   double six = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -111,25 +72,26 @@ double surfaceArea(const TriangleMesh& mesh) {
 }
 
 std::uint64_t fingerprint(const TriangleMesh& mesh) {
-  Hasher hasher;
-  hasher.add(std::uint64_t{mesh.vertices.size()});
-  hasher.add(std::uint64_t{mesh.triangles.size()});
-  for (const Vector3& v : mesh.vertices)
-    for (const double x : v) hasher.add(x);
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t v : triangle) hasher.add(v);
-  return hasher.digest();
+  detail::Checksum checksum;
+  checksum.add(detail::bytesOf(std::uint64_t{mesh.vertices.size()}));
+  checksum.add(detail::bytesOf(std::uint64_t{mesh.triangles.size()}));
+  for (const Vector3& vertex : mesh.vertices) {
+    const Vector3 v = vertex.array() + 0.0;  // Adding 0 turns -0 into 0, so that equal positions have equal bits.
+    checksum.add(std::as_bytes(std::span(v.data(), 3)));
+  }
+  checksum.add(std::as_bytes(std::span(mesh.triangles)));
+  return checksum.value();
 }
 
-Normalization normalizing(const Box& surface) { return {surface.center(), 2 / longestSide(surface, "")}; }
+Normalization normalizationOf(const Box& surface) { return {surface.center(), 2 / longestSide(surface, "")}; }
 
 TriangleMesh normalized(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
   const Box box = boundingBox(mesh);
-  const double longest = longestSide(box, messagePrefix(mesh.name));
+  const double longest = longestSide(box, mesh.name.empty() ? "mesh" : mesh.name);
   TriangleMesh result = mesh;
-  // (x - min) - (max - x) is 2(x - centre) without rounding the centre: on the longest side it is -longest at min and
-  // longest at max in floating point too, and it never decreases with x, so that nothing leaves [-1, 1].
+  // (x - min) - (max - x) is 2(x - centre) without rounding the centre. On the longest side it is exactly -longest at
+  // min and longest at max, and it never decreases with x, so that no vertex leaves [-1, 1].
   for (Vector3& v : result.vertices) v = ((v - box.min()) - (box.max() - v)) / longest;
   return result;
 }

@@ -10,78 +10,80 @@
 
 #include "bvh/segment.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::sign {
 namespace {
 
-constexpr std::uint32_t kFew = 512;     // fewer sides are one cluster that never stands for them
-constexpr std::uint32_t kSmallest = 8;  // sides of a cluster that is not halved
-constexpr double kCoarsest = 0.25;      // ratio of a cluster's size to its distance
+constexpr std::uint32_t kFew = 512;      // fewer edges are always summed one by one
+constexpr std::uint32_t kSmallest = 8;   // clusters of so many edges are not halved
+constexpr double kCoarsestRatio = 0.25;  // greatest radius of a cluster over its distance
 
 double cube(double x) { return x * x * x; }
 
-/// ε_ijk M_jk: of a⊗b it is a×b.
+/// Returns the vector ε_ijk M_jk, which is a × b for the matrix a⊗b.
 Vector3 axial(const Eigen::Matrix3d& m) { return {m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0)}; }
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const Hierarchy& hierarchy)
-    : BoundaryEdges(hierarchy, sidesByEdge(hierarchy.triangles())) {}
+BoundaryEdges::BoundaryEdges(const bvh::Hierarchy& hierarchy)
+    : BoundaryEdges(hierarchy, mesh::directedEdgesOf(hierarchy.triangles())) {}
 
-BoundaryEdges::BoundaryEdges(const Hierarchy& hierarchy, const std::vector<hpsdf::Side>& sides) {
-  const auto place = [&](std::uint32_t vertex) { return hierarchy.local(hierarchy.vertices()[vertex]); };
-  forEachEdge(sides, [&](std::span<const hpsdf::Side> edge) {
-    int times = 0;
-    for (const hpsdf::Side& side : edge) times += side.rising ? 1 : -1;
-    if (times != 0) sides_.push_back({place(edge.front().low()), place(edge.front().high()), double(times)});
+BoundaryEdges::BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<mesh::DirectedEdge>& sides) {
+  const auto position = [&](std::uint32_t vertex) { return hierarchy.local(hierarchy.vertices()[vertex]); };
+  mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> edge) {
+    int multiplicity = 0;
+    for (const mesh::DirectedEdge& side : edge) multiplicity += side.rising ? 1 : -1;
+    if (multiplicity != 0)
+      edges_.push_back({position(edge.front().low()), position(edge.front().high()), double(multiplicity)});
   });
-  const auto count = static_cast<std::uint32_t>(sides_.size());
+  const auto count = static_cast<std::uint32_t>(edges_.size());
   if (count < kFew) {
     clusters_ = {Cluster{.end = count, .next = 1}};
   } else {
-    cluster(0, count);
+    addCluster(0, count);
     tbb::parallel_for(std::size_t{0}, clusters_.size(), [&](std::size_t n) { measure(clusters_[n]); });
   }
 }
 
-/// Halves them where they extend the farthest, down to a few.
-void BoundaryEdges::cluster(std::uint32_t begin, std::uint32_t end) {
+/// Adds a cluster of edges and, recursively, its halves: it divides the edges along the axis on which their midpoints
+/// extend farthest, recursively.
+void BoundaryEdges::addCluster(std::uint32_t begin, std::uint32_t end) {
   const std::size_t self = clusters_.size();
   clusters_.push_back(Cluster{.begin = begin, .end = end});
   if (end - begin > kSmallest) {
-    Box middles;
-    for (std::uint32_t s = begin; s < end; ++s) middles.extend((sides_[s].from + sides_[s].to) / 2);
+    Box midpoints;
+    for (std::uint32_t e = begin; e < end; ++e) midpoints.extend((edges_[e].from + edges_[e].to) / 2);
     Eigen::Index axis = 0;
-    middles.sizes().maxCoeff(&axis);
+    midpoints.sizes().maxCoeff(&axis);
     const std::uint32_t half = begin + (end - begin) / 2;
-    std::ranges::nth_element(sides_.begin() + begin, sides_.begin() + half, sides_.begin() + end, {},
-                             [axis](const Side& side) { return side.from[axis] + side.to[axis]; });
-    cluster(begin, half);
-    cluster(half, end);
+    std::ranges::nth_element(edges_.begin() + begin, edges_.begin() + half, edges_.begin() + end, {},
+                             [axis](const Edge& edge) { return edge.from[axis] + edge.to[axis]; });
+    addCluster(begin, half);
+    addCluster(half, end);
   }
   clusters_[self].next = static_cast<std::uint32_t>(clusters_.size());
 }
 
 void BoundaryEdges::measure(Cluster& cluster) const {
   Box box;
-  for (std::uint32_t s = cluster.begin; s < cluster.end; ++s) box.extend(sides_[s].from).extend(sides_[s].to);
+  for (std::uint32_t e = cluster.begin; e < cluster.end; ++e) box.extend(edges_[e].from).extend(edges_[e].to);
   cluster.center = box.center();
   cluster.radius = 0;
-  for (std::uint32_t s = cluster.begin; s < cluster.end; ++s) cluster.add(sides_[s]);
+  for (std::uint32_t e = cluster.begin; e < cluster.end; ++e) cluster.add(edges_[e]);
 }
 
-void BoundaryEdges::Cluster::add(const Side& side) {
-  const Vector3 a = side.from - center, b = side.to - center, sum = a + b, along = side.times * (b - a);
-  const double itsLength = along.norm();
+void BoundaryEdges::Cluster::add(const Edge& edge) {
+  const Vector3 a = edge.from - center, b = edge.to - center, sum = a + b, along = edge.multiplicity * (b - a);
+  const double edgeLength = along.norm();
   radius = std::max({radius, a.norm(), b.norm()});
-  length += itsLength;
-  cubes += itsLength * (cube(a.norm()) + cube(b.norm())) / 2;  // a convex function's mean is at most that of its ends
+  length += edgeLength;
+  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // the mean of a convex function is at most its ends'
   first += along;
   second += sum / 2 * along.transpose();
   const Eigen::Matrix3d spread = (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 6;
   for (int k = 0; k < 3; ++k) third[k] += along[k] * spread;
 }
 
-Vector3 BoundaryEdges::Cluster::at(const Vector3& toCenter, double squaredDistance) const {
+Vector3 BoundaryEdges::Cluster::series(const Vector3& toCenter, double squaredDistance) const {
   const double inverse = 1 / squaredDistance;
   const Vector3 traces(third[0].trace(), third[1].trace(), third[2].trace());
   Eigen::Matrix3d towards;
@@ -90,47 +92,48 @@ Vector3 BoundaryEdges::Cluster::at(const Vector3& toCenter, double squaredDistan
   return inverse * std::sqrt(inverse) * (axial(second - 3 * towards) + toCenter.cross(first - 3 * inverse * higher));
 }
 
-inline void BoundaryEdges::Side::addTo(Gradient& sum, const Vector3& local) const {
+inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) const {
   const Vector3 a = from - local, b = to - local, along = b - a;
   const double la = a.norm(), lb = b.norm(), product = la * lb;
   const double below = product * (product + a.dot(b));
-  if (below > 0) sum.value += times * (la + lb) / below * a.cross(b);
-  const double nearest = (a + closestParameter(Vector3::Zero(), a, b) * along).norm();
-  // ∫2/r³ along the segment, as if all of it were as near, or it went on to both sides for ever
-  sum.change += 2 * std::abs(times) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
-  sum.nearest = std::min(sum.nearest, nearest);
+  if (below > 0) sum.value += multiplicity * (la + lb) / below * a.cross(b);
+  const double nearest = (a + bvh::closestParameter(Vector3::Zero(), a, b) * along).norm();
+  // The integral of 2/r³ along the edge is at most that of an edge that is everywhere as near as its nearest point, and
+  // at most that of an infinite line.
+  sum.derivative += 2 * std::abs(multiplicity) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
+  sum.edgeDistance = std::min(sum.edgeDistance, nearest);
   ++sum.terms;
 }
 
 BoundaryEdges::Gradient BoundaryEdges::sum(const Vector3& local, double ratio) const {
   Gradient sum;
-  const double leftOut = (4 - 3 * ratio) / ((1 - ratio) * (1 - ratio));
+  const double errorFactor = (4 - 3 * ratio) / ((1 - ratio) * (1 - ratio));
   for (std::size_t n = 0; n < clusters_.size();) {
     const Cluster& cluster = clusters_[n];
     const Vector3 toCenter = cluster.center - local;
     const double squared = toCenter.squaredNorm(), distance = std::sqrt(squared);
     if (cluster.radius < ratio * distance) {
       const double nearest = distance - cluster.radius;
-      sum.value += cluster.at(toCenter, squared);
-      sum.error += leftOut * cluster.cubes / (squared * squared * distance);
-      sum.change += 2 * cluster.length / cube(nearest);  // ∫2/r³, as if all of it were as near
-      sum.nearest = std::min(sum.nearest, nearest);
+      sum.value += cluster.series(toCenter, squared);
+      sum.error += errorFactor * cluster.cubes / (squared * squared * distance);
+      sum.derivative += 2 * cluster.length / cube(nearest);  // as if all edges were as near as the cluster's sphere
+      sum.edgeDistance = std::min(sum.edgeDistance, nearest);
       ++sum.terms;
       n = cluster.next;
-    } else if (++n == cluster.next) {
-      for (std::uint32_t s = cluster.begin; s < cluster.end; ++s) sides_[s].addTo(sum, local);
+    } else if (++n == cluster.next) {  // the cluster has no parts
+      for (std::uint32_t e = cluster.begin; e < cluster.end; ++e) edges_[e].addTo(sum, local);
     }
   }
-  constexpr double kAll = 4 * std::numbers::pi;
-  return {sum.value / kAll, sum.error / kAll, sum.change / kAll, sum.nearest, sum.terms};
+  constexpr double kSphere = 4 * std::numbers::pi;
+  return {sum.value / kSphere, sum.error / kSphere, sum.derivative / kSphere, sum.edgeDistance, sum.terms};
 }
 
 BoundaryEdges::Gradient BoundaryEdges::gradient(const Vector3& local, double error) const {
-  for (double ratio = kCoarsest;;) {
+  for (double ratio = kCoarsestRatio;;) {
     const Gradient found = sum(local, ratio);
     if (found.error <= error) return found;
-    ratio *= 0.9 * std::cbrt(error / found.error);  // what is left out falls with its cube
+    ratio *= 0.9 * std::cbrt(error / found.error);  // the error is proportional to the cube of the ratio
   }
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::sign

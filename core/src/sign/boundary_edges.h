@@ -1,5 +1,4 @@
 #pragma once
-// The winding number's gradient, by clusters of sides.
 
 #include <array>
 #include <cmath>
@@ -10,78 +9,81 @@
 #include "bvh/hierarchy.h"
 #include "mesh/directed_edges.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::sign {
 
-/// The sides of triangles that no neighbour takes back: the rims of holes, and edges at which faces look the wrong way.
+/// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one direction than in
+/// the other. They determine the gradient of the winding number.
 ///
-/// They alone tell how the winding number changes from place to place, beside the surface: its gradient is the magnetic
-/// field of a current that runs along them, 1/4π ∫ r/|r|³ × dl, r from the place to the side (Biot and Savart), as a
-/// solid angle changes with the outline alone. A closed mesh has none, and a winding number that is the same everywhere
-/// up to the surface.
+/// The gradient is the magnetic field of a current along these edges, 1/4π ∫ r/|r|³ × dl, where r runs from the point
+/// to the edge (Biot and Savart), because a solid angle depends on the outline of a surface only. A closed mesh has no
+/// such edges, and its winding number is constant up to the surface.
 ///
-/// For a cluster of sides that is far enough away, the Taylor series of r/|r|³ about the cluster's center is taken, up
-/// to second order. Of a cluster within r of its center, R away, what is left out is at most
+/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the cluster's center, up
+/// to second order. If all its edges lie within r of the center, and the center is R away, the truncation error is at
+/// most
 ///
-///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl, d from the center,
+///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl,  d from the center,
 ///
-/// by the solid harmonics of `Winding`: the sum of l |d|^(l−1)/R^(l+1) from l = 4 on.
+/// by the solid harmonics of `WindingNumber`: it is the sum of l |d|^(l−1)/R^(l+1) over l ≥ 4.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
-  explicit BoundaryEdges(const Hierarchy& hierarchy);
-  /// `sides`: of the hierarchy's triangles.
-  BoundaryEdges(const Hierarchy& hierarchy, const std::vector<hpsdf::Side>& sides);
+  explicit BoundaryEdges(const bvh::Hierarchy& hierarchy);
+  /// `sides` are the directed edges of the hierarchy's triangles, as from `mesh::directedEdgesOf`.
+  BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<mesh::DirectedEdge>& sides);
 
-  bool empty() const { return sides_.empty(); }
-  std::size_t size() const { return sides_.size(); }
+  bool empty() const { return edges_.empty(); }
+  std::size_t size() const { return edges_.size(); }
 
-  /// Of the winding number. Places and lengths are the hierarchy's local ones.
+  /// The gradient of the winding number at a point. Lengths are in the hierarchy's local coordinates.
   struct Gradient {
     Vector3 value = Vector3::Zero();
-    double error = 0;           ///< so far from the exact sum at most
-    double change = 0;          ///< so much it changes at most, a way, beside here
-    double nearest = HUGE_VAL;  ///< no rim is nearer
-    std::size_t terms = 0;      ///< so many sides, and clusters in place of theirs, were summed
+    double error = 0;                ///< bound of the distance between `value` and the exact sum
+    double derivative = 0;           ///< bound of the gradient's derivative in any direction
+    double edgeDistance = HUGE_VAL;  ///< lower bound of the distance to the nearest of the edges
+    std::size_t terms = 0;           ///< number of edges and clusters that were summed
   };
 
-  /// By clusters so coarse that its error is no more than this, at least 0; with 0, the sum itself.
+  /// Returns the gradient, summed over clusters so coarse that its error is at most `error`; the exact sum if `error`
+  /// is 0.
   Gradient gradient(const Vector3& local, double error) const;
 
-  std::size_t bytes() const { return sides_.size() * sizeof(Side) + clusters_.size() * sizeof(Cluster); }
+  std::size_t bytes() const { return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster); }
 
  private:
-  struct Side {
+  struct Edge {
     Vector3 from, to;
-    double times;  ///< as many triangles more run this way than the other
+    double multiplicity;  ///< number of triangles that run from `from` to `to`, less those that run back
 
-    /// 4π times its share, and what it does to the bounds.
+    /// Adds 4π times the edge's part of the gradient and of the bounds.
     void addTo(Gradient& sum, const Vector3& local) const;
   };
 
-  /// Sides [begin, end), and ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl, times and direction included.
+  /// The edges [begin, end) with their moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl, where dl contains the
+  /// multiplicity.
   struct Cluster {
     std::uint32_t begin = 0, end = 0;
-    std::uint32_t next = 0;  ///< the cluster that comes when this one is done
+    std::uint32_t next = 0;  ///< index of the first cluster that is not a part of this one
     Vector3 center = Vector3::Zero();
-    double radius = HUGE_VAL;  ///< r above; until measured, no place is far enough away
-    double cubes = 0;          ///< B above
-    double length = 0;         ///< ∫dl
+    double radius = HUGE_VAL;  ///< r of the error bound; infinite until measured, so that the series is never used
+    double cubes = 0;          ///< B of the error bound
+    double length = 0;         ///< sum of the edges' lengths times their multiplicities
     Vector3 first = Vector3::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     std::array<Eigen::Matrix3d, 3> third = {second, second, second};
 
-    void add(const Side& side);
-    /// 4π times the series, `toCenter` from the place.
-    Vector3 at(const Vector3& toCenter, double squaredDistance) const;
+    void add(const Edge& edge);
+    /// Returns 4π times the gradient by the series; `toCenter` runs from the point to the center.
+    Vector3 series(const Vector3& toCenter, double squaredDistance) const;
   };
 
-  void cluster(std::uint32_t begin, std::uint32_t end);
+  void addCluster(std::uint32_t begin, std::uint32_t end);
   void measure(Cluster& cluster) const;
-  /// By clusters of which t above is less than this.
+  /// Returns the gradient by the series of all clusters with t below `ratio`, and by single edges elsewhere.
   Gradient sum(const Vector3& local, double ratio) const;
 
-  std::vector<Side> sides_;
-  std::vector<Cluster> clusters_;  ///< a cluster before those that it is made of
+  std::vector<Edge> edges_;
+  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes its parts
 };
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::sign

@@ -8,19 +8,19 @@
 #include <span>
 #include <utility>
 
-namespace hpsdf::distance {
+namespace hpsdf::sign {
 namespace {
 
-/// The corners of all triangles by their vertex, as numbers 3·slot + k: those of v are [first[v], first[v + 1]), in the
-/// order of the mesh's triangles.
+/// The corners of all triangles, as numbers 3·slot + k, grouped by vertex. Those of vertex v are at [first[v],
+/// first[v + 1]), in the order of the mesh's triangles.
 struct CornersByVertex {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> corners;
 };
 
-CornersByVertex groupCorners(const Hierarchy& hierarchy) {
+CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
   const auto triangles = hierarchy.triangles();
-  std::vector<std::uint32_t> slots(triangles.size());  // of the mesh's triangles
+  std::vector<std::uint32_t> slots(triangles.size());  // by index in the mesh
   tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t slot) {
     slots[hierarchy.frames()[slot].triangle] = static_cast<std::uint32_t>(slot);
   });
@@ -29,25 +29,25 @@ CornersByVertex groupCorners(const Hierarchy& hierarchy) {
   for (const auto& triangle : triangles)
     for (const std::uint32_t v : triangle) ++grouped.first[v];
   for (std::size_t v = 1; v < grouped.first.size(); ++v) grouped.first[v] += grouped.first[v - 1];
-  // backwards, so that `first` ends up at each group's beginning
+  // Filling each group from its end leaves `first` at the beginning of the group.
   for (std::size_t t = slots.size(); t-- > 0;)
     for (std::uint32_t k = 3; k-- > 0;) grouped.corners[--grouped.first[triangles[slots[t]][k]]] = 3 * slots[t] + k;
   return grouped;
 }
 
-Vector3 unitNormal(const TriangleFrame& frame) { return hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()); }
+Vector3 unitNormal(const bvh::TriangleFrame& frame) { return hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()); }
 
-/// What happens at one vertex after another; keeps its memory from one to the next.
-class AtVertex {
+/// Computes the pseudonormals of one vertex after another, with buffers that are kept between them.
+class VertexVisitor {
  public:
-  AtVertex(const Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
+  VertexVisitor(const bvh::Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
       : frames_(hierarchy.frames()),
         triangles_(hierarchy.triangles()),
         vertices_(hierarchy.vertices()),
         nextSide_(nextSide) {}
 
-  /// Returns the vertex's pseudonormal and links the sides that run from it to no lower vertex. `corners`: all at this
-  /// vertex.
+  /// Returns the vertex's pseudonormal from all its `corners`, and links the sides between it and vertices of at least
+  /// its own index.
   Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
     sides_.clear();
     numbers_.clear();
@@ -73,7 +73,7 @@ class AtVertex {
 
   void linkSides() {
     std::sort(sides_.begin(), sides_.end());
-    std::size_t first = 0;  // of those at the same edge
+    std::size_t first = 0;  // side at the current edge
     for (std::size_t i = 0; i < sides_.size(); ++i) {
       const bool last = i + 1 == sides_.size() || sides_[i + 1] >> 32 != sides_[i] >> 32;
       nextSide_[numberOf(sides_[i])] = numberOf(sides_[last ? first : i + 1]);
@@ -82,29 +82,30 @@ class AtVertex {
   }
   std::uint32_t numberOf(std::uint64_t side) const { return numbers_[static_cast<std::uint32_t>(side)]; }
 
-  std::span<const TriangleFrame> frames_;
+  std::span<const bvh::TriangleFrame> frames_;
   std::span<const std::array<std::uint32_t, 3>> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
-  std::vector<std::uint64_t> sides_;  ///< other vertex, place in numbers_
-  std::vector<std::uint32_t> numbers_;
+  /// Other vertex in the high half, index in numbers_ in the low half: sorting groups sides by edge.
+  std::vector<std::uint64_t> sides_;
+  std::vector<std::uint32_t> numbers_;  ///< side numbers 3·slot + k
 };
 
 }  // namespace
 
-Pseudonormals::Pseudonormals(const Hierarchy& hierarchy)
+Pseudonormals::Pseudonormals(const bvh::Hierarchy& hierarchy)
     : vertices_(hierarchy.vertices().size()), nextSide_(3 * hierarchy.triangles().size()) {
   const CornersByVertex grouped = groupCorners(hierarchy);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size()), [&](const auto& range) {
-    AtVertex at(hierarchy, nextSide_);
+    VertexVisitor visitor(hierarchy, nextSide_);
     for (std::size_t v = range.begin(); v < range.end(); ++v)
       vertices_[v] =
-          at.visit(static_cast<std::uint32_t>(v),
-                   std::span(grouped.corners).subspan(grouped.first[v], grouped.first[v + 1] - grouped.first[v]));
+          visitor.visit(static_cast<std::uint32_t>(v),
+                        std::span(grouped.corners).subspan(grouped.first[v], grouped.first[v + 1] - grouped.first[v]));
   });
 }
 
-Vector3 Pseudonormals::ofEdge(const Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const {
+Vector3 Pseudonormals::ofEdge(const bvh::Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const {
   const auto rank = [&](std::uint32_t side) { return std::pair(hierarchy.frames()[side / 3].triangle, side); };
   std::uint32_t side = 3 * slot + k;
   while (rank(nextSide_[side]) > rank(side)) side = nextSide_[side];
@@ -121,4 +122,4 @@ std::size_t Pseudonormals::bytes() const {
   return vertices_.size() * sizeof(vertices_[0]) + nextSide_.size() * sizeof(nextSide_[0]);
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::sign

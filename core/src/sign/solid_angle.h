@@ -6,25 +6,30 @@
 
 #include "hpsdf/types.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::sign {
 
-/// A sum of angles, by the product of complex numbers that have them: one arc tangent at its end, and a count of whole
-/// turns.
+/// A sum of angles that needs one arc tangent only: it multiplies complex numbers that have these angles, and counts
+/// the whole turns.
 class AngleSum {
  public:
-  /// The angle of x + iy, in (−π, π].
+  /// Adds the angle of x + iy, in (−π, π]; adds nothing for 0.
   void add(double x, double y) {
     if (x == 0 && y == 0) return;
-    const double real = real_ * x - imaginary_ * y, imaginary = real_ * y + imaginary_ * x + 0.0;  // no −0
+    const double real = real_ * x - imaginary_ * y;
+    const double imaginary = real_ * y + imaginary_ * x + 0.0;  // the 0.0 turns −0 into 0
+    // The arc tangent of the product jumps where the sum passes an odd multiple of π.
     if (y > 0 && imaginary_ >= 0 && imaginary < 0) ++turns_;
     if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
-    if (y == 0 && x < 0 && (imaginary_ > 0 || (imaginary_ == 0 && real_ < 0))) ++turns_;  // by half a turn
+    const bool addsHalfTurn = y == 0 && x < 0;
+    if (addsHalfTurn && (imaginary_ > 0 || (imaginary_ == 0 && real_ < 0))) ++turns_;
+    // Long products would overflow or underflow: only their angle is of interest.
     const double size = std::abs(real) + std::abs(imaginary);
     const double scale = size < 1e-100 ? 1e100 : size > 1e100 ? 1e-100 : 1;
     real_ = scale * real;
     imaginary_ = scale * imaginary;
   }
 
+  /// Returns the sum in radians.
   double value() const { return std::atan2(imaginary_, real_) + 2 * std::numbers::pi * turns_; }
 
  private:
@@ -32,11 +37,11 @@ class AngleSum {
   int turns_ = 0;
 };
 
-/// Adds half of the solid angle of a triangle with these corners, seen from the origin (van Oosterom and Strackee
-/// 1983); above 0 where the origin is behind it.
-inline void addHalfAngle(const Vector3& a, const Vector3& b, const Vector3& c, AngleSum& sum) {
+/// Adds half of the signed solid angle of the triangle abc, seen from the origin (van Oosterom and Strackee 1983). It
+/// is positive where the origin lies behind the triangle.
+inline void addHalfSolidAngle(const Vector3& a, const Vector3& b, const Vector3& c, AngleSum& sum) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm(), product = la * lb * lc;
   if (product > 0) sum.add(1 + (a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / product, a.dot(b.cross(c)) / product);
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::sign

@@ -8,24 +8,25 @@
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::surface {
 
-/// Whether two triangles have a point in common, without rounding. Coordinates of order 1.
-bool meet(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
+/// Returns true if two triangles have a point in common, decided exactly. Their coordinates must be of order 1.
+bool intersect(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
 
-/// Whether a side of the second, of those that count, passes through or touches the first, both in one plane but for
-/// rounding, seen along the axis from which the second shows the most area.
-bool sidesCut(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other,
-              const std::array<bool, 3>& counts);
+/// Returns true if an edge of the coplanar triangle `other`, among those that `counts` selects, intersects the triangle
+/// `one`. Both are projected along the axis from which `other` shows the most area.
+bool edgesIntersect(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other,
+                    const std::array<bool, 3>& counts);
 
-/// Whether they lie in one plane, but for rounding. Coordinates of order 1.
-bool lieInOnePlane(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
+/// Returns true if two triangles are coplanar, up to rounding. Their coordinates must be of order 1.
+bool areCoplanar(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
 
-/// A power of two, so that it rounds nothing, times which coordinates are of order 1.
+/// Returns a factor that scales coordinates to order 1. It is a power of two, so that scaling is exact.
 double scaleToOne(std::span<const Vector3> vertices);
 
-/// `hpsdf::findCrossings` of a hierarchy's triangles, by their indices in the mesh. With a margin, of coordinates of
-/// order 1, also those that come as near each other, to rounding.
-Crossings findCrossings(const Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress);
+/// Finds the crossings of a hierarchy's triangles like `hpsdf::findCrossings`, with indices in the mesh. If `margin`,
+/// in coordinates of order 1, is above 0, pairs of triangles that are nearer than it count as crossings too; this is
+/// decided with rounding.
+Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress);
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::surface

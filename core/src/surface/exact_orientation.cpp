@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <limits>
 
-namespace hpsdf {
+namespace hpsdf::surface {
 namespace {
 
-/// A double, and what rounding left out of it.
+/// The unevaluated sum of a rounded result and its rounding error.
 struct Exact {
   double value, rest;
 };
@@ -25,8 +25,8 @@ Exact productOf(double a, double b) {
   return {product, std::fma(a, b, -product)};
 }
 
-/// A sum of doubles without rounding: as parts that do not overlap, the smallest first (Shewchuk 1997,
-/// "Grow-Expansion", with its zeros left out).
+/// An exact sum of doubles, stored as non-overlapping parts, the smallest first. Zero parts are removed (Shewchuk 1997,
+/// "Grow-Expansion").
 class ExactSum {
  public:
   void add(double value) {
@@ -40,7 +40,7 @@ class ExactSum {
     count_ = kept;
   }
 
-  /// Adds a product of up to three factors.
+  /// Adds sign·a·b exactly.
   void add(const Exact& a, const Exact& b, double sign) {
     for (const double x : {a.value, a.rest})
       for (const double y : {b.value, b.rest}) {
@@ -49,6 +49,7 @@ class ExactSum {
         add(product.value);
       }
   }
+  /// Adds sign·a·b·c exactly.
   void add(const Exact& a, const Exact& b, const Exact& c, double sign) {
     for (const double x : {a.value, a.rest})
       for (const double y : {b.value, b.rest}) {
@@ -58,17 +59,17 @@ class ExactSum {
       }
   }
 
-  /// The greatest part decides.
+  /// Returns the sign of the sum, which is that of its greatest part.
   int sign() const { return count_ == 0 ? 0 : parts_[count_ - 1] > 0 ? 1 : -1; }
 
  private:
-  std::array<double, 200> parts_;  // of six products of three factors there are 192 at most
+  std::array<double, 200> parts_;  // six products of three factors have at most 192 parts
   std::size_t count_ = 0;
 };
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon() / 2;
 
-/// By rounded arithmetic, where that is certain (Shewchuk's bounds); else 2.
+/// Returns the sign of a rounded value if `bound` times `magnitude` exceeds its rounding error (Shewchuk 1997), else 2.
 int roundedSign(double value, double magnitude, double bound) {
   if (value > bound * magnitude) return 1;
   if (-value > bound * magnitude) return -1;
@@ -113,4 +114,4 @@ int orientation(const std::array<int, 2>& axes, const Vector3& a, const Vector3&
   return sum.sign();
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::surface

@@ -14,21 +14,22 @@
 #include "mesh/directed_edges.h"
 #include "mesh/orientation.h"
 #include "mesh/patches.h"
-#include "sign/inside.h"
-#include "sign/winding.h"
+#include "sign/winding_number.h"
+#include "sign/winding_sign.h"
 #include "surface/bodies.h"
 
 namespace hpsdf {
+namespace surface {
 namespace {
 
-/// Faces that are turned together.
+/// The faces of a body, which are reversed as a whole.
 struct Body {
   std::vector<std::uint32_t> faces;
   double area = 0, volume = 0;
   Box box;
   bool closed = false;
-  bool solid = false;   ///< its volume tells inside from outside
-  bool turned = false;  ///< is to be
+  bool solid = false;     ///< true if the sign of the volume is reliable
+  bool reversed = false;  ///< true if the faces are to be reversed
 };
 
 Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
@@ -36,68 +37,69 @@ Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
   return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]) / 2;
 }
 
-void turn(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
+void reverse(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
 
-/// Makes the triangles of each patch look the way of the greater part of its area, but for those that cannot; how many
-/// were turned.
-std::size_t agree(TriangleMesh& mesh, const Patches& patches) {
+/// Orients the faces of each patch like the greater part of its area, except those of one-sided patches. Returns the
+/// number of reversed faces.
+std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   std::vector<double> area(patches.count), against(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
-    (patches.against[f] ? against : area)[patches.of[f]] += areaVector(mesh, f).norm();
-  std::size_t turned = 0;
+    (patches.against[f] ? against : area)[patches.patchOf[f]] += areaVector(mesh, f).norm();
+  std::size_t reversed = 0;
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    const std::uint32_t patch = patches.of[f];
+    const std::uint32_t patch = patches.patchOf[f];
     const char minority = against[patch] <= area[patch] ? 1 : 0;
     if (patches.oneSided[patch] || patches.against[f] != minority) continue;
-    turn(mesh, f);
-    ++turned;
+    reverse(mesh, f);
+    ++reversed;
   }
-  return turned;
+  return reversed;
 }
 
-/// By patch; those that belong to another's body have no faces. What has one side only is no solid. Volumes are as of
-/// tetrahedra between the triangles and the middle of the body's box.
-std::vector<Body> measured(const TriangleMesh& mesh, const Patches& patches, const Bodies& bodies) {
-  std::vector<Body> found(patches.count);
+/// Returns the bodies, each at the index of its lowest patch; entries of other patches have no faces. Volumes are sums
+/// of the tetrahedra between the triangles and the center of the body's box. One-sided bodies are not solid.
+std::vector<Body> measureBodies(const TriangleMesh& mesh, const mesh::Patches& patches, const Bodies& bodies) {
+  std::vector<Body> measured(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    Body& body = found[bodies.of[patches.of[f]]];
+    Body& body = measured[bodies.ofPatch[patches.patchOf[f]]];
     body.faces.push_back(f);
     body.area += areaVector(mesh, f).norm();
     for (const std::uint32_t v : mesh.triangles[f]) body.box.extend(mesh.vertices[v]);
   }
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    Body& body = found[i];
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    Body& body = measured[i];
     if (body.faces.empty() || patches.oneSided[i]) continue;
     for (const std::uint32_t f : body.faces)
       body.volume += areaVector(mesh, f).dot(mesh.vertices[mesh.triangles[f][0]] - body.box.center()) / 3;
     body.closed = bodies.closed[i] != 0;
-    body.solid = isPlain(body.volume, body.area, body.box, body.closed);
-    body.turned = body.solid && body.volume < 0;
+    body.solid = mesh::hasReliableVolumeSign(body.volume, body.area, body.box, body.closed);
+    body.reversed = body.solid && body.volume < 0;
   }
-  return found;
+  return measured;
 }
 
-void turnBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
+void reverseBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
   for (const Body& body : bodies)
-    if (body.turned)
-      for (const std::uint32_t f : body.faces) turn(mesh, f);
+    if (body.reversed)
+      for (const std::uint32_t f : body.faces) reverse(mesh, f);
 }
 
-/// Winding numbers of some bodies.
-class Around {
+/// The winding number of the solid ones of some bodies.
+class BodyWinding {
  public:
-  Around(const TriangleMesh& mesh, std::span<const Body> bodies)
+  BodyWinding(const TriangleMesh& mesh, std::span<const Body> bodies)
       : surface_(surfaceOf(mesh, bodies)), hierarchy_(surface_, boundingBox(surface_)), winding_(hierarchy_) {}
-  Around(const Around&) = delete;
-  Around& operator=(const Around&) = delete;
+  BodyWinding(const BodyWinding&) = delete;
+  BodyWinding& operator=(const BodyWinding&) = delete;
 
-  /// To a quarter.
-  double times(const Vector3& place) const {
-    return winding_.within(place, 0.25, [](const auto&) { return false; }).value;
+  /// Returns the winding number to within 0.25.
+  double windingNumber(const Vector3& x) const {
+    return winding_.estimateWithin(x, 0.25, [](const auto&) { return false; }).value;
   }
 
  private:
-  /// With the corners of each face its own, so that a small part of a large mesh takes little.
+  /// Returns the faces of the solid bodies, each with corners of its own, so that a small body of a large mesh costs
+  /// little.
   static TriangleMesh surfaceOf(const TriangleMesh& mesh, std::span<const Body> bodies) {
     TriangleMesh surface{.vertices = {}, .triangles = {}, .name = mesh.name};
     for (const Body& body : bodies) {
@@ -112,106 +114,108 @@ class Around {
   }
 
   TriangleMesh surface_;
-  distance::Hierarchy hierarchy_;
-  distance::Winding winding_;
+  bvh::Hierarchy hierarchy_;
+  sign::WindingNumber winding_;
 };
 
-/// Places spread evenly over a body's area, so far before it.
-std::vector<Vector3> placesBefore(const TriangleMesh& mesh, const Body& body, double aside) {
-  constexpr int kPlaces = 32;
-  constexpr double kStepAlong = 0.7548776662466927, kStepAcross = 0.5698402909980532;  // Roberts' R2 sequence
-  std::vector<Vector3> places;
+/// Returns points that are spread evenly over the area of a body, at `offset` along the normals, by Roberts' R2
+/// sequence.
+std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, double offset) {
+  constexpr int kPoints = 32;
+  constexpr double kStepAlong = 0.7548776662466927, kStepAcross = 0.5698402909980532;
+  std::vector<Vector3> points;
   double passed = 0;
   for (const std::uint32_t f : body.faces) {
     const Vector3 area = areaVector(mesh, f);
     passed += area.norm();
-    for (double n = 0.5 + static_cast<double>(places.size()); n * body.area <= passed * kPlaces; ++n) {
-      double along = n * kStepAlong - std::floor(n * kStepAlong),
-             across = n * kStepAcross - std::floor(n * kStepAcross);
+    for (double n = 0.5 + static_cast<double>(points.size()); n * body.area <= passed * kPoints; ++n) {
+      double along = n * kStepAlong - std::floor(n * kStepAlong);
+      double across = n * kStepAcross - std::floor(n * kStepAcross);
       if (along + across > 1) {
         along = 1 - along;
         across = 1 - across;
       }
       const auto& [a, b, c] = mesh.triangles[f];
-      places.push_back(mesh.vertices[a] + along * (mesh.vertices[b] - mesh.vertices[a]) +
-                       across * (mesh.vertices[c] - mesh.vertices[a]) + aside * area.stableNormalized());
+      points.push_back(mesh.vertices[a] + along * (mesh.vertices[b] - mesh.vertices[a]) +
+                       across * (mesh.vertices[c] - mesh.vertices[a]) + offset * area.stableNormalized());
     }
   }
-  return places;
+  return points;
 }
 
-/// What the mesh as it was given says of the way a body looks.
-enum class Given { unclear, right, inwards };
+enum class Orientation { undecided, outward, inward };
 
-/// Of three quarters and more of such places before it and behind it, leaving out those where something else of the
-/// mesh takes the body back. `right`: outside before it, inside behind it. `inwards`: so it would be with all turned.
-/// Where it is both, because a body touches another that looks the other way, it is as its volume has it, `byVolume`.
-Given givenWay(const Around& given, const std::vector<Vector3>& before, const std::vector<Vector3>& behind,
-               Given byVolume) {
-  std::ptrdiff_t right = 0, inwards = 0, left = std::ssize(before), all = left;
+/// Returns the orientation of a body that the winding numbers of the mesh as imported show: step 4 of `repaired`.
+/// `byVolume` is the orientation by the body's own volume.
+Orientation importedOrientation(const BodyWinding& imported, const std::vector<Vector3>& before,
+                                const std::vector<Vector3>& behind, Orientation byVolume) {
+  std::ptrdiff_t outward = 0, inward = 0, left = std::ssize(before), all = left;
   const auto isMost = [&](std::ptrdiff_t count) { return 4 * count >= 3 * all && count > 0; };
   const auto canBeMost = [&](std::ptrdiff_t count) { return 4 * (count + left) >= 3 * all; };
-  for (std::size_t n = 0; n < before.size() && (canBeMost(right) || canBeMost(inwards)); ++n, --left) {
-    const long from = std::lround(given.times(before[n])), to = std::lround(given.times(behind[n]));
+  for (std::size_t n = 0; n < before.size() && (canBeMost(outward) || canBeMost(inward)); ++n, --left) {
+    const long from = std::lround(imported.windingNumber(before[n])),
+               to = std::lround(imported.windingNumber(behind[n]));
     all -= from == to;
-    const bool isRight = from <= 0 && to >= 1, isInwards = from <= -1 && to >= 0;
-    right += isRight && !(isInwards && byVolume == Given::inwards);
-    inwards += isInwards && !(isRight && byVolume == Given::right);
+    const bool isOutward = from <= 0 && to >= 1, isInward = from <= -1 && to >= 0;
+    outward += isOutward && !(isInward && byVolume == Orientation::inward);
+    inward += isInward && !(isOutward && byVolume == Orientation::outward);
   }
-  return isMost(right) ? Given::right : isMost(inwards) ? Given::inwards : Given::unclear;
+  return isMost(outward) ? Orientation::outward : isMost(inward) ? Orientation::inward : Orientation::undecided;
 }
 
-/// Sets anew which bodies are turned, where there are several solids and any of them was:
-/// - one stays that has the outside before it and the inside behind it as given, such as a cavity,
-/// - one is turned that had so were all turned, such as a cavity of a shell that looks inwards, and its outer side; but
-///   none that is open and looks outwards: what surrounds it is less plain than its volume,
-/// - of the others, one that looks inwards is turned but for a cavity: for three quarters of its area and more within
-///   an odd number of other solids. What merely reaches into another is none; cavities may reach a little into each
-///   other.
-/// `outward`: as it is with all solids looking outwards.
-void spareCavities(const TriangleMesh& given, const TriangleMesh& outward, std::vector<Body>& bodies) {
-  if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::turned)) return;
-  const Around all(outward, bodies), asGiven(given, bodies);
-  const double aside = distance::besideSurface(boundingBox(given));
+/// Decides again which bodies are reversed, by steps 4 and 5 of `repaired`, where there are several solid bodies and
+/// any of them is to be reversed. All solid bodies of `outward` are oriented outward.
+void keepCavityOrientation(const TriangleMesh& imported, const TriangleMesh& outward, std::vector<Body>& bodies) {
+  if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::reversed)) return;
+  const BodyWinding allOutward(outward, bodies), asImported(imported, bodies);
+  const double offset = sign::probeDistance(boundingBox(imported));
   tbb::parallel_for(std::size_t{0}, bodies.size(), [&](std::size_t i) {
     Body& body = bodies[i];
     if (!body.solid) return;
-    const std::vector<Vector3> before = placesBefore(given, body, aside), behind = placesBefore(given, body, -aside);
-    const Given way = givenWay(asGiven, before, behind, body.turned ? Given::inwards : Given::right);
-    if (way == Given::unclear && body.turned) {
-      const Around itself(outward, {&body, 1});
-      const auto within = std::ranges::count_if(behind, [&](const Vector3& x) {  // before it as it looks outwards
-        return std::lround(all.times(x) - itself.times(x)) % 2 != 0;
+    const std::vector<Vector3> before = pointsBeside(imported, body, offset);
+    const std::vector<Vector3> behind = pointsBeside(imported, body, -offset);
+    const Orientation orientation =
+        importedOrientation(asImported, before, behind, body.reversed ? Orientation::inward : Orientation::outward);
+    if (orientation == Orientation::undecided && body.reversed) {
+      // The body is oriented inward: `behind` are the points outside it.
+      const BodyWinding itself(outward, {&body, 1});
+      const auto within = std::ranges::count_if(behind, [&](const Vector3& x) {
+        return std::lround(allOutward.windingNumber(x) - itself.windingNumber(x)) % 2 != 0;
       });
-      body.turned = 4 * within < 3 * std::ssize(behind);
-    } else if (way != Given::unclear) {
-      body.turned = way == Given::inwards && (body.turned || body.closed);
+      body.reversed = 4 * within < 3 * std::ssize(behind);
+    } else if (orientation != Orientation::undecided) {
+      body.reversed = orientation == Orientation::inward && (body.reversed || body.closed);
     }
   });
 }
 
 }  // namespace
+}  // namespace surface
 
 RepairedMesh repaired(ImportedMesh imported) {
   TriangleMesh& mesh = imported.mesh;
-  distance::requireSurface(mesh);
-  const Patches patches = patchesOf(mesh.triangles.size(), sidesByEdge(mesh.triangles));
+  bvh::requireSurface(mesh);
   RepairedMesh result;
-  result.turnedFaces = agree(mesh, patches);
-  const Bodies bodies = bodiesOf(mesh, patches, sidesByEdge(mesh.triangles));
-  std::vector<Body> found = measured(mesh, patches, bodies);
-  TriangleMesh outward = mesh;
-  turnBodies(outward, found);
-  spareCavities(mesh, outward, found);
-  turnBodies(mesh, found);
-  result.turnedPatches = static_cast<std::size_t>(
-      std::ranges::count_if(bodies.of, [&](std::uint32_t body) { return found[body].turned; }));
 
+  // Orient the patches, then measure the bodies that they form.
+  const mesh::Patches patches = mesh::patchesOf(mesh.triangles.size(), mesh::directedEdgesOf(mesh.triangles));
+  result.reversedFaces = surface::orientPatches(mesh, patches);
+  const surface::Bodies bodies = surface::findBodies(mesh, patches, mesh::directedEdgesOf(mesh.triangles));
+  std::vector<surface::Body> measured = surface::measureBodies(mesh, patches, bodies);
+
+  // Reverse the bodies that are oriented inward, except cavities.
+  TriangleMesh outward = mesh;
+  surface::reverseBodies(outward, measured);
+  surface::keepCavityOrientation(mesh, outward, measured);
+  surface::reverseBodies(mesh, measured);
+  result.reversedPatches = static_cast<std::size_t>(
+      std::ranges::count_if(bodies.ofPatch, [&](std::uint32_t body) { return measured[body].reversed; }));
+
+  // Update what depends on orientation in the report.
   const MeshReport now = inspect(mesh);
-  imported.report.inconsistentEdges = now.inconsistentEdges;  // nothing else depends on which way faces look
+  imported.report.inconsistentEdges = now.inconsistentEdges;
   imported.report.unbalancedEdges = now.unbalancedEdges;
   imported.report.volume = now.volume;
-  result.leftEdges = now.inconsistentEdges;
   result.imported = std::move(imported);
   return result;
 }

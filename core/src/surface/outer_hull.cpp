@@ -16,40 +16,44 @@
 
 #include "hpsdf/error.h"
 #include "mesh/duplicates.h"
-#include "mesh/message_prefix.h"
+#include "mesh/mesh_error.h"
 #include "surface/crossings.h"
 #include "util/chunks.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::surface {
 namespace {
 
 using Corners = std::array<Vector3, 3>;
 
-/// Of the mesh's longest side: pieces are not cut further, unless they are too many; then twice as large ones, and so
-/// on.
+/// Length of the smallest pieces over the mesh's longest side. It doubles from the first value, up to the second, while
+/// there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
-constexpr double kCoarserBesideHoles = 8;  // times: what only holes leave unsure is not worth as many pieces
+/// Factor of that length for pieces that are uncertain only because of holes, which do not merit as many pieces.
+constexpr double kCoarserBesideHoles = 8;
 constexpr std::size_t kMostPairs = 2'000'000;
-constexpr std::size_t kMostPieces = 250'000;  // besides whole triangles
+constexpr std::size_t kMostPieces = 250'000;  // in addition to the mesh's triangles
 
-/// Whether both sides of a triangle, or of a part of it, are the inside; `cut`: others cut it still; `replaced`: by its
-/// parts.
-enum class Kind : char { surface, buried, unsure, cut, replaced };
+enum class PieceKind : char {
+  surface,      ///< a side is outside
+  inner,        ///< both sides are inside
+  undecided,    ///< no triangle intersects it, and its sides are unknown
+  intersected,  ///< other triangles intersect it, and it is too small to subdivide
+  replaced,     ///< its quarters are in the list
+};
 
 struct Piece {
   Corners corners;
-  std::uint32_t triangle;  ///< of which it is a part
+  std::uint32_t triangle;  ///< index of the triangle that contains it
   bool isWhole;
-  Kind kind = Kind::cut;
+  PieceKind kind = PieceKind::intersected;
 };
 
-/// One of the triangles that a triangle meets.
-struct Crosser {
+/// A triangle that intersects another one.
+struct Cutter {
   std::uint32_t triangle;
   Corners corners;
-  /// Lies in its plane: then only sides change what is beside that one, and only those that count: no neighbour goes on
-  /// in the plane.
-  bool inPlane;
+  bool isCoplanar;  ///< true if both triangles lie in one plane
+  /// The edges of a coplanar cutter that can cut: only where no neighbour continues the plane, the sides change.
   std::array<bool, 3> counts = {true, true, true};
 };
 
@@ -57,13 +61,15 @@ double longestSide(const Corners& t) {
   return std::sqrt(std::max({(t[1] - t[0]).squaredNorm(), (t[2] - t[1]).squaredNorm(), (t[0] - t[2]).squaredNorm()}));
 }
 
-bool cuts(const Crosser& crosser, const Corners& piece) {
-  return crosser.inPlane ? sidesCut(piece, crosser.corners, crosser.counts) : meet(piece, crosser.corners);
+bool cuts(const Cutter& cutter, const Corners& piece) {
+  return cutter.isCoplanar ? edgesIntersect(piece, cutter.corners, cutter.counts) : intersect(piece, cutter.corners);
 }
 
 [[noreturn]] void refuse(const TriangleMesh& mesh) {
-  throw Error(messagePrefix(mesh.name) +
-              "it meets itself in too many places for a hull: leave out the hull, or mend the mesh first");
+  throw mesh::meshError(
+      mesh.name,
+      "the mesh intersects itself too often for an outer hull: use the winding number without the hull, or "
+      "repair the mesh first");
 }
 
 std::array<Corners, 4> quarters(const Corners& t) {
@@ -74,62 +80,64 @@ std::array<Corners, 4> quarters(const Corners& t) {
 
 struct TooManyPieces {};
 
-/// What of a triangle is no nearer to its sides than rounding: others that share these cut nothing of it.
-Corners interior(const Corners& t) {
+/// Returns the triangle, shrunk by a millionth towards its centroid: triangles that share only its boundary do not
+/// intersect it.
+Corners shrunk(const Corners& t) {
   const Vector3 middle = (t[0] + t[1] + t[2]) / 3;
   constexpr double kLess = 1e-6;
   return {t[0] + kLess * (middle - t[0]), t[1] + kLess * (middle - t[1]), t[2] + kLess * (middle - t[2])};
 }
 
-/// Cuts triangles where others meet them. All coordinates are scaled to order 1.
-class Cutter {
+/// Subdivides triangles where others intersect them. All coordinates are scaled to order 1.
+class Subdivider {
  public:
-  Cutter(double finest, const Progress& progress) : finest_(finest), progress_(progress) {}
+  Subdivider(double finest, const Progress& progress) : finest_(finest), progress_(progress) {}
 
-  /// Adds to the pieces those of one: cut, or unsure where others cut them no more. From any thread. Throws
-  /// `TooManyPieces`, `Cancelled`.
-  void add(Piece piece, const std::vector<Crosser>& crossers, std::vector<Piece>& pieces) {
-    progress_.pause();
-    const Corners corners = interior(piece.corners);
-    const bool isFinest = !canCut(piece.corners);
-    std::vector<Crosser> cutting;
-    for (const Crosser& crosser : crossers) {
-      if (cuts(crosser, corners)) cutting.push_back(crosser);
+  /// Appends a piece or, recursively, its quarters: undecided ones that no cutter intersects, and intersected ones of
+  /// the smallest size. Can be called from any thread. Throws `TooManyPieces`, `Cancelled`.
+  void subdivide(Piece piece, const std::vector<Cutter>& cutters, std::vector<Piece>& pieces) {
+    progress_.throwIfCancelled();
+    const Corners corners = shrunk(piece.corners);
+    const bool isFinest = !canSubdivide(piece.corners);
+    std::vector<Cutter> cutting;
+    for (const Cutter& cutter : cutters) {
+      if (cuts(cutter, corners)) cutting.push_back(cutter);
       if (isFinest && !cutting.empty()) break;
     }
-    if (cutting.empty()) piece.kind = Kind::unsure;
+    if (cutting.empty()) piece.kind = PieceKind::undecided;
     if (cutting.empty() || isFinest) return pieces.push_back(piece);
-    countMore();
-    for (const Corners& quarter : quarters(piece.corners)) add({quarter, piece.triangle, false}, cutting, pieces);
+    countQuarters();
+    for (const Corners& quarter : quarters(piece.corners)) subdivide({quarter, piece.triangle, false}, cutting, pieces);
   }
 
-  /// Puts the quarters of one that is unsure in its place. Throws `TooManyPieces`.
-  void refine(std::size_t at, std::vector<Piece>& pieces) {
-    countMore();
-    pieces[at].kind = Kind::replaced;
-    const Piece piece = pieces[at];
+  /// Replaces an undecided piece by its quarters, which are appended. Throws `TooManyPieces`.
+  void refine(std::size_t index, std::vector<Piece>& pieces) {
+    countQuarters();
+    pieces[index].kind = PieceKind::replaced;
+    const Piece piece = pieces[index];
     for (const Corners& quarter : quarters(piece.corners))
-      pieces.push_back({quarter, piece.triangle, false, Kind::unsure});
+      pieces.push_back({quarter, piece.triangle, false, PieceKind::undecided});
   }
 
-  bool canCut(const Corners& corners, double times = 1) const { return longestSide(corners) > times * finest_; }
+  bool canSubdivide(const Corners& corners, double factor = 1) const { return longestSide(corners) > factor * finest_; }
 
  private:
-  void countMore() {
-    if ((more_ += 3) > kMostPieces) throw TooManyPieces();
+  void countQuarters() {
+    if ((added_ += 3) > kMostPieces) throw TooManyPieces();
   }
 
   double finest_;
   const Progress& progress_;
-  std::atomic<std::size_t> more_ = 0;  ///< pieces than triangles
+  std::atomic<std::size_t> added_ = 0;  ///< number of pieces, less that of the triangles
 };
 
 using Pair = std::array<std::uint32_t, 2>;
 
-/// Each pair of triangles that meet, both ways, sorted.
-std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
+/// Returns each pair of triangles that intersect, in both orders, sorted.
+std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh,
+                                    const Progress& progress) {
   const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0, progress);
-  if (!crossings.all) refuse(mesh);
+  if (!crossings.complete) refuse(mesh);
   std::vector<Pair> pairs;
   for (const Crossing& crossing : crossings.found) {
     const auto [one, other] = crossing.triangles;
@@ -140,36 +148,38 @@ std::vector<Pair> pairsThatMeet(const Hierarchy& hierarchy, const TriangleMesh& 
   return pairs;
 }
 
-/// Neighbours go on beyond the side that they share, unless they are folded onto each other and so meet.
-void leaveOutInnerSides(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Crosser>& crossers) {
-  using DirectedSide = std::array<std::uint32_t, 3>;  // from, to, of which triangle
-  std::vector<DirectedSide> sides;
-  for (const Crosser& crosser : crossers)
-    for (int k = 0; k < 3 && crosser.inPlane; ++k) {
-      const auto& triangle = mesh.triangles[crosser.triangle];
-      sides.push_back({triangle[k], triangle[(k + 1) % 3], crosser.triangle});
+/// Clears `counts` of coplanar cutters at edges across which another one continues the plane. Neighbours that are
+/// folded onto each other do not continue it: they intersect, and are among the pairs.
+void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Cutter>& cutters) {
+  using DirectedEdge = std::array<std::uint32_t, 3>;  // from vertex, to vertex, triangle
+  std::vector<DirectedEdge> edges;
+  for (const Cutter& cutter : cutters)
+    for (int k = 0; k < 3 && cutter.isCoplanar; ++k) {
+      const auto& triangle = mesh.triangles[cutter.triangle];
+      edges.push_back({triangle[k], triangle[(k + 1) % 3], cutter.triangle});
     }
-  std::ranges::sort(sides);
-  for (Crosser& crosser : crossers) {
-    if (!crosser.inPlane) continue;
-    const auto& triangle = mesh.triangles[crosser.triangle];
+  std::ranges::sort(edges);
+  for (Cutter& cutter : cutters) {
+    if (!cutter.isCoplanar) continue;
+    const auto& triangle = mesh.triangles[cutter.triangle];
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t from = triangle[(k + 1) % 3], to = triangle[k];
-      for (auto side = std::ranges::lower_bound(sides, DirectedSide{from, to, 0});
-           side != sides.end() && (*side)[0] == from && (*side)[1] == to && crosser.counts[k]; ++side)
-        crosser.counts[k] = std::ranges::binary_search(pairs, Pair{crosser.triangle, (*side)[2]});
+      for (auto edge = std::ranges::lower_bound(edges, DirectedEdge{from, to, 0});
+           edge != edges.end() && (*edge)[0] == from && (*edge)[1] == to && cutter.counts[k]; ++edge)
+        cutter.counts[k] = std::ranges::binary_search(pairs, Pair{cutter.triangle, (*edge)[2]});
     }
   }
 }
 
-/// Pieces of all triangles. Coordinates are scaled to order 1. Throws `TooManyPieces`.
-std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
-                                Cutter& cutter) {
+/// Returns the pieces of all triangles, in their order, with coordinates times `scale`. Throws `TooManyPieces`.
+std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
+                                      Subdivider& subdivider) {
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
   };
-  std::vector<std::size_t> firsts;  // of the pairs of each triangle that has any, and the end
+  // Subdivide the triangles that others intersect, in parallel.
+  std::vector<std::size_t> firsts;  // index of the first pair of each such triangle, and the number of pairs
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (i == 0 || pairs[i][0] != pairs[i - 1][0]) firsts.push_back(i);
   firsts.push_back(pairs.size());
@@ -177,20 +187,21 @@ std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const st
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) {
     const std::uint32_t t = pairs[firsts[n]][0];
     const Corners corners = cornersOf(t);
-    std::vector<Crosser> crossers;
+    std::vector<Cutter> cutters;
     for (const Pair& pair : std::span(pairs).subspan(firsts[n], firsts[n + 1] - firsts[n])) {
-      if (areTwins(mesh.triangles[t], mesh.triangles[pair[1]])) continue;  // cuts nothing of it
+      if (mesh::haveSameCorners(mesh.triangles[t], mesh.triangles[pair[1]])) continue;  // a coincident triangle cuts nothing
       const Corners other = cornersOf(pair[1]);
-      crossers.push_back({pair[1], other, lieInOnePlane(corners, other)});
+      cutters.push_back({pair[1], other, areCoplanar(corners, other)});
     }
-    leaveOutInnerSides(mesh, pairs, crossers);
-    cutter.add({corners, t, true}, crossers, parts[n]);
+    ignoreInnerEdges(mesh, pairs, cutters);
+    subdivider.subdivide({corners, t, true}, cutters, parts[n]);
   });
+  // Merge them with the triangles that none intersects.
   std::vector<Piece> pieces;
   auto next = parts.begin();
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (next == parts.end() || next->front().triangle != t) {
-      pieces.push_back({cornersOf(t), t, true, Kind::unsure});
+      pieces.push_back({cornersOf(t), t, true, PieceKind::undecided});
       continue;
     }
     pieces.insert(pieces.end(), next->begin(), next->end());
@@ -199,70 +210,76 @@ std::vector<Piece> cutTriangles(const TriangleMesh& mesh, double scale, const st
   return pieces;
 }
 
-/// What a piece is that no triangle meets: surface, if it is that in its middle. One without an area has the inside on
-/// both sides: its neighbours hold its sides.
-Kind kindOf(const Corners& corners, const Inside& inside, double scale, double aside) {
-  const auto& [a, b, c] = corners;
-  const Vector3 middle = (a + b + c) / (3 * scale);
-  const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
-  const Vector3 before = middle + step, behind = middle - step;
-  if (before == behind) return Kind::buried;
-  if (!inside.contains(before) || !inside.contains(behind)) return Kind::surface;
-  double reach = 0;
-  for (const Vector3& corner : corners) reach = std::max(reach, (corner / scale - middle).norm());
-  return inside.isSameWithin(before, reach) && inside.isSameWithin(behind, reach) ? Kind::buried : Kind::unsure;
-}
+/// Probes the sides of pieces. Pieces have coordinates times `scale`; `offset` from the surface is in mesh units.
+struct SideProbe {
+  const sign::WindingSign& winding;
+  double scale, offset;
 
-/// Whether all is inside around a small piece that others cut, before and behind it and in fourteen directions, as far
-/// as it is long: then it is taken for what is left of a wall.
-bool isSurrounded(const Corners& corners, const Inside& inside, double scale, double aside) {
-  const auto& [a, b, c] = corners;
-  const Vector3 step = aside * (b - a).cross(c - a).stableNormalized();
-  const auto middleOf = [&](const Corners& t) { return Vector3((t[0] + t[1] + t[2]) / (3 * scale)); };
-  for (const Corners& quarter : quarters(corners))
-    for (const double sign : {-1.0, 1.0})
-      if (!inside.contains(middleOf(quarter) + sign * step)) return false;
-  const Vector3 middle = middleOf(corners);
-  const double far = longestSide(corners) / scale;
-  const auto isInside = [&](const Vector3& direction) {
-    return inside.contains(middle + far * direction.normalized());
-  };
-  for (const double sign : {-1.0, 1.0})
-    for (int axis = 0; axis < 3; ++axis)
-      if (!isInside(sign * Vector3::Unit(axis))) return false;
-  for (int n = 0; n < 8; ++n)
-    if (!isInside(Vector3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1))) return false;
-  return true;
-}
+  Vector3 centroid(const Corners& t) const { return (t[0] + t[1] + t[2]) / (3 * scale); }
 
-void setKinds(std::span<Piece> pieces, const Inside& inside, double scale, double aside, const Progress& progress,
-              std::string_view task) {
-  forEachChunk(pieces.size(), 64, progress, task, [&](std::size_t, std::size_t first, std::size_t count) {
-    for (Piece& piece : pieces.subspan(first, count)) {
-      if (piece.kind == Kind::unsure) piece.kind = kindOf(piece.corners, inside, scale, aside);
-      if (piece.kind == Kind::cut)
-        piece.kind = isSurrounded(piece.corners, inside, scale, aside) ? Kind::buried : Kind::surface;
-    }
-  });
-}
+  Vector3 step(const Corners& t) const { return offset * (t[1] - t[0]).cross(t[2] - t[0]).stableNormalized(); }
 
-/// Pieces that are buried, or surface; beside holes some that are too small to be cut further are unsure. Coordinates
-/// are scaled to order 1. Nothing if they are too many.
-std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
-                                           const Inside& inside, double finest, const Progress& progress) {
+  /// Classifies a piece that no triangle intersects. Degenerate pieces are inner, because their neighbours contain
+  /// their edges.
+  PieceKind classify(const Corners& corners) const {
+    const Vector3 middle = centroid(corners), aside = step(corners);
+    const Vector3 before = middle + aside, behind = middle - aside;
+    if (before == behind) return PieceKind::inner;
+    if (!winding.isInside(before) || !winding.isInside(behind)) return PieceKind::surface;
+    double radius = 0;
+    for (const Vector3& corner : corners) radius = std::max(radius, (corner / scale - middle).norm());
+    const bool isCertain = winding.isSameSideWithin(before, radius) && winding.isSameSideWithin(behind, radius);
+    return isCertain ? PieceKind::inner : PieceKind::undecided;
+  }
+
+  /// Returns true if an intersected piece is surrounded by inside: on both sides of its quarters, and in fourteen
+  /// directions at the distance of its length.
+  bool isSurrounded(const Corners& corners) const {
+    const Vector3 aside = step(corners);
+    for (const Corners& quarter : quarters(corners))
+      for (const double side : {-1.0, 1.0})
+        if (!winding.isInside(centroid(quarter) + side * aside)) return false;
+    const Vector3 middle = centroid(corners);
+    const double far = longestSide(corners) / scale;
+    const auto isInside = [&](const Vector3& direction) {
+      return winding.isInside(middle + far * direction.normalized());
+    };
+    for (const double side : {-1.0, 1.0})
+      for (int axis = 0; axis < 3; ++axis)
+        if (!isInside(side * Vector3::Unit(axis))) return false;
+    for (int n = 0; n < 8; ++n)
+      if (!isInside(Vector3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1))) return false;
+    return true;
+  }
+
+  void classify(std::span<Piece> pieces, const Progress& progress, std::string_view task) const {
+    detail::forEachChunk(pieces.size(), 64, progress, task, [&](std::size_t, std::size_t first, std::size_t count) {
+      for (Piece& piece : pieces.subspan(first, count)) {
+        if (piece.kind == PieceKind::undecided) piece.kind = classify(piece.corners);
+        if (piece.kind == PieceKind::intersected)
+          piece.kind = isSurrounded(piece.corners) ? PieceKind::inner : PieceKind::surface;
+      }
+    });
+  }
+};
+
+/// Returns all pieces with their kinds; undecided ones remain beside holes only. Nothing if there are too many.
+std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, double scale,
+                                                   const std::vector<Pair>& pairs, const sign::WindingSign& winding,
+                                                   double finest, const Progress& progress) {
   const Box box = boundingBox(mesh);
-  const double aside = besideSurface(box);
-  const std::string task = "leaving out walls within, pieces of 1/" + std::to_string(std::lround(1 / finest));
-  Cutter cutter(scale * finest * box.sizes().maxCoeff(), progress);
+  const SideProbe probe{winding, scale, sign::probeDistance(box)};
+  const std::string task = "removing inner walls, pieces of 1/" + std::to_string(std::lround(1 / finest));
+  Subdivider subdivider(scale * finest * box.sizes().maxCoeff(), progress);
   try {
-    std::vector<Piece> pieces = cutTriangles(mesh, scale, pairs, cutter);
-    setKinds(pieces, inside, scale, aside, progress, task);
-    // Beside holes the winding number changes along a piece.
+    std::vector<Piece> pieces = subdivideTriangles(mesh, scale, pairs, subdivider);
+    probe.classify(pieces, progress, task);
+    // Refine what is undecided, because the winding number varies along a piece beside holes.
     for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
-        if (pieces[i].kind == Kind::unsure && cutter.canCut(pieces[i].corners, kCoarserBesideHoles))
-          cutter.refine(i, pieces);
-      setKinds(std::span(pieces).subspan(end), inside, scale, aside, progress, task);
+        if (pieces[i].kind == PieceKind::undecided && subdivider.canSubdivide(pieces[i].corners, kCoarserBesideHoles))
+          subdivider.refine(i, pieces);
+      probe.classify(std::span(pieces).subspan(end), progress, task);
     }
     return pieces;
   } catch (const TooManyPieces&) {
@@ -272,17 +289,18 @@ std::optional<std::vector<Piece>> piecesOf(const TriangleMesh& mesh, double scal
 
 }  // namespace
 
-Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside, const Progress& progress) {
+OuterHull makeOuterHull(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, const sign::WindingSign& winding,
+                        const Progress& progress) {
   const double scale = scaleToOne(hierarchy.vertices());
-  const std::vector<Pair> pairs = pairsThatMeet(hierarchy, mesh, progress);
+  const std::vector<Pair> pairs = intersectingPairs(hierarchy, mesh, progress);
   std::optional<std::vector<Piece>> pieces;
   for (double finest = kFinest; !pieces && finest <= kCoarsest; finest *= 2)
-    pieces = piecesOf(mesh, scale, pairs, inside, finest, progress);
+    pieces = classifiedPieces(mesh, scale, pairs, winding, finest, progress);
   if (!pieces) refuse(mesh);
-  Hull hull{.mesh = {.vertices = mesh.vertices, .triangles = {}, .name = mesh.name}, .triangles = {}};
+  OuterHull hull{.mesh = {.vertices = mesh.vertices, .triangles = {}, .name = mesh.name}, .sourceTriangles = {}};
   for (const Piece& piece : *pieces) {
-    if (piece.kind == Kind::buried || piece.kind == Kind::replaced) continue;
-    hull.triangles.push_back(piece.triangle);
+    if (piece.kind == PieceKind::inner || piece.kind == PieceKind::replaced) continue;
+    hull.sourceTriangles.push_back(piece.triangle);
     if (piece.isWhole) {
       hull.mesh.triangles.push_back(mesh.triangles[piece.triangle]);
       continue;
@@ -291,9 +309,9 @@ Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& 
     for (const Vector3& corner : piece.corners) hull.mesh.vertices.push_back(corner / scale);
     hull.mesh.triangles.push_back({first, first + 1, first + 2});
   }
-  if (hull.triangles.empty())
-    throw Error(messagePrefix(mesh.name) + "no face has the outside beside it: there is no hull");
+  if (hull.sourceTriangles.empty())
+    throw mesh::meshError(mesh.name, "no face has the outside on a side, so that there is no outer hull");
   return hull;
 }
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::surface

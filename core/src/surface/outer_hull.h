@@ -5,25 +5,26 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/triangle_mesh.h"
-#include "sign/inside.h"
+#include "sign/winding_sign.h"
 
-namespace hpsdf::distance {
+namespace hpsdf::surface {
 
-/// What of a mesh is between outside and inside: its triangles without those that have the inside on both sides, such
-/// as walls within bodies that overlap.
+/// The outer hull of a mesh: its triangles without those that have the inside on both sides, such as inner walls of
+/// bodies that overlap (Attene 2010).
 ///
-/// A triangle that others meet within its sides is cut into quarters, and these again, until a piece is met by none, so
-/// that each of its sides is of one kind, or is a five-hundredth of the mesh's size: such a piece stays where a place
-/// before it, behind it or around it is outside. Where that would make more than 250,000 pieces, they are coarser, up
-/// to a thirty-second. Of a mesh with holes, the winding number changes along a piece: it stays as well where its
-/// middle is no wall, and is cut on until it is certain to be one.
-struct Hull {
+/// A triangle that others intersect is subdivided into quarters until no triangle intersects a piece, or the piece is
+/// no longer than 1/512 of the mesh's size. Pieces without intersection are classified at their centroid. Smallest
+/// pieces are kept if any probe in front of them, behind them or around them is outside. If this needs more than
+/// 250,000 pieces, the limit of size doubles, up to 1/32. In meshes with holes the winding number varies along a piece:
+/// pieces are then subdivided until it is certain that both sides are inside, and kept where that stays unknown.
+struct OuterHull {
   TriangleMesh mesh;
-  std::vector<std::uint32_t> triangles;  ///< of each, the index of that in the whole mesh of which it is a part
+  std::vector<std::uint32_t> sourceTriangles;  ///< for each triangle, the index of the original one that contains it
 };
 
-/// `hierarchy`: of the mesh; `inside`: made of that. Throws `Error`, naming the mesh, where it meets itself in too many
-/// places, and where nothing is left; `Cancelled`.
-Hull hullOf(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Inside& inside, const Progress& progress);
+/// `hierarchy` and `winding` are those of the mesh. Throws `Error`, naming the mesh, if it has more than two million
+/// crossings, if pieces of 1/32 are still too many, or if nothing is left. Throws `Cancelled`.
+OuterHull makeOuterHull(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, const sign::WindingSign& winding,
+                        const Progress& progress);
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::surface

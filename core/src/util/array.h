@@ -4,10 +4,10 @@
 #include <memory>
 #include <span>
 
-namespace hpsdf::distance {
+namespace hpsdf::detail {
 
-/// Elements without initial values: their memory is touched first where they are filled, by many threads, and not
-/// before by one.
+/// An array without initial values. Each thread touches memory first where it fills it, so that pages are placed near
+/// that thread and no single thread has to clear them beforehand.
 template <typename T>
 class Array {
  public:
@@ -24,4 +24,4 @@ class Array {
   std::size_t size_ = 0;
 };
 
-}  // namespace hpsdf::distance
+}  // namespace hpsdf::detail

@@ -8,7 +8,7 @@
 
 #include "hpsdf/error.h"
 
-namespace hpsdf {
+namespace hpsdf::detail {
 namespace {
 
 constexpr std::uint32_t kLongestText = 4096;
@@ -92,6 +92,6 @@ void CheckedReader::damaged(const std::string& how) const {
   refuse("the " + std::string(kind_.name) + " is damaged: " + how + "; " + std::string(kind_.remedy));
 }
 
-void CheckedReader::refuse(const std::string& why) const { throw Error(file_.string() + ": " + why); }
+void CheckedReader::refuse(const std::string& why) const { throw Error(ErrorKind::file, file_.string(), why); }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

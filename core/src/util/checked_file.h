@@ -1,5 +1,5 @@
 #pragma once
-// Files of numbers with a checksum at the end: the `.hpsdf` file, the checkpoint of a construction.
+// Files of numbers that end with a checksum: `.hpsdf` files and checkpoints of constructions.
 
 #include <bit>
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 struct XXH3_state_s;
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
 static_assert(std::endian::native == std::endian::little, "files are little-endian and arrays are written as they are");
 static_assert(sizeof(double) == 8 && std::numeric_limits<double>::is_iec559);
@@ -30,7 +30,7 @@ std::span<const std::byte> bytesOf(const T& value) {
   return std::as_bytes(std::span(&value, 1));
 }
 
-/// XXH3 (64 bits) over all bytes handed to it.
+/// XXH3 hash (64 bits) of all bytes added.
 class Checksum {
  public:
   Checksum();
@@ -44,10 +44,11 @@ class Checksum {
   std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
-/// Writer and reader have the same members for items, so that one function can list them for both directions.
+/// Writes numbers and then their checksum. `CheckedReader` has members of the same names, so that one function template
+/// can list the items of a file for both directions.
 class CheckedWriter {
  public:
-  /// Throws as `OutputFile` does, here and wherever it writes.
+  /// All members throw as `OutputFile` does.
   explicit CheckedWriter(const std::filesystem::path& file) : output_(file) {}
 
   template <typename T>
@@ -60,7 +61,7 @@ class CheckedWriter {
   void array(std::span<const T> values) {
     put(std::as_bytes(values));
   }
-  /// The checksum; then the file gets its name.
+  /// Writes the checksum and commits the file.
   void finish();
 
  private:
@@ -70,17 +71,18 @@ class CheckedWriter {
   Checksum checksum_;
 };
 
-/// What a reader's errors say of its file.
+/// Words for a file in the messages of `CheckedReader`.
 struct FileKind {
-  std::string_view name;    ///< "field file"
-  std::string_view wanted;  ///< "a .hpsdf file"
-  std::string_view remedy;  ///< for a damaged one: "build or copy it again"
+  std::string_view name;    ///< the file itself, such as "field file"
+  std::string_view wanted;  ///< the file to give, such as "a .hpsdf file"
+  std::string_view remedy;  ///< what to do about a damaged file, such as "build or copy it again"
 };
 
-/// Every member throws `Error` where the file ends too early, or says what cannot be.
+/// Reads what `CheckedWriter` wrote. Every member throws `Error` (file) where the file ends too early or holds a value
+/// that is not possible.
 class CheckedReader {
  public:
-  /// Throws `Error` for a file that is missing, of another type than a regular one, or not to be opened.
+  /// Throws `Error` (file) for a file that is missing, not a regular file, or cannot be opened.
   CheckedReader(const std::filesystem::path& file, const FileKind& kind);
 
   template <typename T>
@@ -89,14 +91,14 @@ class CheckedReader {
   }
   void flag(bool& value);
   void text(std::string& value);
-  /// An array whose size the file's length must allow, looked at before memory is taken.
+  /// Reads an array. A size that exceeds the rest of the file is refused before memory is allocated.
   template <typename T>
   void array(std::vector<T>& values, std::uint64_t count) {
     if (count > remaining() / sizeof(T)) damaged("it ends too early");
     values.resize(count);
     get(std::as_writable_bytes(std::span(values)));
   }
-  /// Expects the checksum, and then the end.
+  /// Compares the checksum and expects the end of the file.
   void finish();
 
   std::uint64_t remaining() const { return size_ - position_; }
@@ -114,4 +116,4 @@ class CheckedReader {
   Checksum checksum_;
 };
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

@@ -1,5 +1,5 @@
 #pragma once
-// Work on many items in parallel, in chunks that are the same for any number of threads.
+// Parallel work on many items in chunks, whose boundaries do not depend on the number of threads.
 
 #include <tbb/parallel_for.h>
 
@@ -10,15 +10,15 @@
 
 #include "hpsdf/error.h"
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
-/// Reports how many of so many parts of some work are done, and ends it where it is cancelled.
+/// Counts the finished parts of a task, reports their fraction, and throws `Cancelled` when the caller cancels.
 class Parts {
  public:
   Parts(const Progress& progress, std::string_view task, std::size_t count)
       : progress_(progress), task_(task), count_(count) {}
 
-  void begin() const { progress_.pause(); }
+  void begin() const { progress_.throwIfCancelled(); }
   void end() {
     if (!progress_.report) return;
     const std::lock_guard lock(reporting_);
@@ -33,17 +33,17 @@ class Parts {
   std::size_t done_ = 0;
 };
 
-/// How many chunks of this size hold so many items.
+/// The number of chunks of `size` items that hold all items.
 inline std::size_t chunksOf(std::size_t items, std::size_t size) { return (items + size - 1) / size; }
 
-/// work(chunk, first item, number of items), in parallel.
+/// Calls work(chunk, first item, number of items) for all chunks in parallel.
 template <typename Work>
 void forEachChunk(std::size_t items, std::size_t size, const Work& work) {
   tbb::parallel_for(std::size_t{0}, chunksOf(items, size),
                     [&](std::size_t chunk) { work(chunk, chunk * size, std::min(size, items - chunk * size)); });
 }
 
-/// The same, with the chunks that are done reported.
+/// Calls work(chunk, first item, number of items) for all chunks in parallel, and reports the chunks done.
 template <typename Work>
 void forEachChunk(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                   const Work& work) {
@@ -55,4 +55,4 @@ void forEachChunk(std::size_t items, std::size_t size, const Progress& progress,
   });
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

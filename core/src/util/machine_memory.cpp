@@ -7,22 +7,22 @@
 #include <limits>
 #include <string>
 
-namespace hpsdf {
+namespace hpsdf::detail {
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-/// Of a file that holds a number; "max" is none.
+/// The number that the file holds; "max", or no file, means no limit.
 double limitIn(const fs::path& file) {
   std::ifstream text(file);
   double bytes = 0;
   return text >> bytes ? bytes : kNoLimit;
 }
 
-/// Of the files of this name from a group up to where the groups begin. Within a container the group's own folder may
-/// be out of sight, and what is seen as the topmost is the container's.
+/// The least limit in the files of this name from a group's folder up to the root of the groups. Within a container the
+/// group's own folder may be invisible; the topmost visible folder is then the container's.
 double leastLimit(const fs::path& groups, fs::path group, const char* file) {
   double least = kNoLimit;
   for (;; group = group.parent_path()) {
@@ -37,7 +37,8 @@ double memoryOfControlGroups(const fs::path& root) {
   const fs::path groups = root / "sys/fs/cgroup";
   std::ifstream lines(root / "proc/self/cgroup");
   double least = kNoLimit;
-  for (std::string line; std::getline(lines, line);) {  // number:controllers:group, the second empty in version 2
+  // A line is number:controllers:group, with no controllers in version 2.
+  for (std::string line; std::getline(lines, line);) {
     const std::size_t first = line.find(':'), second = line.find(':', first + 1);
     if (first == std::string::npos || second == std::string::npos) continue;
     const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
@@ -55,4 +56,4 @@ double machineMemory() {
   return bytes;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

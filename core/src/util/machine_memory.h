@@ -2,13 +2,13 @@
 
 #include <filesystem>
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
-/// Bytes that this process's control groups allow it, which is infinity where they set no limit: the least of its own
-/// and of those above that, of version 1 and 2. `root`: the folder in which proc and sys lie.
+/// The bytes that control groups of version 1 and 2 allow this process, infinity without a limit: the least limit of
+/// its own group and of the groups above. `root` is the folder that contains proc and sys.
 double memoryOfControlGroups(const std::filesystem::path& root = "/");
 
-/// Bytes that this process can have at most: the machine's, or less where its control groups say so. Asked once.
+/// The bytes of the machine's memory, or fewer where control groups limit this process. The first call reads them.
 double machineMemory();
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

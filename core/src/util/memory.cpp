@@ -8,7 +8,7 @@
 
 namespace hpsdf {
 
-double allowedMemory() { return 0.75 * machineMemory(); }
+double allowedMemory() { return 0.75 * detail::machineMemory(); }
 
 std::string bytesText(double bytes) {
   struct Unit {
@@ -18,7 +18,7 @@ std::string bytesText(double bytes) {
   constexpr std::array<Unit, 4> kUnits = {{{1e9, "%.2f GB"}, {1e6, "%.2f MB"}, {1e3, "%.2f kB"}, {1, "%.0f bytes"}}};
   const Unit* unit = kUnits.begin();
   while (unit + 1 != kUnits.end() && bytes < unit->bytes) ++unit;
-  std::array<char, 400> text{};  // for any double
+  std::array<char, 400> text{};  // The longest double has 309 digits before the point.
   std::snprintf(text.data(), text.size(), unit->format, bytes / unit->bytes);
   return text.data();
 }
@@ -26,8 +26,9 @@ std::string bytesText(double bytes) {
 void requireMemory(const std::string& what, double bytes, std::string_view advice) {
   const double most = allowedMemory();
   if (bytes <= most) return;
-  throw Error(what + " would take some " + bytesText(bytes) + " of memory, more than the " + bytesText(most) +
-              " that are three quarters of what the machine or its control group has: " + std::string(advice));
+  throw Error(ErrorKind::limit, "",
+              what + " would take some " + bytesText(bytes) + " of memory, more than the " + bytesText(most) +
+                  " that are three quarters of what the machine or its control group has: " + std::string(advice));
 }
 
 }  // namespace hpsdf

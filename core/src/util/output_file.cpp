@@ -24,10 +24,10 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-constexpr std::string_view kTemporary = ".part-";  // a process and a number follow
+constexpr std::string_view kTemporary = ".part-";  ///< a process id, "-" and a number follow
 
-/// What the names of a file's temporary files begin with, without their path. Of a long name, which leaves no room for
-/// more, its beginning (of whole characters in UTF-8) and a hash of it all.
+/// The beginning of the names of a file's temporary files, without their path. A long name leaves no room for a suffix;
+/// it is replaced by its first characters (whole ones in UTF-8) and a hash of the name.
 std::string beginningOfTemporaries(const std::filesystem::path& file) {
   constexpr std::size_t kLongest = 100, kKept = 60;
   std::string name = file.filename();
@@ -41,7 +41,7 @@ std::string beginningOfTemporaries(const std::filesystem::path& file) {
   return name + std::string(kTemporary);
 }
 
-/// Two writers of the same file, in one process or in two, must not share a temporary name.
+/// A temporary name that no other writer of the same file uses, in this process or in another.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
@@ -54,7 +54,8 @@ struct Opened {
   std::FILE* stream;
 };
 
-/// Another one where the name is taken: a process that was killed may have had our number.
+/// Opens a new temporary file. A name may be taken by the file of a killed process that had the same process id; then
+/// the next name is tried.
 Opened openTemporary(const std::filesystem::path& file) {
   constexpr int kTries = 100;
   Opened opened;
@@ -66,7 +67,7 @@ Opened openTemporary(const std::filesystem::path& file) {
   return opened;
 }
 
-/// What a symbolic link stands for, so that the rename replaces the file and keeps the link.
+/// The target of a symbolic link, so that the rename replaces the target and keeps the link; other files stay.
 std::filesystem::path resolved(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_symlink(file, ignored)) return file;
@@ -74,7 +75,8 @@ std::filesystem::path resolved(const std::filesystem::path& file) {
   return target.empty() ? file : target;
 }
 
-/// Names of the temporary files in existence, for `removeUnfinished`. More than these at once are not remembered.
+/// Names of the existing temporary files, for `removeUnfinished`. Beyond 16 files at once, further names are not
+/// stored.
 std::array<std::atomic<const char*>, 16> unfinished{};
 static_assert(std::atomic<const char*>::is_always_lock_free, "a signal handler reads these");
 
@@ -92,7 +94,7 @@ void forget(const char* name) {
   }
 }
 
-/// A file of ours, by its name without its path.
+/// Returns true for the name, without its path, of a temporary file that this process is writing.
 bool isOurs(const std::filesystem::path& name) {
   return std::ranges::any_of(unfinished, [&](const auto& slot) {
     const char* ours = slot.load();
@@ -100,7 +102,7 @@ bool isOurs(const std::filesystem::path& name) {
   });
 }
 
-/// The process in the name of a temporary file of `file`; nothing for other files.
+/// The id of the process that wrote a temporary file of `file`, from the name; empty for other names.
 std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
   const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;
@@ -133,17 +135,19 @@ void OutputFile::removeUnfinished() noexcept {
 }
 
 OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)) {
-  if (file_.empty()) throw Error("the output file's name is empty; give a file name");
+  if (file_.empty()) throw Error(ErrorKind::file, "", "the output file's name is empty; give a file name");
   std::error_code error;
   const auto status = std::filesystem::status(file_, error);
   const auto refuse = [&](int why) {
-    throw Error(file.string() + ": cannot be written (" + reason(why) + "); check the folder");
+    throw Error(ErrorKind::file, file.string(), "cannot be written (" + reason(why) + "); check the folder");
   };
-  if (error == std::errc::filename_too_long) refuse(error.value());  // that of the temporary file is not
-  if (std::filesystem::is_directory(status)) throw Error(file.string() + ": is a folder; give a file name");
+  // A name that is too long is refused here, because the name of its temporary file is short enough.
+  if (error == std::errc::filename_too_long) refuse(error.value());
+  if (std::filesystem::is_directory(status))
+    throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
-    throw Error(file.string() + ": is not a regular file; give another name");
-  if (!file_.has_filename()) throw Error(file.string() + ": names a folder; give a file name");
+    throw Error(ErrorKind::file, file.string(), "is not a regular file; give another name");
+  if (!file_.has_filename()) throw Error(ErrorKind::file, file.string(), "names a folder; give a file name");
   Opened opened = openTemporary(file_);
   temporary_ = std::move(opened.name);
   stream_ = opened.stream;
@@ -160,7 +164,8 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::fail() {
-  throw Error(file_.string() + ": writing failed (" + reason(errno) + "); check the space left on the disk");
+  throw Error(ErrorKind::file, file_.string(),
+              "writing failed (" + reason(errno) + "); check the space left on the disk");
 }
 
 void OutputFile::write(std::span<const std::byte> bytes) {

@@ -1,6 +1,5 @@
 #pragma once
-// Random numbers that depend on a seed and a place in a sequence alone: the same for any number of threads and any
-// standard library.
+// Random numbers that depend only on a seed and an index: the same for any number of threads and any standard library.
 
 #include <cmath>
 #include <cstdint>
@@ -8,15 +7,16 @@
 
 #include "hpsdf/types.h"
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
-/// SplitMix64 (Steele, Lea, Flood 2014), a generator for each number of a sequence.
+/// SplitMix64 (Steele, Lea, Flood 2014). Each index of a sequence has a generator of its own.
 class Random {
  public:
-  Random(std::uint64_t seed, std::uint64_t number) : state_(mixed(mixed(seed) + number)) {}
+  Random(std::uint64_t seed, std::uint64_t index) : state_(mixed(mixed(seed) + index)) {}
 
   std::uint64_t next() { return mixed(state_ += 0x9e3779b97f4a7c15); }
-  /// In [0, 1), 53 bits.
+
+  /// A uniform number in [0, 1) with 53 random bits.
   double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
 
   Vector3 inBox(const Box& box) {
@@ -24,6 +24,7 @@ class Random {
     return box.min() + box.sizes().cwiseProduct(Vector3(x, y, z));
   }
 
+  /// A uniform point in the ball of this radius around the origin.
   Vector3 inBall(double radius) {
     const double z = 2 * unit() - 1, angle = 2 * std::numbers::pi * unit(), fromCenter = radius * std::cbrt(unit());
     const double fromAxis = std::sqrt(1 - z * z);
@@ -40,4 +41,4 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

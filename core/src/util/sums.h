@@ -4,9 +4,10 @@
 #include <cmath>
 #include <cstddef>
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
-/// Sums and the greatest of some values, none below 0. Those of chunks are to be added up in their order.
+/// Count, sum, sum of squares and maximum of non-negative values. Add the sums of chunks in the chunks' order, so that
+/// the rounding does not depend on the number of threads.
 struct Sums {
   std::size_t count = 0;
   double sum = 0, squares = 0, max = 0;
@@ -23,9 +24,10 @@ struct Sums {
     squares += other.squares;
     max = std::max(max, other.max);
   }
-  /// 0 without any.
+
+  // Mean and root mean square are 0 without any value.
   double mean() const { return count == 0 ? 0 : sum / static_cast<double>(count); }
   double rms() const { return count == 0 ? 0 : std::sqrt(squares / static_cast<double>(count)); }
 };
 
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

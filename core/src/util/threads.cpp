@@ -8,7 +8,7 @@
 namespace hpsdf {
 
 void runWithThreads(int threads, const std::function<void()>& work) {
-  // asked for more than it may have, TBB would complain on stderr
+  // TBB prints a warning on stderr when an arena asks for more threads than it may have.
   const int most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : std::min(threads, most));
   arena.execute(work);

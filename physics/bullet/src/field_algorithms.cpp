@@ -15,9 +15,9 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kMostContacts = SphereFeet::kMost;  // of two bodies: three of Bullet's manifolds
-constexpr int kNodes = 256;                               // of a soft body that are looked up together
-constexpr int kPieces = 64;                               // of a node's way
+constexpr std::size_t kMostContacts = SphereMinima::kMost;  // of two bodies, in three of Bullet's manifolds
+constexpr int kNodes = 256;                                 // number of a soft body's nodes that one task handles
+constexpr int kPieces = 64;                                 // greatest number of points sampled on a node's path
 
 const FieldShape* fieldOf(const btCollisionObject& object) {
   return dynamic_cast<const FieldShape*>(object.getCollisionShape());
@@ -34,10 +34,10 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// The first point of a node's way in a step at which it is as near as this; its end where there is none. So nothing
-/// that is thin is passed.
-Vector3 whereItTouches(const Field& field, const Vector3& from, const Vector3& to, double near) {
-  // of a way that is no number, as of any that is too long, the most
+/// The first sampled point of a node's path in a step whose distance from the field's body is less than `near`, or the
+/// path's end if there is none. Nodes therefore do not pass through thin bodies.
+Vector3 firstContact(const Field& field, const Vector3& from, const Vector3& to, double near) {
+  // A path whose length is NaN or too great has the greatest number of pieces.
   const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;
   if (pieces == 1) return to;
   std::array<Vector3, kPieces> points;
@@ -103,7 +103,7 @@ void RigidFieldAlgorithm::find(const btCollisionObject& first, const btCollision
   else if (other != nullptr && is(first, STATIC_PLANE_PROXYTYPE))
     withPlane(second, first, false);
   for (const BodyContact& contact : contacts_) findings.add(-contact.distance);
-  spread(kMostContacts, size_, contacts_);
+  reduceContacts(kMostContacts, size_, contacts_);
   findings.contacts = contacts_.size();
 }
 
@@ -124,13 +124,13 @@ void RigidFieldAlgorithm::withSphere(const btCollisionObject& field, const btCol
   const Eigen::Isometry3d ofField = worldFromMesh(field, shape);
   const Vector3 center = ofField.inverse() * fromBullet(sphere.getWorldTransform().getOrigin());
   const double margin = std::min(shape.getMargin(), 0.1 * radius);
-  if (shape.field().lowerBoundAround(center) > radius + margin) return feet_.forget();
-  for (const Foot& foot : feet_.find(shape.field().field(), center, radius, margin)) {
-    const Vector3 at = center + radius * foot.direction, normal = -(ofField.linear() * foot.direction);
+  if (shape.field().lowerBoundAround(center) > radius + margin) return minima_.forget();
+  for (const SphereMinimum& minimum : minima_.find(shape.field().field(), center, radius, margin)) {
+    const Vector3 at = center + radius * minimum.direction, normal = -(ofField.linear() * minimum.direction);
     if (sphereIsSecond)
-      contacts_.push_back({ofField * at, -normal, foot.value});
+      contacts_.push_back({ofField * at, -normal, minimum.value});
     else
-      contacts_.push_back({ofField * Vector3(at + foot.value * foot.direction), normal, foot.value});
+      contacts_.push_back({ofField * Vector3(at + minimum.value * minimum.direction), normal, minimum.value});
   }
 }
 
@@ -163,15 +163,19 @@ void RigidFieldAlgorithm::withPlane(const btCollisionObject& field, const btColl
 }
 
 void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
-  // in Bullet's order of the bodies, which may have been the other way round when this was made
+  // Bullet's order of the bodies may differ from that at the algorithm's creation: take the current one.
   const btCollisionObject* one = first.getCollisionObject();
   const btCollisionObject* other = second.getCollisionObject();
-  before_.clear();
+
+  // Remember the previous contacts, and make room for the new ones.
+  previous_.clear();
   for (btPersistentManifold* manifold : manifolds_) {
-    for (int i = 0; i < manifold->getNumContacts(); ++i) before_.push_back(manifold->getContactPoint(i));
+    for (int i = 0; i < manifold->getNumContacts(); ++i) previous_.push_back(manifold->getContactPoint(i));
     manifold->clearManifold();
   }
   while (4 * manifolds_.size() < contacts_.size()) manifolds_.push_back(m_dispatcher->getNewManifold(one, other));
+
+  // Each contact starts from the impulse of the nearest previous one.
   const double near = 0.1 * size_;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const BodyContact& contact = contacts_[i];
@@ -185,20 +189,19 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
     point.m_combinedRestitution = btManifoldResult::calculateCombinedRestitution(one, other);
     point.m_combinedRollingFriction = btManifoldResult::calculateCombinedRollingFriction(one, other);
     point.m_combinedSpinningFriction = btManifoldResult::calculateCombinedSpinningFriction(one, other);
-    // the solver starts from what it found for the nearest one in the step before
     const auto nearest = std::ranges::min_element(
-        before_, {}, [&](const btManifoldPoint& old) { return old.m_localPointB.distance2(point.m_localPointB); });
-    if (nearest != before_.end() && nearest->m_localPointB.distance2(point.m_localPointB) < near * near) {
-      point.m_appliedImpulse = nearest->m_appliedImpulse;  // of friction Bullet takes none
-      before_.erase(nearest);
+        previous_, {}, [&](const btManifoldPoint& old) { return old.m_localPointB.distance2(point.m_localPointB); });
+    if (nearest != previous_.end() && nearest->m_localPointB.distance2(point.m_localPointB) < near * near) {
+      point.m_appliedImpulse = nearest->m_appliedImpulse;  // Bullet does not reuse impulses of friction
+      previous_.erase(nearest);
     }
     manifolds_[i / 4]->addManifoldPoint(point);
   }
 }
 
-/// A soft body and a field in one step. Places are in the field's coordinates.
-struct SoftFieldAlgorithm::Meeting {
-  Meeting(const btSoftBody& body, const btCollisionObject& object)
+/// A soft body and a field in one step. Positions are in the field's coordinates.
+struct SoftFieldAlgorithm::Pair {
+  Pair(const btSoftBody& body, const btCollisionObject& object)
       : soft(body),
         shape(*fieldOf(object)),
         worldFromField(worldFromMesh(object, shape)),
@@ -212,31 +215,31 @@ struct SoftFieldAlgorithm::Meeting {
   const btSoftBody& soft;
   const FieldShape& shape;
   Eigen::Isometry3d worldFromField, fieldFromWorld;
-  double margin;  ///< within which nodes touch
-  double near;    ///< how near a node may come on its way
+  double margin;  ///< distance within which nodes touch
+  double near;    ///< distance at which a node's path ends
 };
 
-/// Nodes that may touch.
+/// Nodes that may touch the field.
 struct SoftFieldAlgorithm::Candidates {
   std::size_t count = 0;
   std::array<int, kNodes> nodes;
-  std::array<Vector3, kNodes> starts, ends;  ///< of their ways
-  std::array<Vector3, kNodes> at;            ///< where they touch, if they do
+  std::array<Vector3, kNodes> starts, ends;  ///< of their paths
+  std::array<Vector3, kNodes> at;            ///< point of contact, if they touch
 };
 
 void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) {
   const btCollisionObject& object = fieldOf(first) != nullptr ? first : second;
-  if (fieldOf(object) == nullptr) return;  // a part of a compound
-  const Meeting meeting(*btSoftBody::upcast(&object == &first ? &second : &first), object);
-  const int count = meeting.soft.m_nodes.size();
+  if (fieldOf(object) == nullptr) return;  // parts of compound shapes do not collide
+  const Pair pair(*btSoftBody::upcast(&object == &first ? &second : &first), object);
+  const int count = pair.soft.m_nodes.size();
   if (int(outside_.size()) != count) {
     outside_.clear();
-    for (int node = 0; node < count; ++node) outside_.push_back(meeting.startOf(node));
+    for (int node = 0; node < count; ++node) outside_.push_back(pair.startOf(node));
   }
   parts_.resize((count + kNodes - 1) / kNodes);
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t part) {
     const int begin = int(part) * kNodes;
-    keepTouching(meeting, candidates(meeting, begin, std::min(count, begin + kNodes)), parts_[part]);
+    keepTouching(pair, candidates(pair, begin, std::min(count, begin + kNodes)), parts_[part]);
   });
   for (const std::vector<Touching>& part : parts_) {
     findings.contacts += part.size();
@@ -244,29 +247,29 @@ void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionO
   }
 }
 
-SoftFieldAlgorithm::Candidates SoftFieldAlgorithm::candidates(const Meeting& meeting, int begin, int end) {
-  const FieldCollider& field = meeting.shape.field();
+SoftFieldAlgorithm::Candidates SoftFieldAlgorithm::candidates(const Pair& pair, int begin, int end) {
+  const FieldCollider& field = pair.shape.field();
   Candidates found;
   for (int node = begin; node < end; ++node) {
-    const Vector3 from = meeting.startOf(node), to = meeting.endOf(node);
-    if (!from.allFinite() || !to.allFinite()) continue;  // the world tells whose it is at the step's end
+    const Vector3 from = pair.startOf(node), to = pair.endOf(node);
+    if (!from.allFinite() || !to.allFinite()) continue;  // the world reports the body at the end of the step
     Vector3& outside = outside_[std::size_t(node)];
-    if ((to - outside).norm() > kPieces * meeting.near) outside = from;
-    if (meeting.soft.m_nodes[node].m_battach != 0 || field.lowerBound(to) > meeting.margin + (to - outside).norm()) {
+    if ((to - outside).norm() > kPieces * pair.near) outside = from;
+    if (pair.soft.m_nodes[node].m_battach != 0 || field.lowerBound(to) > pair.margin + (to - outside).norm()) {
       outside = to;
       continue;
     }
     found.nodes[found.count] = node;
     found.starts[found.count] = from;
     found.ends[found.count] = to;
-    found.at[found.count] = whereItTouches(field.field(), outside, to, meeting.near);
+    found.at[found.count] = firstContact(field.field(), outside, to, pair.near);
     ++found.count;
   }
   return found;
 }
 
-void SoftFieldAlgorithm::keepTouching(const Meeting& meeting, const Candidates& all, std::vector<Touching>& touching) {
-  const Field& field = meeting.shape.field().field();
+void SoftFieldAlgorithm::keepTouching(const Pair& pair, const Candidates& all, std::vector<Touching>& touching) {
+  const Field& field = pair.shape.field().field();
   std::array<ValueAndGradient, kNodes> answers;
   std::array<double, kNodes> values;
   field.valuesAndGradients({all.at.data(), all.count}, {answers.data(), all.count});
@@ -277,19 +280,19 @@ void SoftFieldAlgorithm::keepTouching(const Meeting& meeting, const Candidates& 
     const double steepness = answers[i].gradient.norm();
     if (!(steepness > 0)) continue;
     const Vector3 normal = answers[i].gradient / steepness;
-    // past where it touches, the surface is that place's plane
+    // Beyond the point of contact the surface is approximated by its tangent plane there.
     const double distance = answers[i].value + normal.dot(all.ends[i] - all.at[i]);
-    if (distance < meeting.margin)
-      touching.push_back({all.nodes[i], meeting.worldFromField.linear() * normal, distance, -values[i]});
+    if (distance < pair.margin)
+      touching.push_back({all.nodes[i], pair.worldFromField.linear() * normal, distance, -values[i]});
   }
 }
 
 void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
   if (parts_.empty()) return;
-  // what btSoftBody's solver of rigid contacts asks for
+  // Fill in the fields that btSoftBody's solver of rigid contacts reads.
   const bool fieldIsFirst = fieldOf(*first.getCollisionObject()) != nullptr;
   const btCollisionObject& object = *(fieldIsFirst ? first : second).getCollisionObject();
-  // Bullet hands const objects to algorithms that are there to change them
+  // Bullet passes const objects to algorithms, which are expected to change them.
   btSoftBody& soft = *const_cast<btSoftBody*>(btSoftBody::upcast((fieldIsFirst ? second : first).getCollisionObject()));
   btRigidBody* rigid = const_cast<btRigidBody*>(btRigidBody::upcast(&object));
   const double step = soft.m_sst.sdt, margin = soft.getCollisionShape()->getMargin();
@@ -303,20 +306,20 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       btSoftBody::Node& node = soft.m_nodes[touching.node];
       if (!(node.m_im + inverseMass > 0)) continue;
       btSoftBody::RContact contact;
-      contact.t1.setZero();  // of multibodies, as t2
+      contact.t1.setZero();  // t1 and t2 are for multibodies
       contact.t2.setZero();
       contact.m_cti.m_colObj = &object;
       contact.m_cti.m_normal = toBullet(touching.normal);
-      // half of the margin is the body's thickness
+      // Half of the margin is the thickness of the soft body.
       const double height = touching.distance - margin / 2;
       contact.m_cti.m_offset = height - contact.m_cti.m_normal.dot(node.m_x);
       const btVector3 arm = node.m_x - transform.getOrigin();
-      const btVector3 ofBody = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
-      if (height > contact.m_cti.m_normal.dot(ofBody)) continue;
-      // The solver takes away what a node has moved towards the surface since m_q; from the surface on it is to be just
-      // what it is too deep, and what lifts it out then gives it no speed.
+      const btVector3 bodyMotion = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
+      if (height > contact.m_cti.m_normal.dot(bodyMotion)) continue;
+      // The solver cancels the motion towards the surface since m_q. Move m_q onto the surface, so that this motion is
+      // exactly the penetration, and the correction adds no velocity.
       node.m_q -= (contact.m_cti.m_normal.dot(node.m_q) + contact.m_cti.m_offset) * contact.m_cti.m_normal;
-      const btVector3 relative = node.m_x - node.m_q - ofBody;
+      const btVector3 relative = node.m_x - node.m_q - bodyMotion;
       const btScalar along = relative.dot(contact.m_cti.m_normal);
       const btVector3 sliding = relative - along * contact.m_cti.m_normal;
       contact.m_node = &node;
@@ -324,7 +327,7 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       contact.m_c1 = arm;
       contact.m_c2 = node.m_im * step;
       contact.m_c3 = sliding.length() < std::abs(along) * friction ? 0 : 1 - friction;
-      contact.m_c4 = 0;  // nothing beside that
+      contact.m_c4 = 0;  // no additional stiffness
       soft.m_rcontacts.push_back(contact);
       if (rigid != nullptr) rigid->activate();
     }

@@ -1,25 +1,28 @@
 #pragma once
+// Bullet's collision algorithms for fields.
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btActivatingCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btCollisionCreateFunc.h>
+#include <BulletCollision/NarrowPhaseCollision/btManifoldPoint.h>
 
 #include <exception>
 #include <vector>
 
-#include "hpsdf/physics/bullet.h"
-#include "sphere_feet.h"
-#include "spread.h"
+#include "hpsdf/physics/field_shape.h"
+#include "reduce_contacts.h"
+#include "sphere_minima.h"
 
 class btSoftBody;
 
 namespace hpsdf::physics {
 
+/// Figures of the contacts of one pair, as in `DispatchFigures`.
 struct Findings {
   std::size_t penetrating = 0, contacts = 0;
   double deepest = 0;
 
-  void add(double depth);  ///< of a contact
+  void add(double depth);  ///< counts a contact of this depth if it penetrates
 };
 
 /// An algorithm whose contacts can be found before Bullet asks for them.
@@ -29,10 +32,11 @@ class FieldAlgorithm : public btActivatingCollisionAlgorithm {
                  const btCollisionObjectWrapper* second)
       : btActivatingCollisionAlgorithm(info, first, second) {}
 
-  /// Finds the contacts, and touches nothing of Bullet's. What throws is thrown from `processCollision`.
+  /// Finds the contacts without changing any object of Bullet. Exceptions are stored, and `processCollision` throws
+  /// them.
   void prepare(const btCollisionObject& first, const btCollisionObject& second) noexcept;
 
-  /// Fills what Bullet's solvers take: what was prepared, or else is found now.
+  /// Hands the contacts to Bullet's solvers; finds them first if `prepare` was not called.
   void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                         const btDispatcherInfo& info, btManifoldResult* result) final;
 
@@ -53,7 +57,7 @@ class FieldAlgorithm : public btActivatingCollisionAlgorithm {
   Findings findings_;
 };
 
-/// A field against another, a sphere or a plane.
+/// The collision of a field with another field, a sphere or a static plane.
 class RigidFieldAlgorithm final : public FieldAlgorithm {
  public:
   using FieldAlgorithm::FieldAlgorithm;
@@ -70,46 +74,49 @@ class RigidFieldAlgorithm final : public FieldAlgorithm {
 
   ContactQuery query_;
   std::vector<BodyContact> contacts_;
-  SphereFeet feet_;  ///< of the sphere, if one is
-  double size_ = 0;  ///< of the smaller body
+  SphereMinima minima_;  ///< of the sphere, if one of the bodies is a sphere
+  double size_ = 0;      ///< radius of the smaller body's bounding sphere
   std::vector<btPersistentManifold*> manifolds_;
-  std::vector<btManifoldPoint> before_;
+  std::vector<btManifoldPoint> previous_;  ///< the contacts of the previous step
 };
 
-/// The nodes of a soft body against a field.
+/// The collision of a soft body's nodes with a field.
 class SoftFieldAlgorithm final : public FieldAlgorithm {
  public:
   using FieldAlgorithm::FieldAlgorithm;
   void getAllContactManifolds(btManifoldArray&) override {}
 
  private:
+  /// A node within the margin.
   struct Touching {
     int node;
-    Vector3 normal;   ///< in the world
-    double distance;  ///< at the end of the step, by the plane of where it touches
-    double depth;     ///< at the step's start
+    Vector3 normal;   ///< unit normal of the contact plane, in the world
+    double distance;  ///< of the node from the contact plane at the end of the step
+    double depth;     ///< penetration at the start of the step
   };
-  struct Meeting;
+  struct Pair;
   struct Candidates;
 
   void find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) override;
   void fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) override;
 
-  /// Of the nodes from `begin` up to `end`, not with it.
-  Candidates candidates(const Meeting& meeting, int begin, int end);
-  void keepTouching(const Meeting& meeting, const Candidates& all, std::vector<Touching>& touching);
+  /// The nodes from `begin` to `end` (exclusive) that may touch the field.
+  Candidates candidates(const Pair& pair, int begin, int end);
+  /// Replaces `touching` by those candidates that touch the field.
+  void keepTouching(const Pair& pair, const Candidates& all, std::vector<Touching>& touching);
 
-  std::vector<Vector3> outside_;              ///< where each node was last outside of the field, in its coordinates
-  std::vector<std::vector<Touching>> parts_;  ///< of each so many nodes, in their order
+  std::vector<Vector3> outside_;              ///< last position of each node outside of the field, in its coordinates
+  std::vector<std::vector<Touching>> parts_;  ///< touching nodes of each group of nodes, in their order
 };
 
+/// Creates an algorithm in the dispatcher's memory.
 template <typename Algorithm>
 struct CreateAlgorithm final : btCollisionAlgorithmCreateFunc {
   btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                  const btCollisionObjectWrapper* first,
                                                  const btCollisionObjectWrapper* second) override {
-    void* room = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(Algorithm));
-    return new (room) Algorithm(info, first, second);
+    void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(Algorithm));
+    return new (memory) Algorithm(info, first, second);
   }
 };
 

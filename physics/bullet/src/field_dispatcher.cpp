@@ -1,3 +1,5 @@
+#include "hpsdf/physics/field_dispatcher.h"
+
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <tbb/parallel_for.h>
@@ -7,12 +9,12 @@
 #include <vector>
 
 #include "field_algorithms.h"
-#include "hpsdf/physics/bullet.h"
 #include "sphere_pair.h"
 
 namespace hpsdf::physics {
 
 struct FieldDispatcher::Algorithms {
+  /// A pair whose contacts are found before Bullet asks for them.
   struct Prepared {
     FieldAlgorithm* algorithm;
     const btCollisionObject *first, *second;
@@ -21,11 +23,11 @@ struct FieldDispatcher::Algorithms {
   CreateAlgorithm<RigidFieldAlgorithm> rigid;
   CreateAlgorithm<SoftFieldAlgorithm> soft;
   CreateAlgorithm<SpherePairAlgorithm> spheres;
-  std::vector<Prepared> prepared;  ///< room that is used again
+  std::vector<Prepared> prepared;  ///< temporary; a member so that its memory is reused
 };
 
 FieldDispatcher::FieldDispatcher(btCollisionConfiguration* configuration)
-    : btCollisionDispatcher(configuration), algorithms_(new Algorithms) {
+    : btCollisionDispatcher(configuration), algorithms_(std::make_unique<Algorithms>()) {
   const auto both = [this](int other, btCollisionAlgorithmCreateFunc& create) {
     registerCollisionCreateFunc(FAST_CONCAVE_MESH_PROXYTYPE, other, &create);
     registerCollisionCreateFunc(other, FAST_CONCAVE_MESH_PROXYTYPE, &create);
@@ -36,7 +38,7 @@ FieldDispatcher::FieldDispatcher(btCollisionConfiguration* configuration)
   registerCollisionCreateFunc(SPHERE_SHAPE_PROXYTYPE, SPHERE_SHAPE_PROXYTYPE, &algorithms_->spheres);
 }
 
-FieldDispatcher::~FieldDispatcher() { delete algorithms_; }
+FieldDispatcher::~FieldDispatcher() = default;
 
 void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                                 btDispatcher* dispatcher) {
@@ -53,13 +55,15 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
   const auto mayBeField = [](const btCollisionObject& object) {
     return object.getCollisionShape()->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
   };
+
+  // Collect the pairs with a field, and create algorithms for new pairs.
   btBroadphasePairArray& array = pairs->getOverlappingPairArray();
   for (int i = 0; i < array.size(); ++i) {
     btBroadphasePair& pair = array[i];
     const auto* first = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
     const auto* second = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
     if (!mayBeField(*first) && !mayBeField(*second)) continue;
-    if (!needsCollision(first, second)) {  // asleep: as they were
+    if (!needsCollision(first, second)) {  // sleeping bodies keep their contacts
       if (const auto* algorithm = dynamic_cast<FieldAlgorithm*>(pair.m_algorithm)) count(*algorithm);
       continue;
     }
@@ -73,6 +77,8 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
     if (auto* algorithm = dynamic_cast<FieldAlgorithm*>(pair.m_algorithm))
       prepared.push_back({algorithm, first, second});
   }
+
+  // Find the contacts in parallel, then let Bullet fill the manifolds.
   tbb::parallel_for(std::size_t{0}, prepared.size(),
                     [&](std::size_t i) { prepared[i].algorithm->prepare(*prepared[i].first, *prepared[i].second); });
   figures_.querySeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -1,7 +1,8 @@
+#include "hpsdf/physics/field_shape.h"
+
 #include <cmath>
 
 #include "hpsdf/error.h"
-#include "hpsdf/physics/bullet.h"
 
 namespace hpsdf::physics {
 
@@ -28,7 +29,7 @@ FieldShape::FieldShape(const FieldCollider& field, const SurfaceSamples& samples
       halfSize_(toBullet(Vector3(mass.box.sizes() / 2))),
       inertia_(toBullet(mass.inertia)) {
   if (!(margin > 0) || !std::isfinite(margin)) throw Error("field shape: the margin must be a number above 0");
-  // not CUSTOM_CONCAVE_SHAPE_TYPE, which Bullet takes for its own grids
+  // CUSTOM_CONCAVE_SHAPE_TYPE is not free: Bullet uses it for its own grids.
   m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
   m_collisionMargin = margin;
 }
@@ -36,9 +37,9 @@ FieldShape::FieldShape(const FieldCollider& field, const SurfaceSamples& samples
 void FieldShape::getAabb(const btTransform& worldFromBody, btVector3& lo, btVector3& hi) const {
   const btVector3 center = worldFromBody * center_;
   const btMatrix3x3 absolute = worldFromBody.getBasis().absolute();
-  const btVector3 reach = absolute * halfSize_ + btVector3(m_collisionMargin, m_collisionMargin, m_collisionMargin);
-  lo = center - reach;
-  hi = center + reach;
+  const btVector3 half = absolute * halfSize_ + btVector3(m_collisionMargin, m_collisionMargin, m_collisionMargin);
+  lo = center - half;
+  hi = center + half;
 }
 
 void FieldShape::calculateLocalInertia(btScalar mass, btVector3& inertia) const { inertia = mass * inertia_; }

@@ -1,11 +1,12 @@
 #pragma once
+// The collision of two spheres.
 
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 
 namespace hpsdf::physics {
 
-/// Two spheres, by Bullet's algorithm for them. That one forgets its contact in each step, so that the solver starts
-/// from nothing, and a pile of spheres never comes to rest. Here the contact keeps its impulse.
+/// Bullet's algorithm for two spheres, with a contact that keeps its impulse. Bullet's own discards it in each step, so
+/// that the solver starts from zero and a pile of spheres never comes to rest.
 class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
  public:
   SpherePairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* first,
@@ -16,7 +17,7 @@ class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
                         const btDispatcherInfo& info, btManifoldResult* result) override;
 
  private:
-  btManifoldArray manifolds_;  ///< room that is used again
+  btManifoldArray manifolds_;  ///< temporary; a member so that its memory is reused
 };
 
 }  // namespace hpsdf::physics

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "hpsdf/error.h"
-#include "rigid.h"
+#include "rigid_transform.h"
 
 namespace hpsdf::physics {
 namespace {
@@ -19,12 +19,12 @@ using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr double kFarthest = 1e6;  // in a step: Bullet leaves out what goes farther, where it was, without a word
+constexpr double kFarthest = 1e6;  // units in one step; Bullet silently leaves bodies that move farther where they were
 
 bool finite(const btVector3& v) { return std::isfinite(v.x() + v.y() + v.z()); }
-bool sane(const btVector3& velocity, double step) { return velocity.length() * step < kFarthest; }
+bool isPossible(const btVector3& velocity, double step) { return velocity.length() * step < kFarthest; }
 
-/// Bullet's solver of constraints, and the time that it takes.
+/// Bullet's constraint solver, which also measures its time.
 class TimedSolver final : public btSequentialImpulseConstraintSolver {
  public:
   btScalar solveGroup(btCollisionObject** bodies, int bodyCount, btPersistentManifold** manifolds, int manifoldCount,
@@ -60,7 +60,7 @@ World::World(const WorldOptions& options) : options_(options) {
   world.setGravity(toBullet(options.gravity));
   btContactSolverInfo& info = world.getSolverInfo();
   info.m_numIterations = options.solverIterations;
-  // bodies that lie in each other are moved apart without gaining speed
+  // Separate penetrating bodies without adding to their velocities.
   info.m_splitImpulse = 1;
   info.m_splitImpulsePenetrationThreshold = 0;
   info.m_erp2 = 0.5;
@@ -80,7 +80,7 @@ World::~World() {
 std::size_t World::add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                        const Material& material) {
   if (!(mass >= 0) || !std::isfinite(mass)) throw Error("world: a body's mass must be a number, 0 or more");
-  if (const char* what = faultOf(worldFromBody)) throw Error(std::string("world: a body's ") + what);
+  if (const char* fault = transformFault(worldFromBody)) throw Error(std::string("world: a body's ") + fault);
   btVector3 inertia(0, 0, 0);
   if (mass > 0) shape.calculateLocalInertia(mass, inertia);
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, &shape, inertia);
@@ -128,12 +128,12 @@ void World::checkFinite() const {
   for (std::size_t n = 0; n < bodies_.size(); ++n) {
     const btTransform& at = bodies_[n]->getWorldTransform();
     if (!finite(at.getOrigin()) || !finite(at.getBasis()[0] + at.getBasis()[1] + at.getBasis()[2]) ||
-        !sane(bodies_[n]->getLinearVelocity(), options_.step) || !finite(bodies_[n]->getAngularVelocity()))
+        !isPossible(bodies_[n]->getLinearVelocity(), options_.step) || !finite(bodies_[n]->getAngularVelocity()))
       fail("body " + std::to_string(n));
   }
   for (std::size_t n = 0; n < softBodies_.size(); ++n)
     for (int node = 0; node < softBodies_[n]->m_nodes.size(); ++node)
-      if (!finite(softBodies_[n]->m_nodes[node].m_x) || !sane(softBodies_[n]->m_nodes[node].m_v, options_.step))
+      if (!finite(softBodies_[n]->m_nodes[node].m_x) || !isPossible(softBodies_[n]->m_nodes[node].m_v, options_.step))
         fail("node " + std::to_string(node) + " of soft body " + std::to_string(n));
 }
 

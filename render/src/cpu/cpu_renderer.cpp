@@ -7,22 +7,23 @@
 #include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
 #include "view/view_buffers.h"
+#include "view/view_checks.h"
 
 namespace hpsdf::render {
 namespace {
 
-bool inside(const Vector3& p, const Vector3& grid) {
+bool isInDomain(const Vector3& p, const Vector3& grid) {
   return (p.array() >= 0).all() && (p.array() <= grid.array()).all();
 }
 
-/// The part of a ray within what is shown of the domain; t counts from the part's start. Empty where the ray misses.
-struct Entry {
+/// The part of a pixel's ray within the visible part of the domain.
+struct VisiblePart {
   Ray ray;
-  double fromEye;  ///< world units from the ray's start to the part's
+  double fromEye;  ///< distance from the start of the pixel's ray to the origin of `ray`, world units
 };
 
-/// In grid coordinates, of a ray from `eye`.
-std::optional<Entry> enter(const RayGeometry& rays, const Vector3& eye, const Vector3& direction) {
+/// The visible part of a ray given in grid coordinates; empty where the ray misses the domain.
+std::optional<VisiblePart> visiblePart(const RayGeometry& rays, const Vector3& eye, const Vector3& direction) {
   double first = 0;
   double last = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -36,7 +37,7 @@ std::optional<Entry> enter(const RayGeometry& rays, const Vector3& eye, const Ve
     }
   }
   if (!(first < last)) return std::nullopt;
-  return Entry{{eye + first * direction, direction, last - first}, first};
+  return VisiblePart{{eye + first * direction, direction, last - first}, first};
 }
 
 class CpuRenderer final : public Renderer {
@@ -67,7 +68,7 @@ class CpuRenderer final : public Renderer {
  private:
   void slicePixel(const SliceGeometry& geometry, int x, int y, ViewBuffers& buffers) const {
     const Vector3 p = geometry.point(x, y);
-    if (!inside(p, field_.space().grid)) return;
+    if (!isInDomain(p, field_.space().grid)) return;
     const CellPoint at = field_.leafAt(p);
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
     setCell(at, pixel, buffers);
@@ -76,19 +77,19 @@ class CpuRenderer final : public Renderer {
 
   void surfacePixel(const RayGeometry& geometry, double offset, int x, int y, ViewBuffers& buffers) const {
     const Vector3 direction = geometry.direction(x, y);
-    const auto entry = enter(geometry, geometry.start(x, y), direction.cwiseProduct(geometry.scale));
-    if (!entry) return;
-    const auto hit = field_.trace(entry->ray, offset);
+    const auto part = visiblePart(geometry, geometry.start(x, y), direction.cwiseProduct(geometry.scale));
+    if (!part) return;
+    const auto hit = field_.trace(part->ray, offset);
     if (!hit) return;
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
     setCell(hit->cell, pixel, buffers);
     const Sample sample = field_.sample(hit->cell, hit->local);
     const Vector3 gradient = field_.worldGradient(sample.gradient, hit->cell.depth);
     const double length = gradient.norm();
-    // a cell of degree 0 has no gradient: face the eye
+    // A cell of degree 0 has no gradient; its normal points to the eye.
     buffers.normal[pixel] = (length > 0 ? Vector3(gradient / length) : Vector3(-direction)).cast<float>();
     buffers.value[pixel] = static_cast<float>(sample.value);
-    buffers.distance[pixel] = static_cast<float>(entry->fromEye + hit->t);
+    buffers.distance[pixel] = static_cast<float>(part->fromEye + hit->t);
     const double step = std::abs(sample.value - offset);
     buffers.crack[pixel] = hit->onFace && step > kCrack * field_.space().diagonal * std::max(1.0, length);
   }

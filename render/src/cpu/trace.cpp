@@ -7,15 +7,16 @@
 namespace hpsdf::render {
 namespace {
 
-// All lengths in domain diagonals; kNudge and kPastFace are the same in the shaders.
-constexpr double kNudge = 1e-6;      // beyond a face; also the shortest step
-constexpr double kPastFace = 4e-7;   // of the grid: how far past a face of a node, at most, its neighbour is entered
-constexpr double kConverged = 1e-8;  // change of the root between two steps of its refinement
-constexpr double kGrain = 0.25;      // in a weight's reach: steps where a blended field may be zero; as in the shader
+// Lengths are in domain diagonals. The shaders use the same kNudge, kPastFace and kGrain.
+constexpr double kNudge = 1e-6;  // distance by which steps end behind a face; also the shortest step
+constexpr double kPastFace =
+    4e-7;  // greatest distance behind a face at which rays enter the next node, in parts of the grid
+constexpr double kConverged = 1e-8;  // change of the root between two iterations that ends its refinement
+constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes a zero, in parts of the zone's extent
 constexpr int kMostSteps = 1 << 16;
 constexpr int kMostRefinements = 24;
 
-/// Calls f(coefficients) with a pointer to the leaf's coefficients, of either type.
+/// Calls f(coefficients) with a pointer to the leaf's coefficients, which are float or double.
 template <typename F>
 auto withCoefficients(const FieldData& field, std::uint32_t leaf, F&& f) {
   return std::visit([&](const auto& c) { return f(c.data() + node::offset(field.nodes[leaf])); }, field.coefficients);
@@ -69,9 +70,9 @@ double evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length from the point to where the ray has left the node's box, or the box within it whose faces are `margin`
-/// of its edges inside: past a face by a little, because a ray that runs along a face, on it up to rounding, would
-/// otherwise leave it again at every step.
+/// World length from the point to the exit of the ray from the node's box, or from the box whose faces are `margin`
+/// node edges further inside. The length ends slightly behind the face, because a ray that runs along a face, on it up
+/// to rounding, would otherwise leave the box again at every step.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -83,7 +84,7 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
   return exit;
 }
 
-/// How far along a ray a height stays above zero at least that falls no steeper than `steepest`.
+/// The length over which a height whose slope is at least `steepest` cannot fall to zero.
 double certainlyAbove(double height, double steepest) {
   if (!(height > 0)) return 0;
   return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
@@ -93,45 +94,52 @@ double certainlyAbove(double height, double steepest) {
 
 TraceField::TraceField(const Field& field)
     : field_(field.data()),
-      reaches_(field.lookupGrid().blendExtents),
+      blendExtents_(field.lookupGrid().blendExtents),
       space_(field_),
-      zones_(zoneBounds(field)),
-      bounds_(nodeBounds(field_, zones_)) {}
+      zones_(blendZoneBounds(field)),
+      bounds_(surfaceBounds(field_, zones_)) {}
 
-bool TraceField::nearFace(const CellPoint& at) const {
+bool TraceField::inBlendZone(const CellPoint& at) const {
   return field_.blend > 0 && ((at.fraction.array() < field_.blend) || (at.fraction.array() > 1 - field_.blend)).any();
 }
 
-/// Calls use(leaf, local, weight, its gradient) for each, `p` in grid coordinates, which gradients refer to.
-template <typename Use>
-void TraceField::forEachReaching(const Vector3& p, const Use& use) const {
-  const auto visit = [&](const auto& self, std::uint32_t index, int depth, const Vector3& corner) -> void {
-    const double edge = std::ldexp(1.0, -depth), reach = field_.blend * edge;
-    const Vector3 within = p - corner;
-    if ((within.array() < -reach).any() || (within.array() > edge + reach).any()) return;
-    if (!node::isLeaf(field_.nodes[index])) {
-      for (std::uint32_t child = 0; child < 8; ++child)
-        self(self, node::firstChild(field_.nodes[index]) + child, depth + 1,
-             corner + 0.5 * edge * Vector3(child & 1, child >> 1 & 1, child >> 2));
-      return;
+TraceField::Weight TraceField::weightAt(std::uint32_t leaf, int depth, const Vector3& fromCorner) const {
+  const double edge = std::ldexp(1.0, -depth);
+  std::array<double, 3> ramp = {1, 1, 1}, slope = {0, 0, 0};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const bool upper : {false, true}) {
+      const int smallest = blend_extent::depth(blendExtents_[leaf], axis, upper);
+      if (smallest == blend_extent::kDomainFace) continue;
+      const double extent = field_.blend * std::ldexp(1.0, -smallest);
+      const double t = (upper ? edge - fromCorner[axis] : fromCorner[axis]) / extent;
+      const double s = t < -1 ? 0 : t > 1 ? 1 : 0.25 * (2 + 3 * t - t * t * t);
+      const double ds = std::abs(t) > 1 ? 0 : (upper ? -0.75 : 0.75) * (1 - t * t) / extent;
+      slope[axis] = slope[axis] * s + ramp[axis] * ds;
+      ramp[axis] *= s;
     }
-    std::array<double, 3> step = {1, 1, 1}, slope = {0, 0, 0};
-    for (int axis = 0; axis < 3; ++axis)
-      for (const bool upper : {false, true}) {
-        const int deepest = blend_extent::depth(reaches_[index], axis, upper);
-        if (deepest == blend_extent::kWall) continue;
-        const double delta = field_.blend * std::ldexp(1.0, -deepest);
-        const double t = (upper ? edge - within[axis] : within[axis]) / delta;
-        const double s = t < -1 ? 0 : t > 1 ? 1 : 0.25 * (2 + 3 * t - t * t * t);
-        const double ds = std::abs(t) > 1 ? 0 : (upper ? -0.75 : 0.75) * (1 - t * t) / delta;
-        slope[axis] = slope[axis] * s + step[axis] * ds;
-        step[axis] *= s;
-      }
-    const double weight = step[0] * step[1] * step[2];
-    if (!(weight > 0)) return;
-    use(index, depth, localFromFraction(within / edge), weight,
-        Vector3(slope[0] * step[1] * step[2], step[0] * slope[1] * step[2], step[0] * step[1] * slope[2]));
-  };
+  const double value = ramp[0] * ramp[1] * ramp[2];
+  if (!(value > 0)) return {0, Vector3::Zero()};
+  return {value, Vector3(slope[0] * ramp[1] * ramp[2], ramp[0] * slope[1] * ramp[2], ramp[0] * ramp[1] * slope[2])};
+}
+
+template <typename Use>
+void TraceField::forEachWeightBelow(std::uint32_t node, int depth, const Vector3& corner, const Vector3& p,
+                                    const Use& use) const {
+  const double edge = std::ldexp(1.0, -depth), extent = field_.blend * edge;
+  const Vector3 fromCorner = p - corner;
+  if ((fromCorner.array() < -extent).any() || (fromCorner.array() > edge + extent).any()) return;
+  if (node::isLeaf(field_.nodes[node])) {
+    const Weight weight = weightAt(node, depth, fromCorner);
+    if (weight.value > 0) use(node, depth, localFromFraction(fromCorner / edge), weight);
+    return;
+  }
+  for (std::uint32_t child = 0; child < 8; ++child)
+    forEachWeightBelow(node::firstChild(field_.nodes[node]) + child, depth + 1,
+                       corner + 0.5 * edge * Vector3(child & 1, child >> 1 & 1, child >> 2), p, use);
+}
+
+template <typename Use>
+void TraceField::forEachWeight(const Vector3& p, const Use& use) const {
   std::array<std::uint32_t, 3> first, last;
   for (int axis = 0; axis < 3; ++axis) {
     const double most = space_.grid[axis] - 1;
@@ -141,7 +149,7 @@ void TraceField::forEachReaching(const Vector3& p, const Use& use) const {
   for (std::uint32_t z = first[2]; z <= last[2]; ++z)
     for (std::uint32_t y = first[1]; y <= last[1]; ++y)
       for (std::uint32_t x = first[0]; x <= last[0]; ++x)
-        visit(visit, (z * field_.grid[1] + y) * field_.grid[0] + x, 0, Vector3(x, y, z));
+        forEachWeightBelow((z * field_.grid[1] + y) * field_.grid[0] + x, 0, Vector3(x, y, z), p, use);
 }
 
 Sample TraceField::sampleBlended(const CellPoint& leaf, const Vector3& local) const {
@@ -149,14 +157,13 @@ Sample TraceField::sampleBlended(const CellPoint& leaf, const Vector3& local) co
   const Vector3 p = leaf.base + edge * (leaf.path + 0.5 * (local + Vector3::Ones()));
   double weights = 0, sum = 0;
   Vector3 weightsGradient = Vector3::Zero(), sumGradient = Vector3::Zero();
-  forEachReaching(
-      p, [&](std::uint32_t index, int depth, const Vector3& localThere, double weight, const Vector3& weightGradient) {
-        const Sample sample = samplePolynomial(index, localThere);
-        weights += weight;
-        sum += weight * sample.value;
-        weightsGradient += weightGradient;
-        sumGradient += weightGradient * sample.value + weight * std::ldexp(2.0, depth) * sample.gradient;
-      });
+  forEachWeight(p, [&](std::uint32_t other, int depth, const Vector3& localInOther, const Weight& weight) {
+    const Sample sample = samplePolynomial(other, localInOther);
+    weights += weight.value;
+    sum += weight.value * sample.value;
+    weightsGradient += weight.gradient;
+    sumGradient += weight.gradient * sample.value + weight.value * std::ldexp(2.0, depth) * sample.gradient;
+  });
   const double value = sum / weights;
   return {value, 0.5 * edge * (sumGradient - value * weightsGradient) / weights};
 }
@@ -198,7 +205,7 @@ CellPoint TraceField::leafAt(const Vector3& p) const {
 double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) const {
   const int p = degree(leaf);
   if (p == 0) return 0;
-  // c_100, c_010, c_001 in lexicographic order
+  // Coefficients are in lexicographic order: these are c_100, c_010 and c_001.
   return withCoefficients(field_, leaf, [&](const auto* c) {
     return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
            c[1] * direction.z();
@@ -232,27 +239,140 @@ Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
   return std::ldexp(2.0, depth) * local.cwiseProduct(space_.grid).cwiseQuotient(space_.size);
 }
 
-std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
-  const double nudge = kNudge * space_.diagonal;
-  const auto localAt = [&](const CellPoint& cell, double t) -> Vector3 {
-    const Vector3 inBase = ray.origin - cell.base + t * ray.direction;
-    return localFromFraction(inBase * std::ldexp(1.0, cell.depth) - cell.path);
-  };
-  // positive on the side of the surface on which the ray starts
-  double side = 0;
-  const auto heightAt = [&](const CellPoint& cell, double t) {
-    return side * (value(cell, localAt(cell, t)) - offset);
+/// The march of one ray to the first crossing of the offset, by steps that cannot pass one (docs/rendering.md,
+/// "Tracing"). Heights are f − offset, signed so that they are positive where the ray starts. The stages have the names
+/// of those in shaders/surface_march.frag.
+class TraceField::March {
+ public:
+  March(const TraceField& field, const Ray& ray, double offset)
+      : field_(field), ray_(ray), offset_(offset), nudge_(kNudge * field.space_.diagonal) {}
+
+  std::optional<Hit> run() {
+    for (int i = 0; i < kMostSteps && t_ <= ray_.length; ++i)
+      if (const auto hit = step()) return hit;
+    return std::nullopt;
+  }
+
+ private:
+  /// The point at t in a leaf, and bounds of the height of the leaf's polynomial along the ray.
+  struct LeafPoint {
+    CellPoint at;
+    Vector3 localDirection;  ///< change of the local coordinates per world unit
+    double steepest;         ///< least slope of the height along the ray
+    double shallowest;       ///< greatest slope of the height along the ray
+    double curve;            ///< greatest second derivative of the height along the ray
+    double toLeave;          ///< distance to the exit from the leaf, world units
+    double clear;            ///< lower bound of the height at t, blended or not
+    bool inBlendZone;
   };
 
-  // The only root of a cell between a (height > 0) and b (height ≤ 0): regula falsi, Illinois variant.
-  const auto refine = [&](const CellPoint& cell, double a, double heightA, double b, double heightB) {
+  std::optional<Hit> step() {
+    const CellPoint at = field_.relevantNodeAt(ray_.origin + t_ * ray_.direction, offset_);
+    if (field_.excludes(at.node, offset_)) return passNode(at);
+    if (at.node != lastLeaf_) {
+      enterLeaf(at);
+      if (lastHeight_ < 0) return hitOnFace();
+    }
+    const LeafPoint leaf = boundHeight(at);
+    if (leaf.clear + leaf.steepest * leaf.toLeave >= 0) {
+      leave(leaf.toLeave);
+      return std::nullopt;
+    }
+    return leaf.inBlendZone ? stepInBlendZone(leaf) : stepInLeaf(leaf);
+  }
+
+  /// Passes a node whose range excludes the offset; a node on the other side of the surface is a hit on its face.
+  std::optional<Hit> passNode(const CellPoint& at) {
+    const double side = field_.bounds_[at.node].lo > offset_ ? 1 : -1;
+    if (side_ == 0) side_ = side;
+    if (side_ != side) return hitOnFace();
+    t_ += lengthToExit(at, ray_.direction, field_.space_.grid) + nudge_;
+    return std::nullopt;
+  }
+
+  /// Evaluates the height where the ray enters a leaf.
+  void enterLeaf(const CellPoint& at) {
+    const double value = field_.value(at, localFromFraction(at.fraction)) - offset_;
+    if (side_ == 0) side_ = value >= 0 ? 1 : -1;
+    lastLeaf_ = at.node;
+    lastHeight_ = side_ * value;
+    longestStep_ = std::numeric_limits<double>::infinity();
+  }
+
+  LeafPoint boundHeight(const CellPoint& at) const {
+    const SurfaceBounds& bounds = field_.bounds_[at.node];
+    const Vector3 localDirection = std::ldexp(2.0, at.depth) * ray_.direction;
+    const double slope = side_ * field_.linearSlope(at.node, localDirection);
+    const double deviation = bounds.gradientDeviation * localDirection.norm();
+    const bool inBlendZone = field_.inBlendZone(at);
+    const double height =
+        inBlendZone ? side_ * (field_.samplePolynomial(at.node, localAt(at, t_)).value - offset_) : lastHeight_;
+    return {.at = at,
+            .localDirection = localDirection,
+            .steepest = slope - deviation,
+            .shallowest = slope + deviation,
+            .curve = bounds.secondDerivative * localDirection.squaredNorm(),
+            .toLeave = lengthToExit(at, ray_.direction, field_.space_.grid),
+            .clear = height - (field_.field_.blend > 0 ? field_.zones_[at.node].valueDifference : 0),
+            .inBlendZone = inBlendZone};
+  }
+
+  /// Steps where other leaves have a weight: as far as the height is certainly positive, or by a small part of the
+  /// zone.
+  std::optional<Hit> stepInBlendZone(const LeafPoint& leaf) {
+    const double grain = kGrain * field_.zones_[leaf.at.node].extent / leaf.localDirection.norm();
+    const double length = std::min(leaf.toLeave, std::max(certainlyAbove(leaf.clear, leaf.steepest), grain) + nudge_);
+    const double ahead = heightAt(leaf.at, t_ + length);
+    if (ahead <= 0) return refine(leaf.at, t_, lastHeight_, t_ + length, ahead);
+    advance(leaf, length, ahead);
+    return std::nullopt;
+  }
+
+  /// Steps where the leaf's polynomial is the field. Its height sags below its chord by at most curve · length² / 8,
+  /// and is monotone where it falls by more than curve · length² / 2.
+  std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
+    const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
+    const bool falling = leaf.shallowest < 0;  // throughout the leaf, so that there is one root at most
+    const double safe = certainlyAbove(lastHeight_, leaf.steepest) + nudge_;
+    const double length =
+        std::min(toExit, falling ? lastHeight_ / -leaf.shallowest + nudge_
+                                 : std::max(safe, std::min(longestStep_, std::sqrt(4 * lastHeight_ / leaf.curve))));
+    const double ahead = heightAt(leaf.at, t_ + length);
+    const bool certain = falling || length <= safe;
+    if (ahead <= 0 && (certain || lastHeight_ - ahead > 0.5 * leaf.curve * length * length))
+      return refine(leaf.at, t_, lastHeight_, t_ + length, ahead);
+    if (ahead > 0 && (certain || std::min(lastHeight_, ahead) > 0.125 * leaf.curve * length * length)) {
+      advance(leaf, length, ahead);
+      longestStep_ = std::numeric_limits<double>::infinity();
+    } else {
+      longestStep_ = 0.25 * length;
+    }
+    return std::nullopt;
+  }
+
+  void advance(const LeafPoint& leaf, double length, double ahead) {
+    if (length == leaf.toLeave)
+      leave(length);
+    else
+      t_ += length;
+    lastHeight_ = ahead;
+  }
+
+  void leave(double length) {
+    t_ += length + nudge_;
+    lastLeaf_ = kNoCell;
+  }
+
+  /// Finds the only root in a leaf between a, where the height is positive, and b, where it is not: regula falsi,
+  /// Illinois variant.
+  Hit refine(const CellPoint& leaf, double a, double heightA, double b, double heightB) const {
     double t = b;
     for (int i = 0; i < kMostRefinements; ++i) {
       const double next = b - heightB * (b - a) / (heightB - heightA);
       const double change = std::abs(next - t);
       t = next;
-      if (change <= kConverged * space_.diagonal) break;
-      const double height = heightAt(cell, t);
+      if (change <= kConverged * field_.space_.diagonal) break;
+      const double height = heightAt(leaf, t);
       if ((height > 0) == (heightB > 0)) {
         heightA *= 0.5;
       } else {
@@ -262,92 +382,35 @@ std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const {
       b = t;
       heightB = height;
     }
-    return Hit{t, cell, localAt(cell, t), false};
-  };
-  const auto hitOnFace = [&](double t) {
-    const CellPoint cell = leafAt(ray.origin + t * ray.direction);
-    return Hit{t, cell, localFromFraction(cell.fraction), true};
-  };
-
-  double t = 0;
-  // what the step before has left where it stayed in its leaf: the height at t, and the longest step to try
-  std::uint32_t lastLeaf = kNoCell;
-  double lastHeight = 0;
-  double reach = 0;
-  for (int step = 0; step < kMostSteps && t <= ray.length; ++step) {
-    const CellPoint at = relevantNodeAt(ray.origin + t * ray.direction, offset);
-    const NodeBounds& bounds = bounds_[at.node];
-    if (excludes(at.node, offset)) {
-      const double sideHere = bounds.lo > offset ? 1 : -1;
-      if (side == 0) side = sideHere;
-      if (side != sideHere) return hitOnFace(t);
-      t += lengthToExit(at, ray.direction, space_.grid) + nudge;
-      continue;
-    }
-    if (at.node != lastLeaf) {
-      const double here = value(at, localFromFraction(at.fraction)) - offset;
-      if (side == 0) side = here >= 0 ? 1 : -1;
-      lastLeaf = at.node;
-      lastHeight = side * here;
-      reach = std::numeric_limits<double>::infinity();
-      if (lastHeight < 0) return hitOnFace(t);
-    }
-    // within the leaf the slope of its polynomial's height along the ray lies between these two, its second derivative
-    // in ±curve
-    const Vector3 localDirection = std::ldexp(2.0, at.depth) * ray.direction;
-    const double slope = side * linearSlope(at.node, localDirection);
-    const double bend = bounds.bend * localDirection.norm();
-    const double curve = bounds.curve * localDirection.squaredNorm();
-    const double steepest = slope - bend;
-    const double shallowest = slope + bend;
-    const double toLeave = lengthToExit(at, ray.direction, space_.grid);
-    const auto leave = [&](double length) {
-      t += length + nudge;
-      lastLeaf = kNoCell;
-    };
-    // of a blended field: what it cannot fall below is the polynomial's height less `apart`
-    const bool near = nearFace(at);
-    const double own = near ? side * (samplePolynomial(at.node, localAt(at, t)).value - offset) : lastHeight;
-    const double clear = own - (field_.blend > 0 ? zones_[at.node].apart : 0);
-    if (clear + steepest * toLeave >= 0) {
-      leave(toLeave);
-      continue;
-    }
-    if (near) {
-      const double grain = kGrain * zones_[at.node].reach / localDirection.norm();
-      const double length = std::min(toLeave, std::max(certainlyAbove(clear, steepest), grain) + nudge);
-      const double ahead = heightAt(at, t + length);
-      if (ahead <= 0) return refine(at, t, lastHeight, t + length, ahead);
-      if (length == toLeave)
-        leave(length);
-      else
-        t += length;
-      lastHeight = ahead;
-      continue;
-    }
-    const double toExit = lengthToExit(at, ray.direction, space_.grid, field_.blend);
-    const bool falling = shallowest < 0;  // throughout: at most one root
-    const double safe = certainlyAbove(lastHeight, steepest) + nudge;
-    const double length =
-        std::min(toExit, falling ? lastHeight / -shallowest + nudge
-                                 : std::max(safe, std::min(reach, std::sqrt(4 * lastHeight / curve))));
-    const double ahead = heightAt(at, t + length);
-    const bool certain = falling || length <= safe;
-    if (ahead <= 0 && (certain || lastHeight - ahead > 0.5 * curve * length * length))
-      return refine(at, t, lastHeight, t + length, ahead);
-    // the height sags below its chord by at most curve · length² / 8
-    if (ahead > 0 && (certain || std::min(lastHeight, ahead) > 0.125 * curve * length * length)) {
-      if (length == toLeave)
-        leave(length);
-      else
-        t += length;
-      lastHeight = ahead;
-      reach = std::numeric_limits<double>::infinity();
-    } else {
-      reach = 0.25 * length;
-    }
+    return {t, leaf, localAt(leaf, t), false};
   }
-  return std::nullopt;
-}
+
+  Hit hitOnFace() const {
+    const CellPoint leaf = field_.leafAt(ray_.origin + t_ * ray_.direction);
+    return {t_, leaf, localFromFraction(leaf.fraction), true};
+  }
+
+  Vector3 localAt(const CellPoint& cell, double t) const {
+    const Vector3 inBase = ray_.origin - cell.base + t * ray_.direction;
+    return localFromFraction(inBase * std::ldexp(1.0, cell.depth) - cell.path);
+  }
+
+  double heightAt(const CellPoint& leaf, double t) const {
+    return side_ * (field_.value(leaf, localAt(leaf, t)) - offset_);
+  }
+
+  const TraceField& field_;
+  const Ray& ray_;
+  const double offset_;
+  const double nudge_;
+  double t_ = 0;
+  double side_ = 0;  ///< sign of f − offset where the ray starts; 0 until it is known
+  // The last step's state, for a step that stays in its leaf.
+  std::uint32_t lastLeaf_ = kNoCell;
+  double lastHeight_ = 0;   ///< height at t
+  double longestStep_ = 0;  ///< longest step to try, world units
+};
+
+std::optional<Hit> TraceField::trace(const Ray& ray, double offset) const { return March(*this, ray, offset).run(); }
 
 }  // namespace hpsdf::render

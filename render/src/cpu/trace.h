@@ -1,8 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. Lookup and evaluation repeat
-// what core has, on purpose: this is the oracle, tested against the field's own queries, and must not share their
-// faults. For the same reason it does without the short cuts of the shaders: every ray starts where it enters the
-// domain, and what `NodeBounds` say is asked for less.
+// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. This is the oracle, which is
+// tested against the field's own queries: lookup and evaluation repeat those of core on purpose, in order not to share
+// their faults. For the same reason the march takes none of the shaders' short cuts: every ray starts where it enters
+// the domain, and fewer bounds decide its steps.
 
 #include <optional>
 #include <vector>
@@ -14,13 +14,13 @@
 
 namespace hpsdf::render {
 
-/// A node that holds a point.
+/// A node and a point in it.
 struct CellPoint {
   std::uint32_t node;
   int depth;
   Vector3 base;      ///< lower corner of the base cell, grid coordinates
   Vector3 path;      ///< lower corner of the node within its base cell, counted in nodes of its depth
-  Vector3 fraction;  ///< of the point within the node, in [0, 1]
+  Vector3 fraction;  ///< position of the point within the node, in [0, 1]³
 };
 
 struct Sample {
@@ -32,67 +32,79 @@ struct Sample {
 struct Ray {
   Vector3 origin;     ///< grid coordinates, within the domain
   Vector3 direction;  ///< grid coordinates per world unit
-  double length;      ///< world units, up to where it leaves the domain
+  double length;      ///< distance to the exit from the domain, world units
 };
 
 struct Hit {
   double t;
   CellPoint cell;
-  Vector3 local;  ///< coordinates within the cell, in [-1, 1] but for rounding
-  bool onFace;    ///< the offset is crossed from one leaf to the next, not within one
+  Vector3 local;  ///< coordinates within the cell, in [−1, 1]³ but for rounding
+  bool onFace;    ///< whether f crosses the offset from one leaf to the next, not within one
 };
 
 /// A hit on a face is a crack where |f − offset| exceeds this, in domain diagonals times the slope there (at least 1,
-/// that of a distance). The march looks into a leaf 1.4e-6 past its face at most, so that it meets a zero that lies
-/// just behind the face of a continuous field there as well, with as little height; single precision adds 2e-7. As in
-/// the shaders.
+/// the slope of a distance). The march enters a leaf up to 1.4e-6 diagonals behind its face, so that |f − offset| may
+/// be that large in a continuous field with a zero just behind a face; single precision adds 2e-7. The shaders use the
+/// same value.
 constexpr double kCrack = 4e-6;
 
-/// A field made ready for tracing. Keeps a reference to the field.
+/// A field with what tracing needs. Keeps a reference to the field.
 class TraceField {
  public:
   explicit TraceField(const Field& field);
 
   const GridSpace& space() const { return space_; }
 
-  /// The leaf that holds a point given in grid coordinates.
+  /// The leaf at a point in grid coordinates.
   CellPoint leafAt(const Vector3& p) const;
 
-  /// At local coordinates of a leaf, which may lie a little outside of it.
+  /// Value and gradient at local coordinates of a leaf, which may lie slightly outside of it.
   Sample sample(const CellPoint& leaf, const Vector3& local) const;
   double value(const CellPoint& leaf, const Vector3& local) const;
 
   int degree(std::uint32_t leaf) const { return node::degree(field_.nodes[leaf]); }
 
-  /// World gradient from one in local coordinates of a cell.
+  /// The gradient in world coordinates for one in local coordinates of a cell.
   Vector3 worldGradient(const Vector3& local, int depth) const;
 
-  /// The first crossing of f = offset (docs/rendering.md, "Tracing").
+  /// The first crossing of f = offset along a ray (docs/rendering.md, "Tracing").
   std::optional<Hit> trace(const Ray& ray, double offset) const;
 
  private:
-  /// Whether others may have a say there: of a blended field alone.
-  bool nearFace(const CellPoint& at) const;
+  class March;
+
+  /// Whether more than one leaf may have a weight at the point.
+  bool inBlendZone(const CellPoint& at) const;
 
   Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
-  /// The definition, by all leaves that reach the point.
+  /// The blended field by its definition: the weighted mean of all leaves with a weight at the point.
   Sample sampleBlended(const CellPoint& leaf, const Vector3& local) const;
+  /// The weight of a leaf and its gradient, at a point given from the leaf's lower corner, in grid coordinates.
+  struct Weight {
+    double value;
+    Vector3 gradient;
+  };
+  Weight weightAt(std::uint32_t leaf, int depth, const Vector3& fromCorner) const;
+  /// Calls use(leaf, depth, local, weight) for each leaf with a weight at the point `p`, in grid coordinates.
   template <typename Use>
-  void forEachReaching(const Vector3& p, const Use& use) const;
+  void forEachWeight(const Vector3& p, const Use& use) const;
+  /// Does the same for the leaves below a node, whose lower corner is `corner`.
+  template <typename Use>
+  void forEachWeightBelow(std::uint32_t node, int depth, const Vector3& corner, const Vector3& p, const Use& use) const;
 
   CellPoint baseCellAt(const Vector3& p) const;
   void descend(CellPoint& at) const;
-  /// Down to a leaf, or to a node in whose box the field cannot reach `offset`.
+  /// The leaf at a point, or the first node along the descent whose range excludes `offset`.
   CellPoint relevantNodeAt(const Vector3& p, double offset) const;
-  /// Slope of the leaf's linear part along a direction in local coordinates.
+  /// The derivative of a leaf's linear part along a direction in local coordinates.
   double linearSlope(std::uint32_t leaf, const Vector3& direction) const;
   bool excludes(std::uint32_t node, double offset) const;
 
   const FieldData& field_;
-  const std::vector<std::uint32_t>& reaches_;
+  const std::vector<std::uint32_t>& blendExtents_;
   GridSpace space_;
-  std::vector<ZoneBounds> zones_;
-  std::vector<NodeBounds> bounds_;
+  std::vector<BlendZoneBounds> zones_;
+  std::vector<SurfaceBounds> bounds_;
 };
 
 }  // namespace hpsdf::render

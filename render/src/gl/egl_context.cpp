@@ -15,9 +15,9 @@
 namespace hpsdf::render {
 namespace {
 
-/// A rung of the ladder: a name for messages and the display, or EGL_NO_DISPLAY.
-struct Rung {
-  std::string name;
+/// A device to try.
+struct Candidate {
+  std::string name;  ///< for messages
   std::function<EGLDisplay()> display;
 };
 
@@ -43,7 +43,7 @@ bool isSoftware(std::string_view renderer) {
   return false;
 }
 
-/// libepoxy ends the program where a library that it opens is missing: ask first.
+/// Names the missing libraries, or returns an empty text. libepoxy would end the program where a library is missing.
 std::string missingLibraries() {
   const auto opens = [](const char* name) {
     void* library = dlopen(name, RTLD_LAZY | RTLD_LOCAL);
@@ -55,8 +55,8 @@ std::string missingLibraries() {
   return {};
 }
 
-/// The devices that are, or are not, software.
-void addDevices(const char* clientExtensions, bool software, std::vector<Rung>& rungs, std::string& tried) {
+/// Adds the software devices, or the hardware devices, to the candidates; adds to `tried` why there are none.
+void addDevices(const char* clientExtensions, bool software, std::vector<Candidate>& candidates, std::string& tried) {
   const char* kind = software ? "software" : "hardware";
   const bool enumerates = hasExtension(clientExtensions, "EGL_EXT_device_base") ||
                           (hasExtension(clientExtensions, "EGL_EXT_device_enumeration") &&
@@ -75,28 +75,29 @@ void addDevices(const char* clientExtensions, bool software, std::vector<Rung>& 
     const char* extensions = eglQueryDeviceStringEXT(device, EGL_EXTENSIONS);
     if (hasExtension(extensions, "EGL_MESA_device_software") != software) continue;
     ++found;
-    rungs.push_back({std::string(kind) + " device " + std::to_string(i),
-                     [device] { return eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr); }});
+    candidates.push_back({std::string(kind) + " device " + std::to_string(i),
+                          [device] { return eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr); }});
   }
   if (found == 0) tried += std::string("; ") + kind + " devices: none among " + std::to_string(count);
 }
 
-std::vector<Rung> ladder(GlChoice choice, std::string& tried) {
+/// The candidates in the order of docs/rendering.md.
+std::vector<Candidate> candidatesFor(GlChoice choice, std::string& tried) {
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-  std::vector<Rung> rungs;
-  if (choice != GlChoice::software) addDevices(client, false, rungs, tried);
-  if (choice != GlChoice::hardware) addDevices(client, true, rungs, tried);
+  std::vector<Candidate> candidates;
+  if (choice != GlChoice::software) addDevices(client, false, candidates, tried);
+  if (choice != GlChoice::hardware) addDevices(client, true, candidates, tried);
   if (hasExtension(client, "EGL_EXT_platform_base") && hasExtension(client, "EGL_MESA_platform_surfaceless"))
-    rungs.push_back({"surfaceless Mesa", [] {
-                       return eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
-                     }});
+    candidates.push_back(
+        {"surfaceless Mesa",
+         [] { return eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr); }});
   else
     tried += "; surfaceless Mesa: not offered by EGL";
-  rungs.push_back({"default display", [] { return eglGetDisplay(EGL_DEFAULT_DISPLAY); }});
-  return rungs;
+  candidates.push_back({"default display", [] { return eglGetDisplay(EGL_DEFAULT_DISPLAY); }});
+  return candidates;
 }
 
-/// A context, or why there is none.
+/// A context, or EGL_NO_CONTEXT and the reason.
 struct Attempt {
   EGLContext context;
   std::string reason;
@@ -104,10 +105,10 @@ struct Attempt {
 
 Attempt failed(std::string reason) { return {EGL_NO_CONTEXT, std::move(reason)}; }
 
-Attempt attempt(EGLDisplay display) {
+Attempt createContext(EGLDisplay display) {
   if (display == EGL_NO_DISPLAY) return failed("no such display");
-  // A display is one of the whole process and its initialisation is not counted: another part of the program may use
-  // it too, so that it is never terminated here.
+  // The display is never terminated: it belongs to the whole process, EGL does not count its initialisations, and
+  // another part of the program may use it.
   if (!eglInitialize(display, nullptr, nullptr)) return failed("does not initialise, " + eglErrorText());
   const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
   for (const char* needed : {"EGL_KHR_no_config_context", "EGL_KHR_surfaceless_context", "EGL_KHR_create_context"})
@@ -122,15 +123,8 @@ Attempt attempt(EGLDisplay display) {
 }
 
 const char* choiceText(GlChoice choice) {
-  switch (choice) {
-    case GlChoice::software:
-      return "on a software device";
-    case GlChoice::hardware:
-      return "on a hardware device";
-    case GlChoice::automatic:
-      break;
-  }
-  return "on any device";
+  if (choice == GlChoice::automatic) return "on any device";
+  return choice == GlChoice::software ? "on a software device" : "on a hardware device";
 }
 
 [[noreturn]] void noContext(GlChoice choice, std::string_view tried) {
@@ -174,28 +168,32 @@ EglContext::EglContext(GlChoice choice) {
   const std::string missing = missingLibraries();
   if (!missing.empty()) noContext(choice, missing);
   std::string tried;
-  for (const Rung& rung : ladder(choice, tried)) {
-    display_ = rung.display();
-    Attempt result = attempt(display_);
-    context_ = result.context;
-    if (context_ != EGL_NO_CONTEXT) {
-      try {
-        const Current current(*this);
-        renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-      } catch (const Error& error) {
-        result.reason = error.what();
-      }
-      const bool software = isSoftware(renderer_);
-      if (result.reason.empty() && choice == GlChoice::hardware && software)
-        result.reason = "\"" + renderer_ + "\" is a software renderer";
-      if (result.reason.empty() && choice == GlChoice::software && !software)
-        result.reason = "\"" + renderer_ + "\" is not a software renderer";
-      if (result.reason.empty()) return;
-      eglDestroyContext(display_, context_);
-    }
-    tried += "; " + rung.name + ": " + result.reason;
+  for (const Candidate& candidate : candidatesFor(choice, tried)) {
+    const std::string reason = open(candidate.display(), choice);
+    if (reason.empty()) return;
+    tried += "; " + candidate.name + ": " + reason;
   }
   noContext(choice, std::string_view(tried).substr(2));
+}
+
+std::string EglContext::open(void* display, GlChoice choice) {
+  display_ = display;
+  Attempt result = createContext(display_);
+  context_ = result.context;
+  if (context_ == EGL_NO_CONTEXT) return result.reason;
+  try {
+    const Current current(*this);
+    renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  } catch (const Error& error) {
+    result.reason = error.what();
+  }
+  const bool software = isSoftware(renderer_);
+  if (result.reason.empty() && choice == GlChoice::hardware && software)
+    result.reason = "\"" + renderer_ + "\" is a software renderer";
+  if (result.reason.empty() && choice == GlChoice::software && !software)
+    result.reason = "\"" + renderer_ + "\" is not a software renderer";
+  if (!result.reason.empty()) eglDestroyContext(display_, context_);
+  return result.reason;
 }
 
 EglContext::~EglContext() { eglDestroyContext(display_, context_); }

@@ -7,19 +7,19 @@
 
 namespace hpsdf::render {
 
-/// An OpenGL 4.5 core context without a surface, on the first device of the ladder that serves.
+/// An OpenGL 4.5 core context without a surface, on the first of the choice's devices that offers one.
 class EglContext {
  public:
-  /// Throws `Error` that says what was tried and why each failed.
+  /// Throws `Error` that names the devices tried and the reason why each failed.
   explicit EglContext(GlChoice choice);
   ~EglContext();
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// GL_RENDERER.
+  /// The string GL_RENDERER.
   const std::string& renderer() const { return renderer_; }
 
-  /// Makes the context current on this thread and, at its end, whatever was current before.
+  /// Makes the context current on this thread for the lifetime of the object, and then the previous context again.
   class Current {
    public:
     explicit Current(const EglContext& context);
@@ -33,6 +33,9 @@ class EglContext {
   };
 
  private:
+  /// Creates the context on a display. Returns the reason why the display does not serve the choice, or an empty text.
+  std::string open(void* display, GlChoice choice);
+
   void* display_ = nullptr;
   void* context_ = nullptr;
   std::string renderer_;

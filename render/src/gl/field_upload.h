@@ -8,19 +8,24 @@ namespace hpsdf::render {
 
 /// A field on the device, as buffer textures: Mesa's llvmpipe allows them 2^27 texels, a storage buffer only 128 MiB.
 ///
-/// nodes, RGBA32UI: x = first child, or degree·2^27 + index of the leaf's first coefficient; the rest are `NodeBounds`:
-/// y = upper halves of the floats hi (high) and lo (low), rounded outwards, or, of a leaf, the bits of rest; z = bend
-/// and w = curve, as bits of floats.
-/// coefficients, R32F: as in FieldData, but those of leaves up to degree 4 in the order of field.glsl's straight code,
-/// and all leaves padded to a multiple of four; coefficientQuads: the same by four, RGBA32F.
-/// linearParts, RGBA32F: `NodeBounds::linear`.
-/// zones, RGBA32UI, none without blending: `LookupGrid::reaches`, and `ZoneBounds` by the floats' bits.
+/// * nodes, RGBA32UI: x is the first child, or degree · 2^27 + index of the leaf's first coefficient; y is
+/// `packOutwards`
+///   of the range, or the valueDeviation of a leaf; z is the gradientDeviation, w the secondDerivative.
+/// * coefficients, R32F: those of the leaves in the order of the nodes, each leaf padded to a multiple of four. Leaves
+/// up
+///   to degree 4 have the order of `LowDegree` in field.glsl.
+/// * coefficientQuads, RGBA32F: the buffer of the coefficients, four to a texel.
+/// * linearParts, RGBA32F: `SurfaceBounds::linear`.
+/// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the numbers of `BlendZoneBounds`. Empty without
+///   blending.
+///
+/// RGBA32UI texels hold floats by their bits.
 class FieldUpload {
  public:
   /// Throws `Error` when the field exceeds what the device holds.
-  FieldUpload(const Field& field, const std::vector<NodeBounds>& bounds, const std::vector<ZoneBounds>& zones);
+  FieldUpload(const Field& field, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones);
 
-  /// To texture units 0 (nodes), 1 (coefficients), 4 (linear parts), 5 (coefficients by four) and 6 (zones).
+  /// Binds the texture units 0 (nodes), 1 (coefficients), 4 (linearParts), 5 (coefficientQuads) and 6 (zones).
   void bind() const;
 
  private:

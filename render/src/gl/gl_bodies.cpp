@@ -1,4 +1,4 @@
-// OpenGL says which triangle of which body each pixel sees; distances and normals follow in double precision.
+// OpenGL decides which triangle of which body each pixel sees; distances and normals are computed in double precision.
 
 #include <tbb/parallel_for.h>
 
@@ -15,26 +15,27 @@
 #include "gl/tiles.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/bodies.h"
-#include "view/body_meshes.h"
+#include "scene/body_meshes.h"
+#include "scene/body_view.h"
 
 namespace hpsdf::render {
 namespace {
 
-/// Locations of the attributes, as in shaders/bodies.vert.
+/// The locations of the vertex attributes in shaders/bodies.vert.
 enum : GLuint { kPosition = 0, kTargetFromMesh = 1, kIndex = 5 };
-/// Where their data are bound.
-enum : GLuint { kOfVertices = 0, kOfInstances = 1 };
+/// The bindings of the buffers from which attributes are read.
+enum : GLuint { kVertexBinding = 0, kInstanceBinding = 1 };
 
-/// What a pixel of a target holds: body and triangle.
-using Seen = std::array<std::uint32_t, 2>;
+/// The indices of the body and the triangle that a pixel sees.
+using BodyTriangle = std::array<std::uint32_t, 2>;
 
-/// A body, as the vertex shader takes it.
+/// A body in the layout of the vertex shader's attributes.
 struct Instance {
-  std::array<float, 16> targetFromMesh;  // columns
+  std::array<float, 16> targetFromMesh;  ///< column-major
   std::uint32_t body;
 };
 
-/// A tile's render target.
+/// The render target of a tile: body and triangle, and depth.
 class Target {
  public:
   Target(int width, int height) {
@@ -49,7 +50,8 @@ class Target {
           "the OpenGL device cannot render bodies into 32-bit buffers: update its driver, or render with --cpu");
   }
 
-  void bindEmpty() const {
+  /// Binds the target for drawing, with no body in any pixel.
+  void bindCleared() const {
     constexpr GLuint kNothing[] = {kNoBody, 0, 0, 0};
     constexpr GLfloat kInfinitelyFar = 0;
     glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
@@ -57,7 +59,7 @@ class Target {
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   }
 
-  void read(int width, int height, std::vector<Seen>& out) const {
+  void read(int width, int height, std::vector<BodyTriangle>& out) const {
     out.resize(std::size_t(width) * std::size_t(height));
     glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT0);
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
@@ -69,9 +71,9 @@ class Target {
   GlFramebuffer framebuffer_;
 };
 
-/// From points, counted from the eye, to a tile's clip space. Rows run downwards. Depth is least / depth in
-/// perspective, which floats hold to the same relative precision near and far, and falls linearly for parallel rays:
-/// the greater, the nearer.
+/// The transform of points relative to the eye to a tile's clip space, in which rows run downwards and nearer points
+/// have greater depths: leastDepth / depth in perspective, to which floats give the same relative precision near and
+/// far, and depths that fall linearly with the distance for parallel rays.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =
@@ -79,10 +81,10 @@ Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width,
   const Eigen::RowVector4d up = (Eigen::RowVector4d() << camera.up.transpose() / camera.up.squaredNorm(), 0).finished();
   const Eigen::RowVector4d depth = (Eigen::RowVector4d() << camera.forward.transpose(), 0).finished();
   const Eigen::RowVector4d one = Eigen::RowVector4d::Unit(3);
-  constexpr double kBeyond = 1.001;  // what is farthest has a depth above 0
+  constexpr double kMargin = 1.001;  // gives the farthest point a depth above 0
   Eigen::Matrix4d result;
   result.row(3) = parallel ? one : depth;
-  result.row(2) = parallel ? Eigen::RowVector4d(one - depth / (kBeyond * farthest))
+  result.row(2) = parallel ? Eigen::RowVector4d(one - depth / (kMargin * farthest))
                            : Eigen::RowVector4d(leastDepth(camera, farthest) * one);
   const auto middle = [](int whole, int first, int part) { return double(whole - 2 * first) / part - 1; };
   result.row(0) = double(width) / tile.width * right + middle(width, tile.left, tile.width) * result.row(3);
@@ -90,7 +92,7 @@ Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width,
   return result;
 }
 
-/// A ball that holds a mesh, in its frame.
+/// A ball that contains a mesh, in the mesh's frame.
 struct Ball {
   Vector3 center;
   double radius;
@@ -102,9 +104,9 @@ Ball ballAround(const BodyMesh& mesh) {
   return ball;
 }
 
-/// Whether a ball in the world, its centre counted from the eye, may be seen: it is within the planes left, right,
-/// above, below and behind which there is nothing in clip space.
-bool maySee(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
+/// Whether a ball may be visible: whether it extends inside the left, right, lower and upper planes of the frustum and
+/// the far plane. `center` is relative to the eye.
+bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
   constexpr double kRounding = 1e-6;
   for (const auto& [axis, sign] : {std::pair(0, 1), {0, -1}, {1, 1}, {1, -1}, {2, -1}}) {
     const Eigen::RowVector4d plane = targetFromEye.row(3) + sign * targetFromEye.row(axis);
@@ -125,7 +127,7 @@ class MeshUpload {
     upload(mesh);
   }
 
-  /// About the ball's centre: single precision counts from there.
+  /// Uploads the vertices relative to the ball's centre, so that single precision suffices.
   void upload(const BodyMesh& mesh) {
     ball_ = ballAround(mesh);
     std::vector<Eigen::Vector3f> positions;
@@ -143,7 +145,7 @@ class MeshUpload {
   Ball ball_;
 };
 
-/// Everything on the device. Made and destroyed with the context current.
+/// The objects on the device. The context must be current when they are created and destroyed.
 struct Resources {
   explicit Resources(const BodyMeshes& bodyMeshes) : program(linkedProgram({"bodies.vert"}, {"bodies.frag"})) {
     for (std::size_t i = 0; i < bodyMeshes.size(); ++i) {
@@ -154,17 +156,16 @@ struct Resources {
       glEnableVertexArrayAttrib(vertexArray.name(), location);
       glVertexArrayAttribBinding(vertexArray.name(), location, binding);
     };
-    attribute(kPosition, kOfVertices);
+    attribute(kPosition, kVertexBinding);
     glVertexArrayAttribFormat(vertexArray.name(), kPosition, 3, GL_FLOAT, GL_FALSE, 0);
     for (GLuint column = 0; column < 4; ++column) {
-      attribute(kTargetFromMesh + column, kOfInstances);
+      attribute(kTargetFromMesh + column, kInstanceBinding);
       glVertexArrayAttribFormat(vertexArray.name(), kTargetFromMesh + column, 4, GL_FLOAT, GL_FALSE,
                                 GLuint(4 * column * sizeof(float)));
     }
-    attribute(kIndex, kOfInstances);
+    attribute(kIndex, kInstanceBinding);
     glVertexArrayAttribIFormat(vertexArray.name(), kIndex, 1, GL_UNSIGNED_INT, offsetof(Instance, body));
-    glVertexArrayBindingDivisor(vertexArray.name(), kOfInstances, 1);
-    // greater depths are nearer
+    glVertexArrayBindingDivisor(vertexArray.name(), kInstanceBinding, 1);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
@@ -175,14 +176,15 @@ struct Resources {
   std::vector<MeshUpload> meshes;
 };
 
-/// Where a ray passes a triangle, in the mesh's frame. It counts as within the triangle: OpenGL rounds corners, and
-/// what it says is seen may begin a little beside the pixel's middle.
+/// The point at which a ray passes a triangle, in the mesh's frame.
 struct Passage {
   double distance;
-  Vector3 weights;
-  bool fromBehind;
+  Vector3 barycentric;
+  bool fromBehind;  ///< whether the ray meets the side from which the corners run clockwise
 };
 
+/// Moves the ray's intersection with the triangle's plane into the triangle: OpenGL rounds corners, so that the
+/// triangle that it reports may begin slightly beside the pixel's middle.
 Passage pass(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction) {
   const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];
   const Vector3 normal = toB.cross(toC);
@@ -190,12 +192,12 @@ Passage pass(const std::array<Vector3, 3>& corners, const Vector3& start, const 
   const Vector3 inPlane = start + normal.dot(corners[0] - start) / towards * direction - corners[0];
   const double ofB = normal.dot(inPlane.cross(toC)) / normal.squaredNorm();
   const double ofC = normal.dot(toB.cross(inPlane)) / normal.squaredNorm();
-  Vector3 weights = Vector3(1 - ofB - ofC, ofB, ofC);
-  // seen along its plane: its middle will do
-  weights = weights.allFinite() ? Vector3(weights.cwiseMax(0)) : Vector3::Ones();
-  weights /= weights.sum();
-  const Vector3 point = weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
-  return {(point - start).dot(direction), weights, towards > 0};
+  Vector3 barycentric = Vector3(1 - ofB - ofC, ofB, ofC);
+  // A ray in the triangle's plane has no intersection; use the triangle's centroid.
+  barycentric = barycentric.allFinite() ? Vector3(barycentric.cwiseMax(0)) : Vector3::Ones();
+  barycentric /= barycentric.sum();
+  const Vector3 point = barycentric[0] * corners[0] + barycentric[1] * corners[1] + barycentric[2] * corners[2];
+  return {(point - start).dot(direction), barycentric, towards > 0};
 }
 
 class GlBodyRenderer final : public BodyRenderer {
@@ -210,7 +212,7 @@ class GlBodyRenderer final : public BodyRenderer {
       const EglContext::Current current(context_);
       resources_.reset();
     } catch (const Error&) {
-      // current on another thread: what is on the device goes with the context
+      // The context is current on another thread; its objects are deleted together with it.
       static_cast<void>(resources_.release());
     }
   }
@@ -221,17 +223,17 @@ class GlBodyRenderer final : public BodyRenderer {
     BodyBuffers buffers = emptyBodyBuffers(width, height);
     const EglContext::Current current(context_);
     const Target target(std::min(width, kTile), std::min(height, kTile));
-    std::vector<Seen> seen;
+    std::vector<BodyTriangle> pixels;
     for (const Tile& tile : tiles({0, 0, width, height})) {
       glViewport(0, 0, tile.width, tile.height);
-      target.bindEmpty();
+      target.bindCleared();
       drawAll(targetFromEye(camera, tile, width, height, farthest), camera.eye, bodies);
-      target.read(tile.width, tile.height, seen);
+      target.read(tile.width, tile.height, pixels);
       checkGl("draw bodies");
       tbb::parallel_for(0, tile.height, [&](int y) {
         for (int x = 0; x < tile.width; ++x) {
-          const Seen& what = seen[std::size_t(y) * tile.width + x];
-          if (what[0] != kNoBody) show(camera, bodies, what, tile.left + x, tile.top + y, buffers);
+          const BodyTriangle& seen = pixels[std::size_t(y) * tile.width + x];
+          if (seen[0] != kNoBody) show(camera, bodies, seen, tile.left + x, tile.top + y, buffers);
         }
       });
     }
@@ -250,13 +252,13 @@ class GlBodyRenderer final : public BodyRenderer {
   std::string description() const override { return context_.renderer(); }
 
  private:
-  /// All that may be seen, mesh after mesh.
+  /// Draws the bodies that may be visible, mesh after mesh.
   void drawAll(const Eigen::Matrix4d& targetFromEye, const Vector3& eye, std::span<const Body> bodies) const {
     std::vector<std::vector<Instance>> instances(meshes_.size());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Ball& ball = resources_->meshes[bodies[i].mesh].ball();
       const Vector3 center = bodies[i].worldFromBody * ball.center - eye;
-      if (!maySee(targetFromEye, center, ball.radius)) continue;
+      if (!mayBeVisible(targetFromEye, center, ball.radius)) continue;
       Eigen::Matrix4d eyeFromMesh = bodies[i].worldFromBody.matrix();
       eyeFromMesh.block<3, 1>(0, 3) = center;
       Instance instance{.targetFromMesh = {}, .body = static_cast<std::uint32_t>(i)};
@@ -273,29 +275,30 @@ class GlBodyRenderer final : public BodyRenderer {
     const GLuint vertexArray = resources_->vertexArray.name();
     const GlBuffer buffer;
     glNamedBufferStorage(buffer.name(), GLsizeiptr(instances.size() * sizeof(Instance)), instances.data(), 0);
-    glVertexArrayVertexBuffer(vertexArray, kOfVertices, resources_->meshes[mesh].vertices(), 0,
+    glVertexArrayVertexBuffer(vertexArray, kVertexBinding, resources_->meshes[mesh].vertices(), 0,
                               sizeof(Eigen::Vector3f));
-    glVertexArrayVertexBuffer(vertexArray, kOfInstances, buffer.name(), 0, sizeof(Instance));
+    glVertexArrayVertexBuffer(vertexArray, kInstanceBinding, buffer.name(), 0, sizeof(Instance));
     glVertexArrayElementBuffer(vertexArray, resources_->meshes[mesh].triangles());
     glDrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(3 * meshes_[mesh].triangles().size()), GL_UNSIGNED_INT,
                             nullptr, static_cast<GLsizei>(instances.size()));
   }
 
-  void show(const Camera& camera, std::span<const Body> bodies, const Seen& what, int x, int y,
+  /// Computes normal and distance of the triangle that pixel (x, y) sees.
+  void show(const Camera& camera, std::span<const Body> bodies, const BodyTriangle& seen, int x, int y,
             BodyBuffers& buffers) const {
-    const Body& body = bodies[what[0]];
+    const Body& body = bodies[seen[0]];
     const BodyMesh& mesh = meshes_[body.mesh];
-    const Triangle& triangle = mesh.triangles()[what[1]];
+    const Triangle& triangle = mesh.triangles()[seen[1]];
     const Eigen::Isometry3d bodyFromWorld = body.worldFromBody.inverse();
     const Vector3 start = bodyFromWorld * pixelEye(camera, x, y, buffers.width, buffers.height);
     const Vector3 direction = bodyFromWorld.linear() * pixelRay(camera, x, y, buffers.width, buffers.height);
     const std::vector<Vector3>& vertices = mesh.vertices();
     const Passage passage =
         pass({vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]}, start, direction);
-    const Vector3 normal = body.worldFromBody.linear() * mesh.normal(what[1], passage.weights);
+    const Vector3 normal = body.worldFromBody.linear() * mesh.normal(seen[1], passage.barycentric);
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
-    buffers.body[pixel] = what[0];
-    buffers.triangle[pixel] = what[1];
+    buffers.body[pixel] = seen[0];
+    buffers.triangle[pixel] = seen[1];
     buffers.normal[pixel] = (passage.fromBehind ? Vector3(-normal) : normal).cast<float>();
     buffers.distance[pixel] = static_cast<float>(passage.distance);
   }

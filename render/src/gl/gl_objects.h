@@ -1,5 +1,5 @@
 #pragma once
-// OpenGL names that are deleted with their owner. Each needs its context current, when made and when deleted.
+// OpenGL objects that are deleted with their owner. Their context must be current when they are created and deleted.
 
 #include <epoxy/gl.h>
 
@@ -10,10 +10,10 @@ namespace hpsdf::render {
 template <typename Kind>
 class GlObject {
  public:
-  GlObject() : name_(Kind::create()) {}
+  GlObject() { Kind::create(&name_); }
   explicit GlObject(GLuint name) : name_(name) {}
   ~GlObject() {
-    if (name_ != 0) Kind::destroy(name_);
+    if (name_ != 0) Kind::destroy(&name_);
   }
   GlObject(GlObject&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
   GlObject& operator=(GlObject&& other) noexcept {
@@ -23,58 +23,38 @@ class GlObject {
   GLuint name() const { return name_; }
 
  private:
-  GLuint name_;
+  GLuint name_ = 0;
 };
 
 struct BufferKind {
-  static GLuint create() {
-    GLuint name = 0;
-    glCreateBuffers(1, &name);
-    return name;
-  }
-  static void destroy(GLuint name) { glDeleteBuffers(1, &name); }
+  static void create(GLuint* name) { glCreateBuffers(1, name); }
+  static void destroy(const GLuint* name) { glDeleteBuffers(1, name); }
 };
 
 template <GLenum target>
 struct TextureKind {
-  static GLuint create() {
-    GLuint name = 0;
-    glCreateTextures(target, 1, &name);
-    return name;
-  }
-  static void destroy(GLuint name) { glDeleteTextures(1, &name); }
+  static void create(GLuint* name) { glCreateTextures(target, 1, name); }
+  static void destroy(const GLuint* name) { glDeleteTextures(1, name); }
 };
 
 struct FramebufferKind {
-  static GLuint create() {
-    GLuint name = 0;
-    glCreateFramebuffers(1, &name);
-    return name;
-  }
-  static void destroy(GLuint name) { glDeleteFramebuffers(1, &name); }
+  static void create(GLuint* name) { glCreateFramebuffers(1, name); }
+  static void destroy(const GLuint* name) { glDeleteFramebuffers(1, name); }
 };
 
 struct VertexArrayKind {
-  static GLuint create() {
-    GLuint name = 0;
-    glCreateVertexArrays(1, &name);
-    return name;
-  }
-  static void destroy(GLuint name) { glDeleteVertexArrays(1, &name); }
+  static void create(GLuint* name) { glCreateVertexArrays(1, name); }
+  static void destroy(const GLuint* name) { glDeleteVertexArrays(1, name); }
 };
 
 struct QueryKind {
-  static GLuint create() {
-    GLuint name = 0;
-    glCreateQueries(GL_ANY_SAMPLES_PASSED, 1, &name);
-    return name;
-  }
-  static void destroy(GLuint name) { glDeleteQueries(1, &name); }
+  static void create(GLuint* name) { glCreateQueries(GL_ANY_SAMPLES_PASSED, 1, name); }
+  static void destroy(const GLuint* name) { glDeleteQueries(1, name); }
 };
 
 struct ProgramKind {
-  static GLuint create() { return glCreateProgram(); }
-  static void destroy(GLuint name) { glDeleteProgram(name); }
+  static void create(GLuint* name) { *name = glCreateProgram(); }
+  static void destroy(const GLuint* name) { glDeleteProgram(*name); }
 };
 
 using GlBuffer = GlObject<BufferKind>;

@@ -15,47 +15,51 @@
 #include "view/scaled_renderer.h"
 #include "view/surface_blocks.h"
 #include "view/view_buffers.h"
+#include "view/view_checks.h"
 
 namespace hpsdf::render {
 namespace {
 
 static_assert(kTile % kBlock == 0);
 
-/// Locations of the uniforms, as in shaders/.
+/// The locations of the uniforms in shaders/.
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
-enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kTogetherSteps };
+enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kBlendedSteps };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kMostRefinements = kMostSteps;
 
-constexpr int kStepsInAll = 1 << 16;  // of a ray, as on the CPU
+constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, the same as on the CPU
 constexpr int kRefinementsInAll = 24;
 
-/// llvmpipe ends all loops of a shader once they have run 65535 times together; some are left for the compiler's own.
+/// Greatest number of loop iterations of a shader: llvmpipe ends all loops of a shader silently once the sum of their
+/// iterations is 65535, of which the compiler's own loops may take some.
 constexpr int kLoopBudget = 60000;
 
-/// Runs of the loops of one evaluation, each loop's last test counted.
+/// The number of loop iterations of one evaluation, including the last test of each loop.
 constexpr int evaluationLoops(int degree) {
   const int rows = (degree + 1) * (degree + 2) / 2;
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
 
-/// The same near a face: at each depth eight places, down to which the first have to descend, and leaves that are
-/// evaluated, of which sixteen are near the point at most.
-constexpr int blendedLoops(int evaluation) { return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2; }
+/// The number of loop iterations of one evaluation in a blend zone: eight candidates at each depth, the descent to
+/// those of the first depth, and the evaluation of sixteen leaves at most.
+constexpr int blendedEvaluationLoops(int evaluation) {
+  return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2;
+}
 
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// A tile's pair of render targets: four integers and four floats a pixel.
+/// The render targets of a tile: four integers and four floats a pixel.
 class Target {
  public:
   Target(int width, int height) {
     glTextureStorage2D(integers_.name(), 1, GL_RGBA32UI, width, height);
     glTextureStorage2D(floats_.name(), 1, GL_RGBA32F, width, height);
     for (const GLuint texture : {integers_.name(), floats_.name()}) {
-      // a texture of integers cannot be read with the filters that are the default
+      // Integer textures cannot be read with the default filters.
       glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
       glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     }
@@ -69,7 +73,7 @@ class Target {
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
-  /// All pixels to no cell and no normal.
+  /// Sets all pixels to no cell and no normal.
   void clear() const {
     constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
     constexpr GLfloat kZero[] = {0, 0, 0, 0};
@@ -77,7 +81,7 @@ class Target {
     glClearNamedFramebufferfv(framebuffer_.name(), GL_COLOR, 1, kZero);
   }
 
-  /// As textures of units 2 and 3.
+  /// Binds the targets as textures to the units 2 and 3.
   void bindForReading() const {
     glBindTextureUnit(2, integers_.name());
     glBindTextureUnit(3, floats_.name());
@@ -100,8 +104,8 @@ class Target {
   GlFramebuffer framebuffer_;
 };
 
-/// The smallest part of a view that holds all blocks, of which there is one at least.
-Tile partWith(const std::vector<Block>& blocks, int width, int height) {
+/// The smallest part of a view that contains all blocks, of which there must be at least one.
+Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
   const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);
   const int x = static_cast<int>(left.x);
@@ -109,8 +113,8 @@ Tile partWith(const std::vector<Block>& blocks, int width, int height) {
   return {x, y, std::min(width, int(right.x) + kBlock) - x, std::min(height, int(bottom.y) + kBlock) - y};
 }
 
-/// The octree alone.
-FieldData withoutCoefficients(const FieldData& field) {
+/// A copy of the field without its coefficients.
+FieldData octreeOf(const FieldData& field) {
   return {.domain = field.domain,
           .grid = field.grid,
           .nodes = field.nodes,
@@ -127,9 +131,9 @@ int highestDegree(const FieldData& field) {
   return degree;
 }
 
-/// Everything on the device. Made and destroyed with the context current.
+/// The objects on the device. The context must be current when they are created and destroyed.
 struct Resources {
-  Resources(const Field& whole, const std::vector<NodeBounds>& bounds, const std::vector<ZoneBounds>& zones)
+  Resources(const Field& whole, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones)
       : field(whole, bounds, zones),
         slice(linkedProgram({"full_screen.vert"}, {"field.glsl", leaves(whole), "slice.frag"})),
         march(linkedProgram({"surface.vert"}, {"field.glsl", leaves(whole), "surface.glsl", "surface_march.frag"})),
@@ -144,6 +148,7 @@ struct Resources {
     glVertexArrayAttribBinding(blocks.name(), 0, 0);
   }
 
+  /// The shader that evaluates leaves with or without blending.
   static std::string_view leaves(const Field& field) {
     return field.data().blend > 0 ? "leaves_blended.glsl" : "leaves_alone.glsl";
   }
@@ -180,17 +185,18 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
 class GlRenderer final : public Renderer {
  public:
   GlRenderer(const Field& field, GlChoice choice)
-      : context_(choice), space_(field.data()), octree_(withoutCoefficients(field.data())) {
-    const std::vector<ZoneBounds> zones = zoneBounds(field);
-    bounds_ = nodeBounds(field.data(), zones);
-    const int alone = evaluationLoops(highestDegree(field.data()));
-    const int evaluation = zones.empty() ? alone : blendedLoops(alone);
-    const int ofStep = alone + kMaxDepth + 4;
-    stepsInPass_ = std::max(1, kLoopBudget / ofStep);
+      : context_(choice), space_(field.data()), octree_(octreeOf(field.data())) {
+    const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
+    bounds_ = surfaceBounds(field.data(), zones);
+    // Limit the steps and refinements of one pass so that the shaders stay within the loop budget.
+    const int unblended = evaluationLoops(highestDegree(field.data()));
+    const int evaluation = zones.empty() ? unblended : blendedEvaluationLoops(unblended);
+    const int loopsOfStep = unblended + kMaxDepth + 4;
+    stepsInPass_ = std::max(1, kLoopBudget / loopsOfStep);
     refinements_ = std::clamp((kLoopBudget - kMaxDepth) / (evaluation + 1) - 1, 1, kRefinementsInAll);
     const EglContext::Current current(context_);
     resources_ = std::make_unique<Resources>(field, bounds_, zones);
-    if (!zones.empty()) glProgramUniform1i(resources_->march.name(), kTogetherSteps, evaluation / ofStep);
+    if (!zones.empty()) glProgramUniform1i(resources_->march.name(), kBlendedSteps, evaluation / loopsOfStep);
   }
 
   ~GlRenderer() override {
@@ -198,7 +204,7 @@ class GlRenderer final : public Renderer {
       const EglContext::Current current(context_);
       resources_.reset();
     } catch (const Error&) {
-      // current on another thread: what is on the device goes with the context
+      // The context is current on another thread; its objects are deleted together with it.
       static_cast<void>(resources_.release());
     }
   }
@@ -215,7 +221,7 @@ class GlRenderer final : public Renderer {
 
     ViewBuffers buffers = emptyBuffers(width, height, false);
     const Target target(std::min(width, kTile), std::min(height, kTile));
-    prepare();
+    bindField();
     glUseProgram(program.name());
     glBindVertexArray(resources_->noVertices.name());
     for (const Tile& tile : tiles({0, 0, width, height})) {
@@ -245,6 +251,7 @@ class GlRenderer final : public Renderer {
     glProgramUniform1i(resources_->march.name(), kMostSteps, stepsInPass_);
     glProgramUniform1i(resources_->hit.name(), kMostRefinements, refinements_);
 
+    // Upload the blocks that may see the surface.
     ViewBuffers buffers = emptyBuffers(width, height, true);
     const SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
     if (found.blocks.empty()) return buffers;
@@ -253,38 +260,18 @@ class GlRenderer final : public Renderer {
     glVertexArrayVertexBuffer(resources_->blocks.name(), 0, blocks.name(), 0, sizeof(Block));
     glProgramUniform1f(resources_->march.name(), kStartSide, found.side);
 
-    const Tile part = partWith(found.blocks, width, height);
+    // Draw them, tile after tile.
+    const Tile part = boundingTile(found.blocks, width, height);
     const Target state(std::min(part.width, kTile), std::min(part.height, kTile));
     const Target target(std::min(part.width, kTile), std::min(part.height, kTile));
-    prepare();
+    bindField();
     glBindVertexArray(resources_->blocks.name());
     glEnable(GL_PROGRAM_POINT_SIZE);
     state.bindForReading();
     for (const Tile& tile : tiles(part)) {
       setTile(tile);
-      const GLsizei count = static_cast<GLsizei>(found.blocks.size());
-      state.bindForDrawing();
-      march(count);
-      target.clear();
-      hit(target, count);
-      target.readIntegers(tile.width, tile.height, integers_);
-      if (std::ranges::any_of(integers_, isUnderWay)) {
-        state.bindForDrawing();
-        marchOn(count);
-        hit(target, count);
-        target.readIntegers(tile.width, tile.height, integers_);
-      }
-      target.readFloats(tile.width, tile.height, normals_);
-      forEachPixel(tile, width, [&](std::size_t from, std::size_t to) {
-        const Texel& texel = integers_[from];
-        buffers.cell[to] = texel[0];
-        buffers.degree[to] = static_cast<std::uint8_t>(texel[1] & 0xff);
-        buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8 & 0xff);
-        buffers.crack[to] = static_cast<std::uint8_t>(texel[1] >> 16);
-        buffers.value[to] = std::bit_cast<float>(texel[2]);
-        buffers.distance[to] = std::bit_cast<float>(texel[3]);
-        buffers.normal[to] = {normals_[from][0], normals_[from][1], normals_[from][2]};
-      });
+      drawTile(tile, static_cast<GLsizei>(found.blocks.size()), state, target);
+      forEachPixel(tile, width, [&](std::size_t from, std::size_t to) { setPixel(from, buffers, to); });
     }
     checkGl("trace a surface");
     return buffers;
@@ -293,19 +280,36 @@ class GlRenderer final : public Renderer {
   std::string description() const override { return context_.renderer(); }
 
  private:
-  void prepare() const {
+  void bindField() const {
     resources_->field.bind();
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
   }
 
   void setTile(const Tile& tile) const {
-    // whole blocks, since a point whose centre lies outside is not drawn
-    const auto up = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
-    glViewport(0, 0, up(tile.width), up(tile.height));
+    // The viewport consists of whole blocks, because a point whose centre lies outside is not drawn.
+    const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
+    glViewport(0, 0, wholeBlocks(tile.width), wholeBlocks(tile.height));
     for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
       glProgramUniform2i(program->name(), kFirstPixel, tile.left, tile.top);
-      glProgramUniform2i(program->name(), kViewport, up(tile.width), up(tile.height));
+      glProgramUniform2i(program->name(), kViewport, wholeBlocks(tile.width), wholeBlocks(tile.height));
     }
+  }
+
+  /// Traces the rays of a tile and reads what they hit. The march continues in further passes only for the pixels that
+  /// its first pass leaves under way.
+  void drawTile(const Tile& tile, GLsizei blocks, const Target& state, const Target& target) {
+    state.bindForDrawing();
+    march(blocks);
+    target.clear();
+    hit(target, blocks);
+    target.readIntegers(tile.width, tile.height, integers_);
+    if (std::ranges::any_of(integers_, isUnderWay)) {
+      state.bindForDrawing();
+      continueMarch(blocks);
+      hit(target, blocks);
+      target.readIntegers(tile.width, tile.height, integers_);
+    }
+    target.readFloats(tile.width, tile.height, normals_);
   }
 
   void march(GLsizei blocks) const {
@@ -315,8 +319,8 @@ class GlRenderer final : public Renderer {
     glTextureBarrier();
   }
 
-  /// Draws the march again until no pixel is under way, or all steps are used up.
-  void marchOn(GLsizei blocks) const {
+  /// Draws the march again until no pixel is under way or all steps are used up.
+  void continueMarch(GLsizei blocks) const {
     const GLuint query = resources_->anyPixels.name();
     glUseProgram(resources_->march.name());
     glProgramUniform1i(resources_->march.name(), kResume, GL_TRUE);
@@ -324,7 +328,7 @@ class GlRenderer final : public Renderer {
       glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
       glDrawArrays(GL_POINTS, 0, blocks);
       glEndQuery(GL_ANY_SAMPLES_PASSED);
-      // the pass reads the texels that the one before has written, each pixel its own
+      // Each pass reads the texels that the pass before has written, each pixel its own.
       glTextureBarrier();
       GLuint any = GL_FALSE;
       glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);
@@ -338,10 +342,22 @@ class GlRenderer final : public Renderer {
     glDrawArrays(GL_POINTS, 0, blocks);
   }
 
-  /// Whether the march of a pixel of the hit pass goes on.
+  /// Whether the march of a pixel in the result of the hit pass has not ended.
   static bool isUnderWay(const Texel& texel) { return texel[0] == kNoCell && texel[1] != 0; }
 
-  /// Calls f with each pixel's place in the tile and in the view. Rows of a target run downwards, as those of a view.
+  /// Copies a pixel of the tile to the view.
+  void setPixel(std::size_t from, ViewBuffers& buffers, std::size_t to) const {
+    const Texel& texel = integers_[from];
+    buffers.cell[to] = texel[0];
+    buffers.degree[to] = static_cast<std::uint8_t>(texel[1] & 0xff);
+    buffers.depth[to] = static_cast<std::uint8_t>(texel[1] >> 8 & 0xff);
+    buffers.crack[to] = static_cast<std::uint8_t>(texel[1] >> 16);
+    buffers.value[to] = std::bit_cast<float>(texel[2]);
+    buffers.distance[to] = std::bit_cast<float>(texel[3]);
+    buffers.normal[to] = {normals_[from][0], normals_[from][1], normals_[from][2]};
+  }
+
+  /// Calls f with the index of each pixel in the tile and in the view. Rows of a target run downwards, as in a view.
   template <typename F>
   static void forEachPixel(const Tile& tile, int viewWidth, F&& f) {
     for (int y = 0; y < tile.height; ++y)
@@ -352,12 +368,12 @@ class GlRenderer final : public Renderer {
   EglContext context_;
   GridSpace space_;
   FieldData octree_;
-  std::vector<NodeBounds> bounds_;
+  std::vector<SurfaceBounds> bounds_;
   std::unique_ptr<Resources> resources_;
-  int stepsInPass_;  ///< of a ray, in one pass
-  int refinements_;
-  std::vector<Texel> integers_;
-  std::vector<NormalTexel> normals_;
+  int stepsInPass_;                   ///< greatest number of steps of a ray in one pass of the march
+  int refinements_;                   ///< greatest number of refinements of a root
+  std::vector<Texel> integers_;       ///< the last tile's integers, as the shaders define them
+  std::vector<NormalTexel> normals_;  ///< the last tile's normals
 };
 
 }  // namespace

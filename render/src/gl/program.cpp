@@ -10,8 +10,8 @@ namespace hpsdf::render {
 namespace {
 
 struct ShaderKind {
-  static GLuint create() { return 0; }
-  static void destroy(GLuint name) { glDeleteShader(name); }
+  static void create(GLuint*) {}  // glCreateShader needs the stage
+  static void destroy(const GLuint* name) { glDeleteShader(*name); }
 };
 using GlShader = GlObject<ShaderKind>;
 
@@ -21,7 +21,14 @@ std::string names(std::initializer_list<std::string_view> files) {
   return result;
 }
 
-[[noreturn]] void fail(const std::string& what, std::string log) {
+/// Throws `Error` that starts with `what` and contains the compiler's log, unless `ok`.
+template <typename GetLog>
+void checkLog(GLint ok, const std::string& what, const GetLog& getLog, GLuint name) {
+  if (ok) return;
+  std::string log(4096, '\0');
+  GLsizei length = 0;
+  getLog(name, static_cast<GLsizei>(log.size()), &length, log.data());
+  log.resize(length);
   std::replace(log.begin(), log.end(), '\n', ' ');
   throw Error(what + ": " + log + "; update the graphics driver, or render with --cpu");
 }
@@ -29,7 +36,7 @@ std::string names(std::initializer_list<std::string_view> files) {
 GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
   std::string text = "#version 450 core\n";
   int number = 1;
-  // messages name the line of a file as NUMBER:LINE, the files counted in the order given
+  // The compiler's messages name lines as NUMBER:LINE, where files are numbered in the order of the list.
   for (const std::string_view file : files) {
     text += "#line 1 " + std::to_string(number++) + "\n";
     text += shaderText(file);
@@ -40,13 +47,7 @@ GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
   glCompileShader(shader.name());
   GLint ok = GL_FALSE;
   glGetShaderiv(shader.name(), GL_COMPILE_STATUS, &ok);
-  if (!ok) {
-    std::string log(4096, '\0');
-    GLsizei length = 0;
-    glGetShaderInfoLog(shader.name(), static_cast<GLsizei>(log.size()), &length, log.data());
-    log.resize(length);
-    fail("the OpenGL driver does not compile the shader " + names(files), log);
-  }
+  checkLog(ok, "the OpenGL driver does not compile the shader " + names(files), glGetShaderInfoLog, shader.name());
   return shader;
 }
 
@@ -64,13 +65,8 @@ GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
   glDetachShader(program.name(), fragment.name());
   GLint ok = GL_FALSE;
   glGetProgramiv(program.name(), GL_LINK_STATUS, &ok);
-  if (!ok) {
-    std::string log(4096, '\0');
-    GLsizei length = 0;
-    glGetProgramInfoLog(program.name(), static_cast<GLsizei>(log.size()), &length, log.data());
-    log.resize(length);
-    fail("the OpenGL driver does not link the shader " + names(fragmentFiles), log);
-  }
+  checkLog(ok, "the OpenGL driver does not link the shader " + names(fragmentFiles), glGetProgramInfoLog,
+           program.name());
   return program;
 }
 

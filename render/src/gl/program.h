@@ -7,8 +7,8 @@
 
 namespace hpsdf::render {
 
-/// A linked program of a vertex shader and a fragment shader, each made of files in shaders/, one after another. Throws
-/// `Error` with the compiler's log.
+/// A linked program of a vertex shader and a fragment shader, each of which is the concatenation of files in shaders/.
+/// Throws `Error` with the compiler's log.
 GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
                         std::initializer_list<std::string_view> fragmentFiles);
 

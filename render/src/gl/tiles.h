@@ -1,5 +1,5 @@
 #pragma once
-// What all renderers do on the device, whatever they draw.
+// Tiles of large views, and the check for OpenGL errors.
 
 #include <epoxy/gl.h>
 
@@ -11,13 +11,15 @@
 
 namespace hpsdf::render {
 
-constexpr int kTile = 2048;  ///< pixels a side: larger views are drawn in tiles, so that any size fits the device
+/// Greatest width and height of a tile in pixels, small enough for the render targets of any device.
+constexpr int kTile = 2048;
 
-/// A part of a view that is drawn at once.
+/// A part of a view that is drawn in one piece.
 struct Tile {
   int left, top, width, height;
 };
 
+/// The tiles that cover a part of a view.
 inline std::vector<Tile> tiles(const Tile& part) {
   std::vector<Tile> result;
   for (int y = 0; y < part.height; y += kTile)
@@ -27,7 +29,7 @@ inline std::vector<Tile> tiles(const Tile& part) {
   return result;
 }
 
-/// Throws `Error` where the device has failed since the last call.
+/// Throws `Error` where OpenGL reports an error since the last call. `what` completes "the OpenGL device fails to".
 inline void checkGl(const char* what) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;

@@ -9,7 +9,7 @@
 namespace hpsdf::render {
 namespace {
 
-// The transfer curve of IEC 61966-2-1.
+// decodeChannel and encodeChannel are the transfer curve of sRGB (IEC 61966-2-1).
 double decodeChannel(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
@@ -17,7 +17,7 @@ double encodeChannel(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-// A step of this table is at most 1/20 of an 8-bit code, so that it rounds like the curve itself.
+// A step of the table is at most 1/20 of an 8-bit code, so that it rounds like the curve itself.
 constexpr int kEncodeSteps = 65535;
 
 const std::vector<std::uint8_t>& encodeTable() {
@@ -39,7 +39,7 @@ const std::array<float, 256>& decodeTable() {
   return table;
 }
 
-// Björn Ottosson, "A perceptual color space for image processing" (2020).
+// The matrices are Ottosson's (2020).
 LinearColor oklabToLinear(const Oklab& color) {
   const double l = std::pow(color.lightness + 0.3963377774 * color.a + 0.2158037573 * color.b, 3);
   const double m = std::pow(color.lightness - 0.1055613458 * color.a - 0.0638541728 * color.b, 3);
@@ -78,8 +78,9 @@ Oklab toOklab(const LinearColor& color) {
 
 LinearColor fromOklab(const Oklab& color) {
   LinearColor linear = oklabToLinear(color);
-  double inside = 0, outside = 1;  // fractions of the chroma
+  // Bisect for the largest fraction of the chroma that can be displayed.
   if (!displayable(linear)) {
+    double inside = 0, outside = 1;
     for (int i = 0; i < 24; ++i) {
       const double middle = (inside + outside) / 2;
       const bool fits = displayable(oklabToLinear({color.lightness, middle * color.a, middle * color.b}));

@@ -1,5 +1,5 @@
 #pragma once
-// Colour spaces: 8-bit sRGB for files, linear sRGB for shading and averaging, Oklab for everything that an eye judges.
+// Colour spaces: 8-bit sRGB for files, linear sRGB for shading and averaging, Oklab for the choice of colours.
 
 #include <Eigen/Core>
 
@@ -7,15 +7,16 @@
 
 namespace hpsdf::render {
 
-/// Linear sRGB, 0 to 1.
+/// Linear sRGB, each channel 0 to 1.
 using LinearColor = Eigen::Vector3f;
 
 LinearColor decodeSrgb(Color color);
 
-/// Values outside 0 to 1 are clamped.
+/// Clamps values outside 0 to 1.
 Color encodeSrgb(const LinearColor& color);
 
-/// Perceptual coordinates (Ottosson 2020): lightness 0 to 1, a towards red, b towards yellow.
+/// A perceptually uniform colour space (Ottosson, "A perceptual color space for image processing", 2020): lightness 0
+/// to 1, a towards red, b towards yellow.
 struct Oklab {
   double lightness = 0;
   double a = 0;
@@ -24,11 +25,12 @@ struct Oklab {
 
 Oklab toOklab(const LinearColor& color);
 
-/// The displayable colour of this lightness and hue whose chroma is the given one or, beyond the gamut, the largest.
+/// Reduces the chroma of a colour beyond the gamut of sRGB, at the same lightness and hue, until it can be displayed.
 LinearColor fromOklab(const Oklab& color);
+/// The same in polar coordinates: a = chroma · cos(hue), b = chroma · sin(hue).
 LinearColor fromOklch(double lightness, double chroma, double hueDegrees);
 
-/// Euclidean distance in Oklab; about 0.02 is just noticeable side by side.
+/// Euclidean distance in Oklab. About 0.02 is just noticeable side by side.
 double colorDifference(const Oklab& a, const Oklab& b);
 
 inline LinearColor mix(const LinearColor& a, const LinearColor& b, float t) { return a + t * (b - a); }

@@ -31,9 +31,9 @@ double niceStep(double span, double lines) {
 LinearColor orderedColor(double t) {
   t = std::clamp(t, 0.0, 1.0);
   const double lightness = 0.385 + 0.565 * t;
-  // Violet to yellow the short way round would cross muddy pinks; this way crosses blue, teal and green.
+  // The hue runs from violet to yellow over blue, teal and green; the shorter arc would cross muddy pinks.
   const double hue = 302 - 204 * std::pow(t, 0.92);
-  // Least in the middle, where the gamut of sRGB is narrow and greens would shout.
+  // The chroma is least in the middle, where the gamut of sRGB is narrow and greens would stand out.
   const double chroma = 0.103 + 0.034 * (2 * t - 1) * (2 * t - 1);
   return fromOklch(lightness, chroma, hue);
 }
@@ -61,7 +61,7 @@ ColorScale ColorScale::around(double least, double greatest, bool logarithmic) {
   return {std::pow(10.0, bottom), std::pow(10.0, top), true};
 }
 
-double ColorScale::place(double value) const {
+double ColorScale::fraction(double value) const {
   const double t = logarithmic_ ? std::log(value / low_) / std::log(high_ / low_) : (value - low_) / (high_ - low_);
   return t > 0 ? std::min(t, 1.0) : 0.0;
 }
@@ -83,7 +83,7 @@ std::vector<double> scaleMarks(const ColorScale& scale) {
 }
 
 LinearColor divergingColor(double t) {
-  // Each arm bends through a light, clear colour, so that the side shows close to zero already.
+  // Each arm is a quadratic Bézier curve through a light, saturated colour, so that the sign shows close to zero.
   const Oklab white = {0.985, 0, 0};
   const Oklab middle = t < 0 ? Oklab{0.77, -0.045, -0.105} : Oklab{0.80, 0.070, 0.085};
   const Oklab end = t < 0 ? Oklab{0.36, -0.015, -0.135} : Oklab{0.40, 0.125, 0.070};
@@ -102,7 +102,7 @@ DistanceScale distanceScale(double minimum, double maximum) {
   const double largest = std::max(std::abs(minimum), std::abs(maximum));
   if (largest > 0) {
     scale.range = niceCeil(largest);
-    // A section that one value fills has no span to draw lines over; then the range serves.
+    // A section of constant value has no span to divide: divide the range instead.
     const double span = maximum - minimum;
     scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range, kIsoLines);
   }

@@ -1,4 +1,5 @@
 #pragma once
+// Colour maps and the scales that map numbers to them.
 
 #include <array>
 #include <span>
@@ -8,15 +9,16 @@
 
 namespace hpsdf::render {
 
-/// The ordered map for levels: 0 dark violet, over blue, teal and green, to 1, pale yellow. Lightness rises throughout.
+/// The map for ordered values: from dark violet at 0 over blue, teal and green to pale yellow at 1. Its lightness rises
+/// throughout.
 LinearColor orderedColor(double t);
 
-/// Colours of those levels (degrees or depths, 0 to 255) that occur, spread evenly over the ordered map.
+/// Colours of degrees or depths (levels, 0 to 255), spread evenly over the ordered map.
 class LevelMap {
  public:
   explicit LevelMap(std::span<const int> levels);
 
-  /// Magenta, which the map does not hold, for a level that was not announced: a fault of the buffers must show.
+  /// Magenta, which the map does not contain, for a level that is not in `levels`: a fault of the buffers must show.
   const LinearColor& operator()(int level) const { return colors_[static_cast<std::uint8_t>(level)]; }
   const std::vector<int>& levels() const { return levels_; }
 
@@ -25,20 +27,21 @@ class LevelMap {
   std::array<LinearColor, 256> colors_;
 };
 
-/// From a quantity that is not negative to the ordered map: `low` and less is its dark end, `high` and more its light
-/// one.
+/// Maps a quantity to the ordered map: values up to `low` to its dark end, values from `high` on to its light end.
 class ColorScale {
  public:
-  /// low < high; above 0 when logarithmic.
+  /// Requires low < high, and 0 < low on a logarithmic scale.
   ColorScale(double low, double high, bool logarithmic);
 
-  /// For values of which the least above 0 that counts and the greatest are given: whole powers of ten when logarithmic
-  /// (six of them at most), else from 0 to a number of one or two digits. Where nothing is above 0, up to 1.
+  /// A scale for values from `least` (above 0) to `greatest`: between powers of ten, at most six decades, if
+  /// logarithmic, else from 0 to a number of one or two digits. Its high end is 1 where `greatest` is 0.
   static ColorScale around(double least, double greatest, bool logarithmic);
 
-  LinearColor operator()(double value) const { return table_[static_cast<std::size_t>(place(value) * kSteps + 0.5)]; }
-  /// 0 at `low`, 1 at `high`; 0 for NaN.
-  double place(double value) const;
+  LinearColor operator()(double value) const {
+    return table_[static_cast<std::size_t>(fraction(value) * kSteps + 0.5)];
+  }
+  /// The value's position on the scale, clamped: 0 at `low`, 1 at `high`; 0 for NaN.
+  double fraction(double value) const;
 
   double low() const { return low_; }
   double high() const { return high_; }
@@ -51,26 +54,28 @@ class ColorScale {
   std::vector<LinearColor> table_;
 };
 
-/// Values to mark on a scale, ascending: powers of ten, where there are two of them, else some five even steps.
+/// Values to mark on a scale, ascending: the powers of ten if the scale contains at least two, else about five even
+/// steps.
 std::vector<double> scaleMarks(const ColorScale& scale);
 
-/// Of 1, 2 and 5 times a power of ten, the step that divides a span into as nearly so many lines as possible.
+/// The step of the form {1, 2, 5} · 10^n that divides `span` into a number of parts as near to `lines` as possible.
 double niceStep(double span, double lines);
 
-/// The largest power of ten that is not above x > 0.
+/// The largest power of ten that is at most x; x must be above 0.
 double powerOfTenBelow(double x);
 
-/// The diverging map for distances: −1 deep blue (inside), 0 white, 1 deep red (outside).
+/// The diverging map for distances: deep blue at −1 (inside), white at 0, deep red at 1 (outside).
 LinearColor divergingColor(double t);
 
-/// What turns distances into colours and lines.
+/// The colours and iso-lines of distances.
 struct DistanceScale {
-  double range = 1;                 ///< colours span [−range, range]
-  double step = 0.1;                ///< between iso-lines, which stand at its multiples
-  double minimum = 0, maximum = 0;  ///< of the values shown
+  double range = 1;                 ///< the colours span [−range, range]
+  double step = 0.1;                ///< iso-lines are at the multiples of this value
+  double minimum = 0, maximum = 0;  ///< least and greatest value shown
 };
 
-/// For values within [minimum, maximum]: a range of one or two digits, and some twelve iso-lines at 1, 2 or 5 × 10^n.
+/// Chooses a range of one or two digits and about twelve iso-lines with a step of {1, 2, 5} · 10^n for values within
+/// [minimum, maximum].
 DistanceScale distanceScale(double minimum, double maximum);
 
 }  // namespace hpsdf::render

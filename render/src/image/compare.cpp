@@ -7,8 +7,8 @@
 namespace hpsdf::render {
 namespace {
 
-/// The worst pixels keep at least this distance, so that one edge does not fill the list.
-constexpr int kApart = 16;
+/// Pixels nearer to each other than this along both axes are neighbours: one edge must not fill the list.
+constexpr int kNeighbourhood = 16;
 
 int difference(const Color& a, const Color& b) {
   int worst = 0;
@@ -65,7 +65,7 @@ std::vector<PixelDifference> worstPixels(const Image& baseline, const Image& act
   for (const PixelDifference& pixel : all) {
     if (worst.size() == count) break;
     const bool isNear = std::ranges::any_of(worst, [&](const PixelDifference& other) {
-      return std::abs(pixel.x - other.x) < kApart && std::abs(pixel.y - other.y) < kApart;
+      return std::abs(pixel.x - other.x) < kNeighbourhood && std::abs(pixel.y - other.y) < kNeighbourhood;
     });
     if (!isNear) worst.push_back(pixel);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// Files that are built into the library, so that nothing is looked up at run time.
+// Files that are built into the library, so that no file has to be found at run time.
 
 #include <string_view>
 
@@ -7,8 +7,8 @@
 
 namespace hpsdf::render {
 
-/// The text of shaders/<name>, unchanged, so that line numbers in compiler messages are those of the file. The name
-/// must be one of the files there.
+/// The text of shaders/<name>, unchanged, so that line numbers in compiler messages match the file. `name` must be one
+/// of the files in that folder.
 std::string_view shaderText(std::string_view name);
 
 }  // namespace hpsdf::render

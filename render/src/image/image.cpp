@@ -1,5 +1,6 @@
 #include "hpsdf/render/image.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -11,7 +12,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 
-// Static: an application that brings its own copy of stb must still link.
+// Static functions: an application that contains its own copy of stb must still link.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_PNG
@@ -21,10 +22,18 @@
 #define STB_IMAGE_WRITE_STATIC
 #define STBI_WRITE_NO_STDIO
 #include <stb/stb_image_write.h>
+
 namespace hpsdf::render {
 namespace {
 
 static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed bytes");
+
+constexpr int kSmallestSize = 16;
+constexpr int kLargestSize = 16384;
+constexpr int kMostSamples = 8;
+// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them; bodies take 28
+// more, and 12 while they are drawn.
+constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }
 
@@ -72,6 +81,17 @@ Image loadPng(const std::filesystem::path& file) {
   Image image(width, height, Color{});
   std::memcpy(image.pixels.data(), pixels.get(), image.pixels.size() * sizeof(Color));
   return image;
+}
+
+void checkPictureSize(int width, int height, int samples) {
+  const auto size = [&] { return std::to_string(width) + "x" + std::to_string(height); };
+  if (std::min(width, height) < kSmallestSize || std::max(width, height) > kLargestSize)
+    throw Error("picture size " + size() + " is out of range: give 16 to 16384 pixels a side");
+  if (samples < 1 || samples > kMostSamples)
+    throw Error("samples = " + std::to_string(samples) + " is out of range: give 1 to 8 samples an axis and pixel");
+  if (std::size_t(width) * height * samples * samples > kMostSamplesInAll)
+    throw Error("a picture of " + size() + " with " + std::to_string(samples) + "x" + std::to_string(samples) +
+                " samples a pixel takes more than 64 million samples: give a smaller size or fewer samples");
 }
 
 }  // namespace hpsdf::render

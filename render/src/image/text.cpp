@@ -8,7 +8,7 @@
 
 #include "image/embedded.h"
 
-// Static: ImGui and others bring their own copy of stb.
+// Static functions: ImGui and others contain their own copy of stb.
 #define STB_TRUETYPE_IMPLEMENTATION
 #define STBTT_STATIC
 #include <stb/stb_truetype.h>
@@ -29,15 +29,15 @@ const stbtt_fontinfo& font() {
   return info;
 }
 
-// Length in bytes of the sequence that this byte opens; 1 where it opens none.
+// Length in bytes of the UTF-8 sequence that starts with this byte; 1 for a byte that starts none.
 std::size_t sequenceLength(unsigned char first) {
   if (first >= 0xf0 && first < 0xf8) return 4;
   if (first >= 0xe0) return first < 0xf0 ? 3 : 1;
   return first >= 0xc0 ? 2 : 1;
 }
 
-// Takes the first code point off the text. Broken sequences and control characters become U+FFFD: file names hold any
-// bytes.
+// Removes the first code point from the text. Broken sequences and control characters become U+FFFD, because file names
+// may contain any bytes.
 char32_t takeCodePoint(std::string_view& text) {
   const auto first = static_cast<unsigned char>(text.front());
   const std::size_t length = sequenceLength(first);
@@ -58,9 +58,9 @@ char32_t takeCodePoint(std::string_view& text) {
 
 struct PlacedGlyph {
   int glyph;
-  int column;      // whole pixel of its origin
-  float fraction;  // and the rest of it
-  PixelRect box;   // of its bitmap
+  int column;      // integer part of its origin, pixels
+  float fraction;  // fractional part of its origin
+  PixelRect box;   // extent of its bitmap
 };
 
 struct Line {
@@ -70,8 +70,9 @@ struct Line {
 
 float scaleFor(double size) { return stbtt_ScaleForMappingEmToPixels(&font(), static_cast<float>(size)); }
 
-// Baselines snap to whole rows, which keeps horizontal strokes crisp; columns do not, which keeps the spacing even.
-Line place(std::string_view text, double size, double x, double baseline) {
+// Baselines are rounded to whole rows, which keeps horizontal strokes crisp; columns are not, which keeps the spacing
+// even.
+Line layOut(std::string_view text, double size, double x, double baseline) {
   const float scale = scaleFor(size);
   const int row = static_cast<int>(std::lround(baseline));
   Line line;
@@ -95,7 +96,7 @@ Line place(std::string_view text, double size, double x, double baseline) {
   return line;
 }
 
-// In encoded values, not in linear light: dark text on a light ground keeps its weight so.
+// Blends encoded values instead of linear light: dark text on light ground keeps its weight.
 void blend(Color& pixel, Color color, int coverage) {
   for (int i = 0; i < 3; ++i) {
     const int mixed = (pixel[i] * (255 - coverage) + color[i] * coverage + 127) / 255;
@@ -117,7 +118,7 @@ void drawGlyph(Image& image, const PlacedGlyph& glyph, float scale, Color color)
 }  // namespace
 
 TextMeasure measureText(std::string_view text, double size, double x, double baseline) {
-  const Line line = place(text, size, x, baseline);
+  const Line line = layOut(text, size, x, baseline);
   TextMeasure measure{line.advance, {}};
   for (const PlacedGlyph& glyph : line.glyphs) {
     if (glyph.box.empty()) continue;
@@ -142,15 +143,15 @@ double capHeight(double size) {
 
 void drawText(Image& image, std::string_view text, double size, double x, double baseline, Color color) {
   const float scale = scaleFor(size);
-  for (const PlacedGlyph& glyph : place(text, size, x, baseline).glyphs) drawGlyph(image, glyph, scale, color);
+  for (const PlacedGlyph& glyph : layOut(text, size, x, baseline).glyphs) drawGlyph(image, glyph, scale, color);
 }
 
 std::string fitText(std::string_view text, double size, double width) {
   if (measureText(text, size).advance <= width) return std::string(text);
-  std::vector<std::size_t> ends = {0};  // of ever longer beginnings
+  std::vector<std::size_t> ends = {0};  // byte offset after each code point
   for (std::string_view rest = text; !rest.empty(); ends.push_back(text.size() - rest.size())) takeCodePoint(rest);
   const auto shortened = [&](std::size_t count) { return std::string(text.substr(0, ends[count])) + "…"; };
-  // Bisection: a name may be as long as a path allows.
+  // Bisect, because a name may be as long as a path.
   std::size_t fits = 0, tooLong = ends.size() - 1;
   if (measureText(shortened(0), size).advance > width) return {};
   while (fits + 1 < tooLong) {

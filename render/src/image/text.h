@@ -1,6 +1,6 @@
 #pragma once
-// Anti-aliased text in the built-in font (DejaVu Sans). Strings are UTF-8; sizes are pixels an em; a text stands at the
-// left end of its baseline.
+// Anti-aliased text in the built-in font (DejaVu Sans). Strings are UTF-8; a size is the em in pixels; the position of
+// a text is the left end of its baseline.
 
 #include <string>
 #include <string_view>
@@ -22,20 +22,23 @@ struct PixelRect {
 };
 
 struct TextMeasure {
-  double advance = 0;  ///< to where the next text would stand
-  PixelRect ink;       ///< every pixel that drawing may change
+  double advance = 0;  ///< distance in pixels to the start of a text that follows
+  PixelRect ink;       ///< contains every pixel that drawing may change
 };
 
 TextMeasure measureText(std::string_view text, double size, double x = 0, double baseline = 0);
 
-/// Height of capitals and digits above the baseline: what to centre on.
+/// The advance of `measureText`.
+inline double advanceOf(std::string_view text, double size) { return measureText(text, size).advance; }
+
+/// Height in pixels of capitals and digits above the baseline, by which text is centred vertically.
 double capHeight(double size);
 
-/// Pixels outside of the image are left out.
+/// Skips pixels outside of the image.
 void drawText(Image& image, std::string_view text, double size, double x, double baseline, Color color);
 
-/// The text itself, or as much of its beginning as fits into `width` pixels with an ellipsis; empty if not even that
-/// fits.
+/// The text if it is at most `width` pixels wide; else the longest beginning that fits with an ellipsis; empty if not
+/// even the ellipsis fits.
 std::string fitText(std::string_view text, double size, double width);
 
 }  // namespace hpsdf::render

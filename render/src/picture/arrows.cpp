@@ -11,27 +11,28 @@ namespace {
 constexpr Color kCore = {22, 20, 34};
 constexpr Color kCasing = {252, 251, 246};
 constexpr float kCasingStrength = 0.75F;
-constexpr double kCoreWidth = 1.3;     // in thin lines
-constexpr double kCasingBorder = 1.0;  // on either side, in thin lines
-constexpr double kHeadLength = 5.5;    // in thin lines, but no more than kHeadShare of the arrow
-constexpr double kHeadShare = 0.6;
-constexpr double kHeadHalfWidth = 0.45;  // of its length
-constexpr float kHidden = 0.3F;          // strength of what lies behind something
+// Lengths are in multiples of a thin line's width.
+constexpr double kCoreWidth = 1.3;
+constexpr double kCasingBorder = 1.0;  // width of the casing on either side
+constexpr double kHeadLength = 5.5;
+constexpr double kHeadShare = 0.6;       // greatest share of the arrow that the head takes
+constexpr double kHeadHalfWidth = 0.45;  // as a share of the head's length
+constexpr float kHidden = 0.3F;          // opacity of hidden parts
 
-/// A pixel of the finished view and its middle sample.
-struct Place {
+/// A pixel of the finished view with its middle sample.
+struct Pixel {
   int x, y;
-  int column, row;
+  int column, row;  ///< of the sample in the buffers
 };
 
-std::vector<Place> evenPlaces(const ViewBuffers& buffers, int samples, int spacing) {
-  std::vector<Place> places;
+std::vector<Pixel> evenlySpacedPixels(const ViewBuffers& buffers, int samples, int spacing) {
+  std::vector<Pixel> pixels;
   for (int y = spacing / 2; y < buffers.height / samples; y += spacing)
     for (int x = spacing / 2; x < buffers.width / samples; x += spacing) {
-      const Place place{x, y, x * samples + samples / 2, y * samples + samples / 2};
-      if (buffers.hit(std::size_t(place.row) * buffers.width + place.column)) places.push_back(place);
+      const Pixel pixel{x, y, x * samples + samples / 2, y * samples + samples / 2};
+      if (buffers.hit(std::size_t(pixel.row) * buffers.width + pixel.column)) pixels.push_back(pixel);
     }
-  return places;
+  return pixels;
 }
 
 std::vector<ValueAndGradient> gradientsAt(const Field& field, const std::vector<Vector3>& points) {
@@ -40,7 +41,7 @@ std::vector<ValueAndGradient> gradientsAt(const Field& field, const std::vector<
   return results;
 }
 
-/// The part of an arrow that is filled: a shaft and a head.
+/// The area of an arrow: a shaft with a head.
 class Shape {
  public:
   Shape(const Arrow& arrow, double thin) : from_(arrow.from), length_((arrow.to - arrow.from).norm()) {
@@ -49,18 +50,19 @@ class Shape {
     half_ = 0.5 * kCoreWidth * thin;
   }
 
-  double along(const Eigen::Vector2d& x) const {
+  /// Parameter along the arrow of the point nearest to x, 0 to 1.
+  double parameter(const Eigen::Vector2d& x) const {
     return length_ > 0 ? std::clamp((x - from_).dot(along_) / length_, 0.0, 1.0) : 0.0;
   }
 
-  /// From x to the shape's edge, below 0 inside.
+  /// Signed distance of x from the arrow's outline, negative inside.
   double distance(const Eigen::Vector2d& x) const {
     const double t = (x - from_).dot(along_);
     const double across = std::abs(along_.x() * (x - from_).y() - along_.y() * (x - from_).x());
-    // a shaft with round ends, up to the middle of the head
+    // The shaft is a capsule that ends in the middle of the head.
     const double shaftEnd = length_ - 0.5 * head_;
     const double toShaft = std::hypot(t - std::clamp(t, 0.0, shaftEnd), across) - half_;
-    // the head: an isosceles triangle, here its upper half
+    // The head is an isosceles triangle; by symmetry only one half of it is considered.
     const double slope = std::hypot(1.0, kHeadHalfWidth);
     const double beyondSide = (across - kHeadHalfWidth * (length_ - t)) / slope;
     const double beyondBase = length_ - head_ - t;
@@ -73,14 +75,14 @@ class Shape {
   double length_, head_, half_;
 };
 
-/// Mixes a colour in where shapes, grown by `border`, cover pixels.
+/// Blends a colour over the pixels that the arrows, grown by `border`, cover.
 void paintShapes(Image& image, const PixelRect& rect, const std::vector<Arrow>& arrows, double thin, double border,
                  const LinearColor& color, float opacity) {
   for (const Arrow& arrow : arrows) {
     const Shape shape(arrow, thin);
-    const double reach = border + kHeadHalfWidth * kHeadLength * thin + 2;
-    const Eigen::Vector2d low = arrow.from.cwiseMin(arrow.to).array() - reach;
-    const Eigen::Vector2d high = arrow.from.cwiseMax(arrow.to).array() + reach;
+    const double margin = border + kHeadHalfWidth * kHeadLength * thin + 2;
+    const Eigen::Vector2d low = arrow.from.cwiseMin(arrow.to).array() - margin;
+    const Eigen::Vector2d high = arrow.from.cwiseMax(arrow.to).array() + margin;
     const auto within = [](double x, int first, int last) {
       return int(std::clamp(std::floor(x), double(first), double(last)));
     };
@@ -89,7 +91,7 @@ void paintShapes(Image& image, const PixelRect& rect, const std::vector<Arrow>& 
         const Eigen::Vector2d middle(x + 0.5, y + 0.5);
         const double covered = std::clamp(border + 0.5 - shape.distance(middle), 0.0, 1.0);
         if (covered <= 0) continue;
-        const float strength = arrow.strength ? arrow.strength(shape.along(middle), x, y) : 1;
+        const float strength = arrow.strength ? arrow.strength(shape.parameter(middle), x, y) : 1;
         Color& pixel = image.at(x, y);
         pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
       }
@@ -100,17 +102,17 @@ void paintShapes(Image& image, const PixelRect& rect, const std::vector<Arrow>& 
 
 std::vector<Arrow> gradientArrows(const Field& field, const SliceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing) {
-  const std::vector<Place> places = evenPlaces(buffers, samples, spacing);
+  const std::vector<Pixel> pixels = evenlySpacedPixels(buffers, samples, spacing);
   std::vector<Vector3> points;
-  for (const Place& place : places) points.push_back(pointAt(view, buffers, place.column, place.row));
+  for (const Pixel& pixel : pixels) points.push_back(pointAt(view, buffers, pixel.column, pixel.row));
   const std::vector<ValueAndGradient> results = gradientsAt(field, points);
   const Vector3 right = view.right.normalized(), up = view.up.normalized();
   std::vector<Arrow> arrows;
-  for (std::size_t n = 0; n < places.size(); ++n) {
+  for (std::size_t n = 0; n < pixels.size(); ++n) {
     const Vector3& gradient = results[n].gradient;
     Eigen::Vector2d half = 0.5 * kArrowShare * spacing * Eigen::Vector2d(gradient.dot(right), -gradient.dot(up));
     if (const double length = 2 * half.norm(); length > spacing) half *= spacing / length;
-    const Eigen::Vector2d middle(places[n].x + 0.5, places[n].y + 0.5);
+    const Eigen::Vector2d middle(pixels[n].x + 0.5, pixels[n].y + 0.5);
     arrows.push_back({middle - half, middle + half});
   }
   return arrows;
@@ -120,12 +122,12 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
                                   int spacing) {
   const Camera& camera = view.camera;
   const int width = buffers.width / samples, height = buffers.height / samples;
-  const std::vector<Place> places = evenPlaces(buffers, samples, spacing);
+  const std::vector<Pixel> pixels = evenlySpacedPixels(buffers, samples, spacing);
   std::vector<Vector3> points;
-  for (const Place& place : places) points.push_back(pointAt(view, buffers, place.column, place.row));
+  for (const Pixel& pixel : pixels) points.push_back(pointAt(view, buffers, pixel.column, pixel.row));
   const std::vector<ValueAndGradient> results = gradientsAt(field, points);
   std::vector<Arrow> arrows;
-  for (std::size_t n = 0; n < places.size(); ++n) {
+  for (std::size_t n = 0; n < pixels.size(); ++n) {
     const PicturePoint from = project(camera, points[n], width, height);
     const double longest = spacing * pixelSize(camera, from.depth, height);
     Vector3 along = kArrowShare * longest * results[n].gradient;
@@ -133,7 +135,7 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
     const Vector3 end = points[n] + along;
     const PicturePoint to = project(camera, end, width, height);
     if (!(to.depth > 0)) continue;
-    // Behind what is nearer by more than the surface may rise within a pixel or two.
+    // The tolerance is the rise of a slanted surface within one or two pixels.
     const auto strength = [&buffers, from, to, samples, tolerance = 2 * longest / spacing](double t, int x, int y) {
       const std::size_t i =
           std::size_t(y * samples + samples / 2) * buffers.width + std::size_t(x * samples + samples / 2);
@@ -146,7 +148,7 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
 }
 
 void paintArrows(Image& image, const PixelRect& rect, const std::vector<Arrow>& arrows, double lineWidth) {
-  // All casings first, so that none covers a neighbour.
+  // Paint all casings before the cores, so that no casing covers a neighbour.
   paintShapes(image, rect, arrows, lineWidth, kCasingBorder * lineWidth, decodeSrgb(kCasing), kCasingStrength);
   paintShapes(image, rect, arrows, lineWidth, 0, decodeSrgb(kCore), 1);
 }

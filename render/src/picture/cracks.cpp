@@ -8,27 +8,27 @@
 namespace hpsdf::render {
 namespace {
 
-/// Samples with a crack, and those no farther from one than `reach` along either axis.
-std::vector<std::uint8_t> widened(const ViewBuffers& buffers, int reach) {
+/// The samples that are at most `radius` away from a crack along either axis.
+std::vector<std::uint8_t> dilated(const ViewBuffers& buffers, int radius) {
   const int width = buffers.width, height = buffers.height;
   std::vector<std::uint8_t> alongRows(buffers.crack.size()), result(buffers.crack.size());
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const std::size_t row = std::size_t(y) * width;
       if (!buffers.crack[row + x]) continue;
-      const int first = std::max(0, x - reach), last = std::min(width - 1, x + reach);
+      const int first = std::max(0, x - radius), last = std::min(width - 1, x + radius);
       std::fill_n(&alongRows[row + first], last - first + 1, std::uint8_t{1});
     }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       if (!alongRows[std::size_t(y) * width + x]) continue;
-      for (int v = std::max(0, y - reach); v <= std::min(height - 1, y + reach); ++v)
+      for (int v = std::max(0, y - radius); v <= std::min(height - 1, y + radius); ++v)
         result[std::size_t(v) * width + x] = 1;
     }
   return result;
 }
 
-/// Calls f(x, y, count) for every pixel with marked samples.
+/// Calls f(x, y, count) for every pixel with `count` marked samples, unless it has none.
 template <typename F>
 void forEachMarked(const std::vector<std::uint8_t>& marks, int width, int height, int samples, F&& f) {
   for (int y = 0; y < height / samples; ++y)
@@ -51,13 +51,14 @@ Cracks cracksOf(const ViewBuffers& buffers, double offset, int samples) {
 }
 
 void markCracks(Image& picture, const ViewBuffers& buffers, const Sampling& sampling) {
-  const int reach = static_cast<int>(std::lround(std::max(1.0, sampling.lineWidth) * sampling.samples));
+  const int radius = static_cast<int>(std::lround(std::max(1.0, sampling.lineWidth) * sampling.samples));
   const LinearColor color = decodeSrgb(kCrackColor);
   const float share = 1.0F / float(sampling.samples * sampling.samples);
-  forEachMarked(widened(buffers, reach), buffers.width, buffers.height, sampling.samples, [&](int x, int y, int count) {
-    Color& pixel = picture.at(x, y);
-    pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share * float(count)));
-  });
+  forEachMarked(dilated(buffers, radius), buffers.width, buffers.height, sampling.samples,
+                [&](int x, int y, int count) {
+                  Color& pixel = picture.at(x, y);
+                  pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share * float(count)));
+                });
 }
 
 }  // namespace hpsdf::render

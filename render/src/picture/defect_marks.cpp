@@ -14,18 +14,21 @@ namespace {
 
 constexpr Color kCasing = {24, 22, 34};
 constexpr float kCasingStrength = 0.7F;
-constexpr float kHidden = 0.7F;      // strength of what lies behind something: in dashes, so that hues stay apart
-constexpr double kDash = 4;          // in thin lines, a dash and a gap each
-constexpr double kHiddenBeyond = 4;  // pixels of depth: as much as a surface may rise beside an edge of its own
-constexpr double kLineWidth = 1.8;   // in thin lines, and so the next
+constexpr float kHidden =
+    0.7F;  // opacity of hidden marks; they are dashed rather than faint, so that hues stay distinct
+// Lengths are in multiples of a thin line's width.
+constexpr double kDash = 4;  // length of a dash, and of the gap after it
+constexpr double kLineWidth = 1.8;
 constexpr double kDotRadius = 2.6;
 constexpr double kCasingBorder = 0.9;
-constexpr double kSmallGroup = 16;     // pixels: what is no larger gets a ring
-constexpr double kLeastRing = 9;       // pixels, its radius
-constexpr double kNearestMark = 1e-3;  // before the eye, of how far away an edge's other end is
-constexpr int kGroupCell = 8;          // pixels: what lies in neighbouring cells of this size is one group
+constexpr double kSmallGroup = 16;   // a group up to this size gets a ring
+constexpr double kLeastRing = 9;     // radius of the smallest ring
+constexpr double kHiddenBeyond = 4;  // pixels of depth that a surface may rise beside an edge of its own
+constexpr double kNearestMark =
+    1e-3;                      // marks nearer to the eye are cut, as a share of the depth of an edge's other end
+constexpr int kGroupCell = 8;  // pixels; marks in neighbouring cells of this size belong to one group
 
-/// As of a panel that has them all.
+/// The panel's row of a kind, without its count.
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
       {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
@@ -43,13 +46,13 @@ std::string countOf(const MeshDefects& defects, DefectKind kind) {
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
 
-/// A line, a dot or a ring: all points at some distance from a segment.
+/// A line, a dot or a ring: all points at some distance from a segment in the picture.
 struct Stroke {
   PicturePoint from, to;
-  double radius = 0;  ///< pixels: of a ring from the middle, else 0
-  double half = 0;    ///< of the width, pixels
+  double radius = 0;     ///< radius of a ring, pixels; 0 for lines and dots
+  double halfWidth = 0;  ///< pixels
   Color color;
-  double tolerance = 0;  ///< world units: hidden by what is nearer by more
+  double tolerance = 0;  ///< depth by which something must be nearer to hide the stroke, world units
 };
 
 class Painter {
@@ -57,7 +60,7 @@ class Painter {
   Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
       : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
 
-  /// Mixes a colour in where strokes, grown by `border`, cover pixels.
+  /// Blends the strokes, grown by `border`, over the picture, in their own colours or in `color`.
   void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
     for (const Stroke& stroke : strokes) paint(stroke, border, decodeSrgb(color ? *color : stroke.color), opacity);
   }
@@ -65,19 +68,19 @@ class Painter {
  private:
   void paint(const Stroke& stroke, double border, const LinearColor& color, float opacity) {
     const Eigen::Vector2d from(stroke.from.x, stroke.from.y), to(stroke.to.x, stroke.to.y);
-    const double reach = stroke.radius + stroke.half + border + 1;
-    const auto first = [&](double x) { return int(std::clamp(std::floor(x - reach), 0.0, 1e6)); };
-    const auto end = [&](double x, int size) { return int(std::clamp(std::ceil(x + reach), 0.0, double(size))); };
+    const double extent = stroke.radius + stroke.halfWidth + border + 1;  // from the segment
+    const auto first = [&](double x) { return int(std::clamp(std::floor(x - extent), 0.0, 1e6)); };
+    const auto end = [&](double x, int size) { return int(std::clamp(std::ceil(x + extent), 0.0, double(size))); };
     const int x1 = end(std::max(from.x(), to.x()), buffers_.width / samples_);
     const int y1 = end(std::max(from.y(), to.y()), buffers_.height / samples_);
     const Eigen::Vector2d along = to - from;
     const double squared = along.squaredNorm();
     for (int y = first(std::min(from.y(), to.y())); y < y1; ++y) {
-      // of the segment, what is no farther above or below the row than the stroke reaches
+      // Find the part of the segment that is near enough to the row to cover pixels of it.
       double begin = 0, last = 1;
       if (along.y() != 0) {
         const auto [low, high] =
-            std::minmax({(y + 0.5 - reach - from.y()) / along.y(), (y + 0.5 + reach - from.y()) / along.y()});
+            std::minmax({(y + 0.5 - extent - from.y()) / along.y(), (y + 0.5 + extent - from.y()) / along.y()});
         begin = std::clamp(low, 0.0, 1.0);
         last = std::clamp(high, 0.0, 1.0);
       }
@@ -86,8 +89,8 @@ class Painter {
       for (int x = first(std::min(xBegin, xLast)); x < rowEnd; ++x) {
         const Eigen::Vector2d middle(x + 0.5, y + 0.5);
         const double t = squared > 0 ? std::clamp((middle - from).dot(along) / squared, 0.0, 1.0) : 0.0;
-        const double away = std::abs((middle - from - t * along).norm() - stroke.radius);
-        const double covered = std::clamp(stroke.half + border + 0.5 - away, 0.0, 1.0);
+        const double distance = std::abs((middle - from - t * along).norm() - stroke.radius);
+        const double covered = std::clamp(stroke.halfWidth + border + 0.5 - distance, 0.0, 1.0);
         if (covered <= 0) continue;
         const bool hidden = isHidden(stroke, t, x, y);
         if (hidden && isGap(stroke, middle)) continue;
@@ -98,23 +101,25 @@ class Painter {
     }
   }
 
-  /// A ring is where its middle is.
+  /// A ring is hidden as a whole, if its centre is.
   bool isHidden(const Stroke& stroke, double t, int x, int y) const {
     if (stroke.radius > 0) x = int(stroke.from.x), y = int(stroke.from.y);
     if (x < 0 || y < 0 || x >= buffers_.width / samples_ || y >= buffers_.height / samples_) return false;
     const std::size_t i =
         std::size_t(y * samples_ + samples_ / 2) * buffers_.width + std::size_t(x * samples_ + samples_ / 2);
-    // along a line in space the reciprocal of the distance is what changes evenly
+    // In perspective the reciprocal of the distance is linear along the line in the picture.
     const double distance = 1 / ((1 - t) / stroke.from.distance + t / stroke.to.distance);
     return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
   }
 
-  /// By the place in the picture, not along the line: edges shorter than a dash have gaps too. A dot has none.
-  bool isGap(const Stroke& stroke, const Eigen::Vector2d& place) const {
+  /// The gaps depend on the position in the picture, not along the line, so that edges shorter than a dash have gaps
+  /// too. A dot has none.
+  bool isGap(const Stroke& stroke, const Eigen::Vector2d& position) const {
     const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
-    double path = across > down ? place.x() : place.y();
+    double path = across > down ? position.x() : position.y();
     if (stroke.radius > 0)
-      path = stroke.radius * (std::numbers::pi + std::atan2(place.y() - stroke.from.y, place.x() - stroke.from.x));
+      path =
+          stroke.radius * (std::numbers::pi + std::atan2(position.y() - stroke.from.y, position.x() - stroke.from.x));
     else if (across == 0 && down == 0)
       return false;
     return std::fmod(path, 2 * dash_) >= dash_;
@@ -126,26 +131,27 @@ class Painter {
   double dash_;  ///< pixels
 };
 
-/// What hangs together in the picture, of one kind: cells of some pixels that touch.
+/// Groups of defects of one kind: connected components of the picture's cells (kGroupCell) that contain any.
 class Groups {
  public:
   Groups(int width, int height)
-      : columns_(width / kGroupCell + 1), rows_(height / kGroupCell + 1), here_(std::size_t(columns_) * rows_) {}
+      : columns_(width / kGroupCell + 1), rows_(height / kGroupCell + 1), cells_(std::size_t(columns_) * rows_) {}
 
   struct Group {
     Eigen::AlignedBox2d extent;
     PicturePoint nearest;
   };
 
-  std::vector<Group> take() {
+  /// Finds all groups and forgets their cells.
+  std::vector<Group> extract() {
     std::vector<Group> groups;
     for (int row = 0; row < rows_; ++row)
       for (int column = 0; column < columns_; ++column)
-        if (here_[std::size_t(row) * columns_ + column].used) groups.push_back(spread(column, row));
+        if (cells_[std::size_t(row) * columns_ + column].used) groups.push_back(extractFrom(column, row));
     return groups;
   }
 
-  /// A line, by places no farther apart than a cell.
+  /// Adds a line by points on it that are at most a cell apart from each other.
   void add(const PicturePoint& from, const PicturePoint& to) {
     const double length = std::hypot(to.x - from.x, to.y - from.y);
     const int steps = int(std::min(std::ceil(length / kGroupCell), 1e4));
@@ -162,7 +168,7 @@ class Groups {
   void add(const PicturePoint& p) {
     if (!(p.x >= 0 && p.y >= 0 && p.x < columns_ * kGroupCell && p.y < rows_ * kGroupCell)) return;
     const int column = int(p.x) / kGroupCell, row = int(p.y) / kGroupCell;
-    Cell& cell = here_[std::size_t(row) * columns_ + column];
+    Cell& cell = cells_[std::size_t(row) * columns_ + column];
     if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
     cell.used = true;
     cell.extent.extend(Eigen::Vector2d(p.x, p.y));
@@ -174,13 +180,13 @@ class Groups {
     Eigen::AlignedBox2d extent;
   };
 
-  Group spread(int column, int row) {
-    Group group{.extent = {}, .nearest = here_[std::size_t(row) * columns_ + column].nearest};
+  Group extractFrom(int column, int row) {
+    Group group{.extent = {}, .nearest = cells_[std::size_t(row) * columns_ + column].nearest};
     std::vector<std::array<int, 2>> pending = {{column, row}};
     while (!pending.empty()) {
       const auto [x, y] = pending.back();
       pending.pop_back();
-      Cell& cell = here_[std::size_t(y) * columns_ + x];
+      Cell& cell = cells_[std::size_t(y) * columns_ + x];
       if (!cell.used) continue;
       cell.used = false;
       group.extent.extend(cell.extent);
@@ -192,19 +198,19 @@ class Groups {
   }
 
   int columns_, rows_;
-  std::vector<Cell> here_;
+  std::vector<Cell> cells_;
 };
 
-/// The ends of what of a segment is before the eye; behind it where nothing is.
+/// The ends of the part of a segment that lies before the eye; both are behind the eye if there is none.
 std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
-  const auto place = [&](const Vector3& point) { return project(camera, point, width, height); };
-  PicturePoint from = place(ends[0]), to = place(ends[1]);
+  const auto seen = [&](const Vector3& point) { return project(camera, point, width, height); };
+  PicturePoint from = seen(ends[0]), to = seen(ends[1]);
   const double nearest = kNearestMark * std::max(from.depth, to.depth);
   if (!(nearest > 0)) return {from, from};
   const auto share = [&](double depth, double other) { return (nearest - depth) / (other - depth); };
   const Vector3 along = ends[1] - ends[0];
-  if (from.depth < nearest) return {place(ends[0] + share(from.depth, to.depth) * along), to};
-  if (to.depth < nearest) return {from, place(ends[1] - share(to.depth, from.depth) * along)};
+  if (from.depth < nearest) return {seen(ends[0] + share(from.depth, to.depth) * along), to};
+  if (to.depth < nearest) return {from, seen(ends[1] - share(to.depth, from.depth) * along)};
   return {from, to};
 }
 
@@ -233,31 +239,37 @@ std::vector<Swatch> defectSwatches(const MeshDefects& defects) {
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
                   const MeshDefects& defects, double lineWidth) {
   const int width = buffers.width / samples, height = buffers.height / samples;
+  const double halfWidth = 0.5 * kLineWidth * lineWidth;
+  const auto toleranceAt = [&](double depth) { return kHiddenBeyond * pixelSize(camera, depth, height); };
   std::vector<Stroke> strokes;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
+    // Collect lines and dots.
     Groups groups(width, height);
     const Color color = defectColor(DefectKind(kind));
-    for (const Defect& defect : defects.of(DefectKind(kind))) {
+    for (const Defect& defect : defects.ofKind(DefectKind(kind))) {
       const auto [from, to] = beforeEye(camera, defect.ends, width, height);
       if (!(from.depth > 0)) continue;
-      const double tolerance = kHiddenBeyond * pixelSize(camera, std::max(from.depth, to.depth), height);
+      const double tolerance = toleranceAt(std::max(from.depth, to.depth));
       groups.add(from, to);
       if (isEdge(defect.kind))
-        strokes.push_back({from, to, 0, 0.5 * kLineWidth * lineWidth, color, tolerance});
+        strokes.push_back({from, to, 0, halfWidth, color, tolerance});
       else if (defect.kind == DefectKind::pinchedVertex)
         strokes.push_back({from, to, 0, kDotRadius * lineWidth, color, tolerance});
     }
-    for (const Groups::Group& group : groups.take()) {
-      if (group.extent.sizes().maxCoeff() > kSmallGroup * lineWidth) continue;
+
+    // Put rings around small groups.
+    for (const Groups::Group& group : groups.extract()) {
+      const double size = group.extent.sizes().maxCoeff();
+      if (size > kSmallGroup * lineWidth) continue;
       PicturePoint middle = group.nearest;
       middle.x = group.extent.center().x();
       middle.y = group.extent.center().y();
-      const double radius = kLeastRing * lineWidth + 0.5 * group.extent.sizes().maxCoeff();
-      strokes.push_back({middle, middle, radius, 0.5 * kLineWidth * lineWidth, color,
-                         kHiddenBeyond * pixelSize(camera, middle.depth, height)});
+      strokes.push_back(
+          {middle, middle, kLeastRing * lineWidth + 0.5 * size, halfWidth, color, toleranceAt(middle.depth)});
     }
   }
-  // all casings first, so that none covers a neighbour
+
+  // Paint all casings before the cores, so that no casing covers a neighbour.
   Painter painter(picture, buffers, samples, lineWidth);
   painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
   painter.paint(strokes, 0, nullptr, 1);

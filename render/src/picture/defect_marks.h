@@ -1,5 +1,5 @@
 #pragma once
-// Where a mesh has defects, over a finished view.
+// Marks of a mesh's defects, painted over a finished view.
 
 #include <array>
 #include <string>
@@ -7,25 +7,25 @@
 
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/render/image.h"
-#include "hpsdf/render/picture.h"
+#include "hpsdf/render/picture_settings.h"
 #include "hpsdf/render/view.h"
 #include "picture/legend.h"
 
 namespace hpsdf::render {
 
-/// Of a panel; the first that fits is taken.
+/// Titles of the panel, the longest first.
 inline const std::array<std::string, 2> kDefectTitles = {"Defects of the mesh", "Defects"};
 
-/// Kinds are told apart on clay.
+/// The colours of the kinds are distinguishable on clay.
 Color defectColor(DefectKind kind);
 
-/// Those that there are.
+/// The kinds of defects that the mesh has, with their numbers.
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);
-/// The same for a panel beside the view.
+/// The rows of the panel about the kinds of defects that the mesh has.
 std::vector<Swatch> defectSwatches(const MeshDefects& defects);
 
-/// Edges as lines, pinched vertices as dots; rings around what would be overlooked, being small or alone. Dashed where
-/// something in the buffers hides it. The view lies in the picture's upper left corner.
+/// Paints edges as lines and pinched vertices as dots, with rings around small groups, which would be overlooked. Marks
+/// are dashed where something in the buffers hides them. The view lies in the picture's upper left corner.
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
                   const MeshDefects& defects, double lineWidth);
 

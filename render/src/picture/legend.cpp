@@ -3,33 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
-#include "picture/color_view.h"
+#include "coloring/color_view.h"
 
 namespace hpsdf::render {
 namespace {
 
 constexpr Color kShareBar = {206, 209, 218};
 
-// Text of a picture: 15 pixels at 1280 × 720, in proportion above, shrinking less than the picture below.
+// Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures and shrinks less than smaller ones.
 double textSizeFor(int width, int height) {
-  const double reach = std::min<double>(height, width * 9.0 / 16);
-  return reach >= 720 ? 15 * reach / 720 : std::max(9.0, 15 - (720 - reach) * 5 / 480);
-}
-
-Color colorOf(const LinearColor& color) { return encodeSrgb(color); }
-
-double advanceOf(const std::string& text, double size) { return measureText(text, size).advance; }
-
-void addText(Overlay& overlay, std::string text, double size, double x, double baseline, Color color) {
-  if (!text.empty()) overlay.texts.push_back({std::move(text), size, x, baseline, color});
+  const double size = std::min<double>(height, width * 9.0 / 16);
+  return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
 }
 
 void addTextRight(Overlay& overlay, const std::string& text, double size, double right, double baseline, Color color) {
   addText(overlay, text, size, right - advanceOf(text, size), baseline, color);
 }
 
-// The column within the panel that legends stand in.
+// The part of the panel that is still free.
 struct Column {
   double left, right, top, bottom;
   double width() const { return right - left; }
@@ -40,10 +33,46 @@ Column columnOf(const Frame& frame) {
   return {frame.panel.x0 + em, frame.panel.x1 - em, frame.panel.y0 + em, frame.panel.y1 - 0.5 * em};
 }
 
-// Writes the first title that fits and moves the column's top below it.
+// Adds the first title that fits and moves the column's top below it.
 void addTitle(Overlay& overlay, Column& column, std::span<const std::string> titles, double size) {
   addText(overlay, fittingTitle(titles, size, column.width()), size, column.left, column.top + capHeight(size), kInk);
   column.top += 1.7 * size;
+}
+
+// A vertical colour bar in the panel.
+struct Bar {
+  double left, right, top, bottom;
+  double labelsLeft, labelsRight;  // extent of the numbers beside the bar
+  double labelSize;
+  double height() const { return bottom - top; }
+};
+
+// Adds a titled bar whose colour is colorAt(t), with t = 0 at the top and 1 at the bottom.
+template <typename ColorAt>
+Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, double above, double below,
+           const ColorAt& colorAt) {
+  const double em = frame.textSize;
+  Column column = columnOf(frame);
+  addTitle(overlay, column, titles, em);
+  Bar bar{.left = std::round(column.left),
+          .right = 0,
+          .top = std::round(column.top + above),
+          .bottom = std::round(column.bottom - below),
+          .labelsLeft = 0,
+          .labelsRight = column.right,
+          .labelSize = std::min(em, 0.9 * em + 1)};
+  bar.right = bar.left + std::round(1.7 * em);
+  bar.labelsLeft = bar.right + 0.6 * em;
+  for (double y = bar.top; y < bar.bottom; ++y)
+    overlay.boxes.push_back({bar.left, y, bar.right, y + 1, encodeSrgb(colorAt((y + 0.5 - bar.top) / bar.height()))});
+  return bar;
+}
+
+// Adds a number beside the bar if it fits; a part of a number would mislead.
+bool addBarLabel(Overlay& overlay, const Bar& bar, const std::string& label, double y) {
+  const bool fits = bar.labelsLeft + advanceOf(label, bar.labelSize) <= bar.labelsRight;
+  if (fits) addText(overlay, label, bar.labelSize, bar.labelsLeft, y + capHeight(bar.labelSize) / 2, kInk);
+  return fits;
 }
 
 struct LevelRow {
@@ -57,12 +86,12 @@ void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width,
   overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
 }
 
-// Number in the swatch, share beside it and, in a roomy picture, as a bar.
+// Adds a swatch that contains the level's number, the share as text and, in a roomy picture, as a bar.
 void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double largestShare,
                 bool roomy, const LinearColor& color) {
   const double left = std::round(column.left);
   const double swatch = std::round(2.1 * size);
-  addSwatch(overlay, row, left, swatch, std::max(1.0, std::round(0.16 * row.height)), colorOf(color));
+  addSwatch(overlay, row, left, swatch, std::max(1.0, std::round(0.16 * row.height)), encodeSrgb(color));
   LevelRow box = row;
   box.height -= std::max(1.0, std::round(0.16 * row.height));
   const std::string number = std::to_string(row.level);
@@ -79,13 +108,13 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
                            middle + half, kShareBar});
 }
 
-// Rows too low for text: the swatches touch, and every so many of them is numbered beside.
+// Adds rows that are too low for text in each of them. The swatches touch, and only some have their number beside them.
 void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
   const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
   const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
   double lastTop = -1e9;
   for (const LevelRow& row : rows) {
-    addSwatch(overlay, row, left, swatch, 0, colorOf(map(row.level)));
+    addSwatch(overlay, row, left, swatch, 0, encodeSrgb(map(row.level)));
     const double baseline = std::round(row.baseline(size));
     if (baseline - capHeight(size) < lastTop + 1.5 * size || baseline > column.bottom) continue;
     if (baseline - capHeight(size) < column.top) continue;
@@ -94,7 +123,7 @@ void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<Lev
   }
 }
 
-// Of a positive number, as one types it: 1.5e-7, not 1.500e-07.
+// Formats a positive number without padding: 1.5e-7, not 1.500e-07.
 std::string formatScientific(double value, int digits) {
   char text[64];
   std::snprintf(text, sizeof text, "%.*e", digits - 1, value);
@@ -106,7 +135,7 @@ std::string formatScientific(double value, int digits) {
   return mantissa + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
 }
 
-// Rounded to this many digits, or to a whole number where that has more; no zeros behind the last digit that counts.
+// Rounds a positive number to this many digits, or to a whole number if that has more, without trailing zeros.
 std::string formatPlain(double value, int digits) {
   const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
   char text[64];
@@ -120,7 +149,7 @@ std::string formatPlain(double value, int digits) {
 
 int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
 
-// Values at multiples of a step, all with the same number of decimals, or with an exponent where that is shorter.
+// Formats a multiple of a step: all multiples have the same number of decimals, or an exponent where that is shorter.
 std::string formatTick(double value, double step) {
   if (value == 0) return "0";
   const std::string sign = value < 0 ? "−" : "+";
@@ -130,7 +159,7 @@ std::string formatTick(double value, double step) {
   return sign + text;
 }
 
-// From (x, y) to the right or upwards, with a head.
+// Adds an arrow from (x, y) to the right or upwards.
 void addArrow(Overlay& overlay, double x, double y, double length, double thin, bool upwards) {
   const auto box = [&](double from, double to, double half) {
     const double middle = 0.5 * thin;
@@ -161,6 +190,10 @@ void blendBox(Image& image, const BoxItem& box) {
 
 Color inkOn(const LinearColor& ground) {
   return toOklab(ground).lightness > 0.64 ? Color{20, 20, 30} : Color{255, 255, 255};
+}
+
+void addText(Overlay& overlay, std::string text, double size, double x, double baseline, Color color) {
+  if (!text.empty()) overlay.texts.push_back({std::move(text), size, x, baseline, color});
 }
 
 std::string fittingTitle(std::span<const std::string> titles, double size, double width) {
@@ -212,67 +245,42 @@ void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::s
 
 void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale) {
   if (frame.panel.empty()) return;
-  const double em = frame.textSize;
-  Column column = columnOf(frame);
+  const double em = frame.textSize, thin = std::max(1.0, em / 15);
   static const std::string titles[] = {"signed distance", "distance"};
-  addTitle(overlay, column, titles, em);
+  const Bar bar =
+      addBar(overlay, frame, titles, 0.3 * em, 0.6 * em, [](double t) { return divergingColor(1 - 2 * t); });
 
-  const double left = std::round(column.left), right = left + std::round(1.7 * em);
-  const double top = std::round(column.top + 0.3 * em), bottom = std::round(column.bottom - 0.6 * em);
-  const auto rowOf = [&](double value) { return top + (bottom - top) * (0.5 - 0.5 * value / scale.range); };
-  for (double y = top; y < bottom; ++y) {
-    const double value = 1 - 2 * (y + 0.5 - top) / (bottom - top);
-    overlay.boxes.push_back({left, y, right, y + 1, colorOf(divergingColor(value))});
-  }
-
-  // As many numbers as stand well apart: at every 1st, 2nd, 5th, 10th … line, zero always among them.
-  const double perLine = (bottom - top) * scale.step / (2 * scale.range);
-  const double size = std::min(em, 0.9 * em + 1);
-  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // about 1e7 at most
+  // Choose the lines with numbers: zero and every 1st, 2nd, 5th, 10th … line from it, so that the numbers have room.
+  const double perLine = bar.height() * scale.step / (2 * scale.range);
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // on either side, about 1e7 at most
   int every = 1;
-  for (int decade = 1; every * perLine < 1.7 * size && every <= lines; decade *= 10)
+  for (int decade = 1; every * perLine < 1.7 * bar.labelSize && every <= lines; decade *= 10)
     for (const int digit : {2, 5, 10})
-      if (every * perLine < 1.7 * size) every = digit * decade;
-  const double thin = std::max(1.0, em / 15);
-  // Lines of a close look, which would cover the colours: only those with numbers.
+      if (every * perLine < 1.7 * bar.labelSize) every = digit * decade;
+
+  // Leave out the lines without numbers where they are so dense that they would cover the colours.
   const int next = perLine < 2 * thin ? every : 1;
   for (int line = -(lines / next) * next; line <= lines; line += next) {
-    const double y = rowOf(line * scale.step), half = line == 0 ? 1.2 * thin : 0.5 * thin;
+    const double y = bar.top + bar.height() * (0.5 - 0.5 * (line * scale.step) / scale.range);
+    const double half = line == 0 ? 1.2 * thin : 0.5 * thin;
     const bool labelled = line % every == 0;
-    overlay.boxes.push_back({left, y - half, right + (labelled ? 0.35 * em : 0), y + half, kTick});
-    if (!labelled) continue;
-    // No number rather than part of one.
-    const std::string label = formatTick(line * scale.step, scale.step);
-    const double x = right + 0.6 * em;
-    if (x + advanceOf(label, size) <= column.right) addText(overlay, label, size, x, y + capHeight(size) / 2, kInk);
+    overlay.boxes.push_back({bar.left, y - half, bar.right + (labelled ? 0.35 * em : 0), y + half, kTick});
+    if (labelled) addBarLabel(overlay, bar, formatTick(line * scale.step, scale.step), y);
   }
 }
 
 void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, const ColorScale& scale) {
   if (frame.panel.empty()) return;
-  const double em = frame.textSize;
-  Column column = columnOf(frame);
-  addTitle(overlay, column, titles, em);
+  const double em = frame.textSize, thin = std::max(1.0, em / 15);
+  const Bar bar = addBar(overlay, frame, titles, 0.5 * em, 0.8 * em, [](double t) { return orderedColor(1 - t); });
 
-  const double left = std::round(column.left), right = left + std::round(1.7 * em);
-  const double top = std::round(column.top + 0.5 * em), bottom = std::round(column.bottom - 0.8 * em);
-  for (double y = top; y < bottom; ++y) {
-    const double place = 1 - (y + 0.5 - top) / (bottom - top);
-    overlay.boxes.push_back({left, y, right, y + 1, colorOf(orderedColor(place))});
-  }
-
-  const double size = std::min(em, 0.9 * em + 1), thin = std::max(1.0, em / 15);
-  double lastLabel = std::numeric_limits<double>::infinity();  // its baseline; going upwards
+  double lastLabel = std::numeric_limits<double>::infinity();  // height of the last number; the marks ascend
   const auto mark = [&](double value, bool labelled) {
-    const double y = bottom - (bottom - top) * scale.place(value);
-    labelled = labelled && y + 1.6 * size <= lastLabel;
-    overlay.boxes.push_back({labelled ? left : right - 0.4 * em, y - 0.5 * thin, right + (labelled ? 0.35 * em : 0),
-                             y + 0.5 * thin, kTick});
-    const std::string label = value == 0 ? "0" : formatNumber(value, 3);
-    const double x = right + 0.6 * em;
-    if (!labelled || x + advanceOf(label, size) > column.right) return;
-    addText(overlay, label, size, x, y + capHeight(size) / 2, kInk);
-    lastLabel = y;
+    const double y = bar.bottom - bar.height() * scale.fraction(value);
+    labelled = labelled && y + 1.6 * bar.labelSize <= lastLabel;
+    overlay.boxes.push_back({labelled ? bar.left : bar.right - 0.4 * em, y - 0.5 * thin,
+                             bar.right + (labelled ? 0.35 * em : 0), y + 0.5 * thin, kTick});
+    if (labelled && addBarLabel(overlay, bar, value == 0 ? "0" : formatNumber(value, 3), y)) lastLabel = y;
   };
   for (const double value : scaleMarks(scale)) mark(value, true);
   if (!scale.logarithmic()) return;
@@ -284,26 +292,27 @@ void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::stri
 void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, char right, char up) {
   const double em = frame.textSize, size = std::max(kSmallestText, 0.85 * em), thin = std::max(1.0, em / 15);
   const double length = std::round(1.8 * em), gap = std::round(0.5 * em);
-  // from the tips of the arrows the letters reach as far again as they are large
-  const double reach = length + std::round(1.1 * size);
-  if (section.width() < 3 * reach || section.height() < 3 * reach) return;
+  const double extent = length + std::round(1.1 * size);  // length of an arrow with its letter
+  if (section.width() < 3 * extent || section.height() < 3 * extent) return;
 
-  double x = section.x0, y = section.y1;  // where the arrows start
-  if (section.x0 - frame.view.x0 >= reach + 2 * gap) {
-    x = section.x0 - gap - reach;
+  // Choose the origin of the arrows: to the left of the section, below it, or within it on a plate.
+  double x = section.x0, y = section.y1;
+  if (section.x0 - frame.view.x0 >= extent + 2 * gap) {
+    x = section.x0 - gap - extent;
     y = std::min<double>(section.y1, frame.view.y1 - gap);
-  } else if (frame.view.y1 - section.y1 >= reach + 2 * gap) {
-    x = std::max<double>(x, frame.view.x0 + gap);  // the letter above the arrow reaches to its left
-    y = section.y1 + gap + reach;
+  } else if (frame.view.y1 - section.y1 >= extent + 2 * gap) {
+    x = std::max<double>(x, frame.view.x0 + gap);  // the letter above the arrow extends to its left
+    y = section.y1 + gap + extent;
   } else {
     x += gap;
     y -= gap;
-    overlay.boxes.push_back({x - 0.5 * gap, y - reach - 0.5 * gap, x + reach + 0.5 * gap, y + 0.5 * gap, paperColor()});
+    overlay.boxes.push_back(
+        {x - 0.5 * gap, y - extent - 0.5 * gap, x + extent + 0.5 * gap, y + 0.5 * gap, paperColor()});
   }
   addArrow(overlay, x, y - thin, length, thin, false);
   addArrow(overlay, x, y, length, thin, true);
   const std::string across(1, right), upward(1, up);
-  // small letters, about half an em high: each in line with its arrow
+  // Lower-case letters are about half an em high; each is centred on its arrow's axis.
   addText(overlay, across, size, x + length + 0.3 * size, y - 0.5 * thin + 0.27 * size, kSoftInk);
   addText(overlay, upward, size, x + 0.5 * (thin - advanceOf(upward, size)), y - length - 0.45 * size, kSoftInk);
 }

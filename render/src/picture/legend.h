@@ -1,9 +1,9 @@
 #pragma once
-// What stands around a view: legend or colour bar to its right, caption below. Laid out first, as rectangles and texts,
-// so that tests can see that nothing is clipped and nothing overlaps; then painted.
+// The frame around a view: a panel with legend or colour bar to its right, a caption below. It is laid out as
+// rectangles and texts before it is painted, so that tests can check that nothing is clipped and nothing overlaps.
 
+#include <algorithm>
 #include <map>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,21 +18,25 @@ constexpr Color kInk = {32, 34, 44};
 constexpr Color kSoftInk = {98, 102, 116};
 constexpr Color kRule = {222, 223, 228};
 constexpr Color kTick = {60, 64, 78};
-constexpr double kSmallestText = 8;  ///< pixels an em: below, digits of DejaVu Sans run together
+constexpr double kSmallestText = 8;  ///< em in pixels; digits of DejaVu Sans run together in smaller text
 
-/// Dark or light, whichever reads better on it.
+/// The ink, dark or light, that is more legible on this ground.
 Color inkOn(const LinearColor& ground);
 
-/// Where the parts of a picture stand; depends on its size alone.
+/// The layout of a picture, in pixels.
 struct Frame {
   int width = 0, height = 0;
-  double textSize = 0;  ///< pixels an em
-  bool roomy = false;   ///< room for the shares as bars and for subtitles
+  double textSize = 0;  ///< em in pixels
+  bool roomy = false;   ///< the panel has room for bars of shares and for subtitles
   PixelRect view;
   PixelRect panel;    ///< empty where the picture is too small for a legend
-  PixelRect caption;  ///< empty where it is too small for a caption
+  PixelRect caption;  ///< empty where the picture is too small for a caption
+
+  /// Width of thin lines, pixels.
+  double lineWidth() const { return std::max(0.7, textSize / 15); }
 };
 
+/// The layout of a picture of this size.
 Frame frame(int width, int height);
 
 struct BoxItem {
@@ -46,52 +50,55 @@ struct TextItem {
   Color color;
 };
 
-/// Painted in this order.
+/// Everything that is drawn over the coloured view; the texts are painted over the boxes.
 struct Overlay {
   std::vector<BoxItem> boxes;
   std::vector<TextItem> texts;
 };
 
-/// The first title that fits into a width, or as much as fits of the last.
+/// Adds a text that is not empty, with the left end of its baseline at (x, baseline).
+void addText(Overlay& overlay, std::string text, double size, double x, double baseline, Color color);
+
+/// The first title that is at most `width` pixels wide, or the beginning of the last.
 std::string fittingTitle(std::span<const std::string> titles, double size, double width);
 
-/// One swatch a level, the highest on top, with the level's number and its share of the volume. The first of `titles`
-/// that fits is taken.
+/// Adds a swatch for each level, the highest on top, with the level's number and its share of the volume. Here and
+/// below the first of `titles` that fits is the panel's title.
 void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
                     const std::map<int, double>& shares, const LevelMap& map);
 
-/// A vertical colour bar with the iso-lines of the picture and their values.
+/// Adds a vertical colour bar with the iso-lines of the picture and their values.
 void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale);
 
-/// A vertical colour bar of a quantity's scale, its high end on top, with marks at powers of ten or at even steps.
+/// Adds a vertical colour bar of a quantity's scale, its high end on top, with marks at powers of ten or at even steps.
 void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, const ColorScale& scale);
 
-/// Which axes lie to the right and upwards: a pair of arrows left of the lower left corner of the slice's section with
-/// the domain, or below it, where the view is free there, else on a plate in that corner. Nothing where the section is
-/// too small for it.
+/// Adds a pair of arrows that names the axes to the right and upwards. It lies to the left of the section's lower left
+/// corner or below it if the view is empty there, else on a plate in that corner. A section that is too small gets
+/// none.
 void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, char right, char up);
 
-/// Names and values, as many as fit.
+/// Adds as many of the facts (name and value) as fit.
 void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
               std::span<const std::pair<std::string, std::string>> facts);
 
-/// A colour, what it stands for and how often it is there, which may be left out.
+/// A colour with its meaning and a count, which may be empty.
 struct Swatch {
-  std::vector<std::string> names;  ///< the first that fits is taken
+  std::vector<std::string> names;  ///< the longest first; the panel shows the first that fits
   std::string count;
   Color color;
 };
 
-/// A row each, as many as fit.
+/// Adds a row for each swatch, as many as fit.
 void addSwatches(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
                  std::span<const Swatch> swatches);
 
-/// The name, then those details that fit, the most important ones first.
+/// Adds the caption: the name, then those details that fit, the most important first.
 void addCaption(Overlay& overlay, const Frame& frame, const std::string& name, std::span<const std::string> details);
 
 void paint(Image& image, const Overlay& overlay);
 
-/// "−0.25", "15200", "1.5e-7": a true minus sign; plain up to 6 digits before the point, the exponent as one types it.
+/// "−0.25", "15200", "1.5e-7": with the sign U+2212, without an exponent up to 6 digits before the point.
 std::string formatNumber(double value, int digits = 4);
 /// "54,935".
 std::string formatCount(std::size_t count);

@@ -8,34 +8,35 @@
 #include <string>
 #include <utility>
 
-#include "picture/color_view.h"
+#include "coloring/color_view.h"
 #include "picture/describe.h"
 
 namespace hpsdf::render {
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;  // distance along the line, value
+/// Points of a curve: distance along the line, value.
+using Points = std::vector<Eigen::Vector2d>;
 
-// Apart in lightness too: for eyes that do not tell the hues apart, and for print.
+// The colours of curves differ in lightness too, for colour-blind readers and for print.
 constexpr Color kBlue = {0, 68, 136};
 constexpr Color kAmber = {236, 160, 30};
 constexpr Color kRed = {187, 58, 82};
 constexpr Color kOutside = {238, 238, 240};
 constexpr Color kBorder = {176, 179, 190};
 
-// Of a curve or of many short ones, in the style of one row of a legend.
+// One row of a chart's legend with its curve, or with many short curves.
 struct Series {
-  std::vector<std::string> names;  // of which the first that fits is taken
+  std::vector<std::string> names;  // the longest first; the legend shows the first that fits
   Color color;
-  bool broad = false;  // under another curve, and seen beside it where the two agree
+  bool broad = false;  // drawn as a broad band, which stays visible under another curve of equal values
   std::vector<Points> curves;
 };
 
 struct Chart {
   std::vector<std::string> titles;
-  double weight;  // of its height
+  double weight;  // height relative to the other charts
   std::vector<Series> series;
-  bool holdsZero = false;
+  bool containsZero = false;
 };
 
 struct Scale {
@@ -95,7 +96,7 @@ std::vector<Chart> chartsOf(const Line& line, std::span<const double> exact) {
 
 Scale scaleOf(const Chart& chart, double lines) {
   constexpr double kMargin = 0.06, kFlat = 1e-6;
-  double low = chart.holdsZero ? 0 : std::numeric_limits<double>::infinity(), high = -low;
+  double low = chart.containsZero ? 0 : std::numeric_limits<double>::infinity(), high = -low;
   for (const Series& series : chart.series)
     for (const Points& points : series.curves)
       for (const Eigen::Vector2d& point : points) {
@@ -106,7 +107,8 @@ Scale scaleOf(const Chart& chart, double lines) {
   if (!(low <= high)) low = high = 0;
   const double size = std::max(std::abs(low), std::abs(high));
   double margin = kMargin * (high - low);
-  if (!(high - low > kFlat * size)) margin = size > 0 ? 0.05 * size : 1;  // one value: rounding is no curve
+  // A constant up to rounding gets a wide margin, so that rounding errors do not look like a curve.
+  if (!(high - low > kFlat * size)) margin = size > 0 ? 0.05 * size : 1;
   low -= margin;
   high += margin;
   return {low, high, niceStep(high - low, std::max(2.0, lines))};
@@ -120,41 +122,39 @@ std::vector<double> ticksOf(const Scale& scale) {
   return ticks;
 }
 
-// As many digits as tell neighbours apart.
+// Formats a tick's value with as many digits as neighbouring ticks need to differ.
 std::string tickText(double value, double step) {
   if (std::abs(value) < 1e-9 * step) return "0";
   const int digits = int(std::floor(std::log10(std::abs(value)) + 1e-9) - std::floor(std::log10(step) + 1e-9)) + 1;
   return formatNumber(value, std::clamp(digits, 1, 15));
 }
 
-double advanceOf(const std::string& text, double size) { return measureText(text, size).advance; }
-
-// Where the charts and the bands stand.
-struct Places {
-  double em, small, thin;
-  bool labelled;
-  int left, right;
+// The rectangles of charts and bands, in pixels.
+struct Grid {
+  double em, small, thin;  // sizes of text and small text, width of thin lines
+  bool labelled;           // true if the picture has room for numbers
+  int left, right;         // extent of the line
   std::vector<PixelRect> charts;
   std::vector<PixelRect> bands;
-  int bottom;  // of all of them
+  int bottom;  // lower end of the last chart or band
 };
 
-class LineArtist {
+class Plotter {
  public:
-  LineArtist(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact)
+  Plotter(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact)
       : frame_(frame), field_(field), line_(line), charts_(chartsOf(line, exact)) {}
 
   LineLayout draw() {
-    place();
+    layOutGrid();
     shadeOutside();
-    for (std::size_t n = 0; n < at_.charts.size(); ++n) drawGround(at_.charts[n], scales_[n]);
+    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawGround(grid_.charts[n], scales_[n]);
     drawBands();
     drawBorders();
-    for (std::size_t n = 0; n < at_.charts.size(); ++n) drawCurves(at_.charts[n], charts_[n], scales_[n]);
-    if (at_.labelled) drawAbscissa();
-    for (std::size_t n = 0; n < at_.charts.size(); ++n) drawLegend(at_.charts[n], charts_[n]);
+    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawCurves(grid_.charts[n], charts_[n], scales_[n]);
+    if (grid_.labelled) drawAbscissa();
+    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawLegend(grid_.charts[n], charts_[n]);
     drawCaption();
-    layout_.charts = at_.charts;
+    layout_.charts = grid_.charts;
     return std::move(layout_);
   }
 
@@ -163,42 +163,43 @@ class LineArtist {
     layout_.overlay.boxes.push_back({x0, y0, x1, y1, color});
   }
   void text(std::string text, double size, double x, double baseline, Color color) {
-    if (!text.empty()) layout_.overlay.texts.push_back({std::move(text), size, x, baseline, color});
+    addText(layout_.overlay, std::move(text), size, x, baseline, color);
   }
 
-  double xOf(double t) const { return at_.left + t * (at_.right - at_.left); }
+  double xOf(double t) const { return grid_.left + t * (grid_.right - grid_.left); }
 
-  void place() {
+  void layOutGrid() {
     const double em = frame_.textSize;
-    at_ = {.em = em,
-           .small = std::max(kSmallestText, 0.85 * em),
-           .thin = std::max(1.0, em / 15),
-           .labelled = !frame_.caption.empty(),
-           .left = 0,
-           .right = frame_.view.x1,
-           .charts = {},
-           .bands = {},
-           .bottom = 0};
+    grid_ = {.em = em,
+             .small = std::max(kSmallestText, 0.85 * em),
+             .thin = std::max(1.0, em / 15),
+             .labelled = !frame_.caption.empty(),
+             .left = 0,
+             .right = frame_.view.x1,
+             .charts = {},
+             .bands = {},
+             .bottom = 0};
     const PixelRect& view = frame_.view;
-    const int margin = at_.labelled ? int(std::lround(em)) : 1;
-    const int foot = at_.labelled ? int(std::lround(3.2 * em)) : margin;
-    placeRows(view.y0 + margin, view.y1 - foot);
-    for (std::size_t n = 0; n < at_.charts.size(); ++n)
-      scales_.push_back(scaleOf(charts_[n], at_.charts[n].height() / (2.4 * em)));
-    at_.left = view.x0 + margin;
-    if (at_.labelled) at_.left = view.x0 + int(std::ceil(widestLabel() + 1.2 * em));
-    // a legend follows, or the picture's edge, which the last number must not reach
-    at_.right = std::max(at_.left + 1, view.x1 - int(std::lround(frame_.panel.empty() ? 1.5 * margin : 0.5 * margin)));
-    for (auto* rows : {&at_.charts, &at_.bands})
-      for (PixelRect& row : *rows) row.x0 = at_.left, row.x1 = at_.right;
+    const int margin = grid_.labelled ? int(std::lround(em)) : 1;
+    const int foot = grid_.labelled ? int(std::lround(3.2 * em)) : margin;
+    layOutRows(view.y0 + margin, view.y1 - foot);
+    for (std::size_t n = 0; n < grid_.charts.size(); ++n)
+      scales_.push_back(scaleOf(charts_[n], grid_.charts[n].height() / (2.4 * em)));
+    grid_.left = view.x0 + margin;
+    if (grid_.labelled) grid_.left = view.x0 + int(std::ceil(widestLabel() + 1.2 * em));
+    // Leave room for the last number where the picture's edge follows instead of a legend.
+    grid_.right =
+        std::max(grid_.left + 1, view.x1 - int(std::lround(frame_.panel.empty() ? 1.5 * margin : 0.5 * margin)));
+    for (auto* rows : {&grid_.charts, &grid_.bands})
+      for (PixelRect& row : *rows) row.x0 = grid_.left, row.x1 = grid_.right;
   }
 
-  // Charts that would be too low to read are left out, and the bands before them.
-  void placeRows(int top, int bottom) {
-    const double em = at_.em;
+  // Stacks charts and bands. If the charts would be too low to read, the bands are left out, then the last charts.
+  void layOutRows(int top, int bottom) {
+    const double em = grid_.em;
     const int gap = std::max(1, int(std::lround(0.9 * em))), bandGap = std::max(1, int(std::lround(0.35 * em)));
     const int band = int(std::lround(1.5 * em)), least = int(std::lround(2.6 * em));
-    int bands = at_.labelled ? 2 * band + bandGap + gap : 0;
+    int bands = grid_.labelled ? 2 * band + bandGap + gap : 0;
     const auto available = [&] { return bottom - top - bands - gap * int(charts_.size() - 1); };
     if (available() < least * int(charts_.size())) bands = 0;
     while (charts_.size() > 1 && available() < least * int(charts_.size())) charts_.pop_back();
@@ -208,68 +209,69 @@ class LineArtist {
     const int height = std::max(available(), 1);
     int y = top;
     for (const Chart& chart : charts_) {
-      const int own = std::max(1, int(std::floor(height * chart.weight / weights)));
-      at_.charts.push_back({0, y, 0, y + own});
-      y += own + gap;
+      const int ownHeight = std::max(1, int(std::floor(height * chart.weight / weights)));
+      grid_.charts.push_back({0, y, 0, y + ownHeight});
+      y += ownHeight + gap;
     }
     if (bands > 0)
-      for (int n = 0; n < 2; ++n, y += band + bandGap) at_.bands.push_back({0, y, 0, y + band});
-    at_.bottom = at_.bands.empty() ? at_.charts.back().y1 : at_.bands.back().y1;
+      for (int n = 0; n < 2; ++n, y += band + bandGap) grid_.bands.push_back({0, y, 0, y + band});
+    grid_.bottom = grid_.bands.empty() ? grid_.charts.back().y1 : grid_.bands.back().y1;
   }
 
   double widestLabel() const {
-    double widest = at_.bands.empty() ? 0 : advanceOf("degree", at_.small);
+    double widest = grid_.bands.empty() ? 0 : advanceOf("degree", grid_.small);
     for (const Scale& scale : scales_)
       for (const double tick : ticksOf(scale))
-        widest = std::max(widest, advanceOf(tickText(tick, scale.step), at_.small));
+        widest = std::max(widest, advanceOf(tickText(tick, scale.step), grid_.small));
     return widest;
   }
 
   void shadeOutside() {
     for (const Piece& piece : line_.pieces)
-      if (!piece.cell) box(xOf(piece.tEnter), at_.charts.front().y0, xOf(piece.tLeave), at_.bottom, kOutside);
+      if (!piece.cell) box(xOf(piece.tEnter), grid_.charts.front().y0, xOf(piece.tLeave), grid_.bottom, kOutside);
   }
 
   static double yOf(const PixelRect& chart, const Scale& scale, double value) {
     return chart.y1 - (value - scale.low) / (scale.high - scale.low) * chart.height();
   }
 
-  // Level lines with their values, a darker one at zero, and the two axes.
+  // Draws grid lines with their values, a darker one at zero, and the two axes.
   void drawGround(const PixelRect& chart, const Scale& scale) {
-    const double thin = at_.thin;
-    double lastLabel = std::numeric_limits<double>::infinity();  // its baseline; going upwards
+    const double thin = grid_.thin;
+    double lastLabel = std::numeric_limits<double>::infinity();  // baseline of the last number; the ticks ascend
     for (const double tick : ticksOf(scale)) {
       const double y = yOf(chart, scale, tick);
       const std::string label = tickText(tick, scale.step);
-      box(at_.left, y - 0.5 * thin, at_.right, y + 0.5 * thin, label == "0" ? kSoftInk : kRule);
-      const double baseline = y + capHeight(at_.small) / 2;
-      if (!at_.labelled || baseline + 1.3 * at_.small > lastLabel) continue;
-      text(label, at_.small, at_.left - 0.5 * at_.em - advanceOf(label, at_.small), baseline, kInk);
+      box(grid_.left, y - 0.5 * thin, grid_.right, y + 0.5 * thin, label == "0" ? kSoftInk : kRule);
+      const double baseline = y + capHeight(grid_.small) / 2;
+      if (!grid_.labelled || baseline + 1.3 * grid_.small > lastLabel) continue;
+      text(label, grid_.small, grid_.left - 0.5 * grid_.em - advanceOf(label, grid_.small), baseline, kInk);
       lastLabel = baseline;
     }
-    box(at_.left - thin, chart.y0, at_.left, chart.y1, kTick);
-    box(at_.left - thin, chart.y1, at_.right, chart.y1 + thin, kTick);
+    box(grid_.left - thin, chart.y0, grid_.left, chart.y1, kTick);
+    box(grid_.left - thin, chart.y1, grid_.right, chart.y1 + thin, kTick);
   }
 
-  // Fainter where they stand close, so that the curves stay in sight.
+  // Draws the borders of cells, thinner where they are dense, so that they do not hide the curves.
   void drawBorders() {
     for (std::size_t n = 1; n < line_.pieces.size(); ++n) {
       const double x = xOf(line_.pieces[n].tEnter);
       const double room = xOf(line_.pieces[n].tLeave) - xOf(line_.pieces[n - 1].tEnter);
-      const double half = 0.5 * std::clamp(0.04 * room, 0.2 * at_.thin, at_.thin);
-      box(x - half, at_.charts.front().y0, x + half, at_.bottom, kBorder);
+      const double half = 0.5 * std::clamp(0.04 * room, 0.2 * grid_.thin, grid_.thin);
+      box(x - half, grid_.charts.front().y0, x + half, grid_.bottom, kBorder);
     }
   }
 
   void drawBands() {
-    if (at_.bands.empty()) return;
+    if (grid_.bands.empty()) return;
     const FieldStatistics figures = statistics(field_);
-    drawBand(at_.bands[0], "degree", figures.degreeVolume, [](const Cell& cell) { return cell.degree; });
-    drawBand(at_.bands[1], "depth", figures.depthVolume, [](const Cell& cell) { return cell.depth; });
-    nameOutside(at_.bands[0]);
+    drawBand(grid_.bands[0], "degree", figures.degreeVolume, [](const Cell& cell) { return cell.degree; });
+    drawBand(grid_.bands[1], "depth", figures.depthVolume, [](const Cell& cell) { return cell.depth; });
+    nameOutside(grid_.bands[0]);
   }
 
-  // Colours are those of the whole field's levels, as in slices; the legend shows the levels on the line.
+  // Draws a band of degrees or depths. The colours depend on all levels of the field, as in slices; the legend contains
+  // only the levels on the line.
   void drawBand(const PixelRect& band, const std::string& name, const std::map<int, double>& ofField,
                 const auto& levelOf) {
     std::vector<int> levels;
@@ -283,41 +285,43 @@ class LineArtist {
       swatch({xOf(piece.tEnter), double(band.y0), xOf(piece.tLeave), double(band.y1), encodeSrgb(map(level))}, level,
              map);
     }
-    text(name, at_.small, at_.left - 0.5 * at_.em - advanceOf(name, at_.small), baselineIn(band, at_.small), kInk);
+    text(name, grid_.small, grid_.left - 0.5 * grid_.em - advanceOf(name, grid_.small), baselineIn(band, grid_.small),
+         kInk);
     if (frame_.panel.empty()) return;
-    const double left = frame_.panel.x0 + at_.em, width = (frame_.panel.x1 - at_.em - left) / double(seen.size());
-    const double own = std::min(width, 1.8 * at_.em);
+    const double left = frame_.panel.x0 + grid_.em, width = (frame_.panel.x1 - grid_.em - left) / double(seen.size());
+    const double swatchWidth = std::min(width, 1.8 * grid_.em);
     int n = 0;
     for (const int level : seen) {
-      swatch({left + n * own, double(band.y0), left + (n + 1) * own, double(band.y1), encodeSrgb(map(level))}, level,
-             map);
+      swatch({left + n * swatchWidth, double(band.y0), left + (n + 1) * swatchWidth, double(band.y1),
+              encodeSrgb(map(level))},
+             level, map);
       ++n;
     }
   }
 
   void nameOutside(const PixelRect& row) {
     const std::string name = "outside";
-    const double advance = advanceOf(name, at_.small);
+    const double advance = advanceOf(name, grid_.small);
     for (const Piece& piece : line_.pieces) {
       const double left = xOf(piece.tEnter), right = xOf(piece.tLeave);
-      if (piece.cell || advance + 0.4 * at_.em > right - left) continue;
-      text(name, at_.small, (left + right - advance) / 2, baselineIn(row, at_.small), kSoftInk);
+      if (piece.cell || advance + 0.4 * grid_.em > right - left) continue;
+      text(name, grid_.small, (left + right - advance) / 2, baselineIn(row, grid_.small), kSoftInk);
     }
   }
 
-  // A box of a level's colour with its number, where that fits.
+  // Draws a box in a level's colour, with the level's number if it fits.
   void swatch(const BoxItem& item, int level, const LevelMap& map) {
     layout_.overlay.boxes.push_back(item);
     const std::string number = std::to_string(level);
-    const double advance = advanceOf(number, at_.small);
-    if (advance + 0.4 * at_.em > item.x1 - item.x0) return;
-    text(number, at_.small, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(at_.small)) / 2,
+    const double advance = advanceOf(number, grid_.small);
+    if (advance + 0.4 * grid_.em > item.x1 - item.x0) return;
+    text(number, grid_.small, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(grid_.small)) / 2,
          inkOn(map(level)));
   }
 
   static double baselineIn(const PixelRect& row, double size) { return (row.y0 + row.y1 + capHeight(size)) / 2; }
 
-  double widthOf(const Series& series) const { return (series.broad ? 4.8 : 1.8) * std::max(0.8, at_.em / 15); }
+  double widthOf(const Series& series) const { return (series.broad ? 4.8 : 1.8) * std::max(0.8, grid_.em / 15); }
 
   void drawCurves(const PixelRect& chart, const Chart& content, const Scale& scale) {
     const double length = line_.length();
@@ -330,16 +334,16 @@ class LineArtist {
       }
   }
 
-  // Distances along the line, and what they are.
+  // Draws the axis of distances along the line with its title.
   void drawAbscissa() {
-    const double length = line_.length(), em = at_.em, small = at_.small;
-    const Scale scale{0, length, niceStep(length, std::max(2.0, (at_.right - at_.left) / (6 * em)))};
-    const double baseline = at_.bottom + 0.6 * em + capHeight(small);
+    const double length = line_.length(), em = grid_.em, small = grid_.small;
+    const Scale scale{0, length, niceStep(length, std::max(2.0, (grid_.right - grid_.left) / (6 * em)))};
+    const double baseline = grid_.bottom + 0.6 * em + capHeight(small);
     const double end = frame_.panel.empty() ? frame_.view.x1 - 2 : frame_.panel.x0 + 0.6 * em;
     double lastRight = -std::numeric_limits<double>::infinity();
     for (const double tick : ticksOf(scale)) {
       const double x = xOf(tick / length);
-      box(x - 0.5 * at_.thin, at_.bottom, x + 0.5 * at_.thin, at_.bottom + 0.35 * em, kTick);
+      box(x - 0.5 * grid_.thin, grid_.bottom, x + 0.5 * grid_.thin, grid_.bottom + 0.35 * em, kTick);
       const std::string label = tickText(tick, scale.step);
       const double left = x - advanceOf(label, small) / 2, right = left + advanceOf(label, small);
       if (left < std::max(lastRight + 0.6 * em, 2.0) || right > end) continue;
@@ -348,23 +352,23 @@ class LineArtist {
     }
     static const std::string titles[] = {"distance along the line, in the field's units", "distance along the line",
                                          "along the line"};
-    const std::string title = fittingTitle(titles, small, at_.right - at_.left);
-    text(title, small, (at_.left + at_.right - advanceOf(title, small)) / 2, baseline + 1.35 * small, kSoftInk);
+    const std::string title = fittingTitle(titles, small, grid_.right - grid_.left);
+    text(title, small, (grid_.left + grid_.right - advanceOf(title, small)) / 2, baseline + 1.35 * small, kSoftInk);
   }
 
-  // Beside the chart: its title, then a stroke and a name for each curve.
+  // Draws the chart's title and, for each series, a stroke with its name.
   void drawLegend(const PixelRect& chart, const Chart& content) {
     if (frame_.panel.empty()) return;
-    const double em = at_.em, left = frame_.panel.x0 + em, right = frame_.panel.x1 - 0.5 * em;
+    const double em = grid_.em, left = frame_.panel.x0 + em, right = frame_.panel.x1 - 0.5 * em;
     double y = chart.y0;
     text(fittingTitle(content.titles, em, right - left), em, left, y + capHeight(em), kInk);
     y += 1.5 * em;
     for (const Series& series : content.series) {
-      if (y + em > chart.y1 + 0.7 * em) return;  // into the gap below, for want of room
+      if (y + em > chart.y1 + 0.7 * em) return;  // the last row may extend into the gap below
       const double stroke = 1.6 * em, middle = y + 0.5 * em, half = widthOf(series) / 2;
       box(left, middle - half, left + stroke, middle + half, series.color);
-      text(fittingTitle(series.names, at_.small, right - left - stroke - 0.5 * em), at_.small, left + stroke + 0.5 * em,
-           middle + capHeight(at_.small) / 2, kInk);
+      text(fittingTitle(series.names, grid_.small, right - left - stroke - 0.5 * em), grid_.small,
+           left + stroke + 0.5 * em, middle + capHeight(grid_.small) / 2, kInk);
       y += 1.3 * em;
     }
   }
@@ -375,7 +379,7 @@ class LineArtist {
     const std::vector<LineJump> jumps = jumpsAlong(line_);
     double greatest = 0;
     for (const LineJump& jump : jumps) greatest = std::max(greatest, std::abs(jump.value));
-    // as many as tell the two ends apart
+    // Choose as many digits as the two ends need to differ.
     const double size = std::max(line_.from.cwiseAbs().maxCoeff(), line_.to.cwiseAbs().maxCoeff());
     const int digits = int(std::clamp(std::ceil(std::log10(size / line_.length())) + 3, 4.0, 15.0));
     std::vector<std::string> details = {
@@ -391,14 +395,14 @@ class LineArtist {
   const Line& line_;
   std::vector<Chart> charts_;
   std::vector<Scale> scales_;
-  Places at_;
+  Grid grid_;
   LineLayout layout_;
 };
 
 }  // namespace
 
 LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact) {
-  return LineArtist(frame, field, line, exact).draw();
+  return Plotter(frame, field, line, exact).draw();
 }
 
 }  // namespace hpsdf::render

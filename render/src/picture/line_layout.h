@@ -1,5 +1,5 @@
 #pragma once
-// What a plot of a line consists of, laid out before it is painted, so that tests can look at it.
+// The parts of a line plot. They are laid out before they are painted, so that tests can check them.
 
 #include <Eigen/Core>
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace hpsdf::render {
 
-/// A bent line through points in pixels, cut off at the edges of a rectangle.
+/// A polyline through points in pixels, clipped to a rectangle.
 struct CurveItem {
   std::vector<Eigen::Vector2d> points;
   double width;
@@ -18,15 +18,17 @@ struct CurveItem {
   PixelRect within;
 };
 
-/// The curves are painted over the overlay.
+/// The parts of a plot; the curves are painted over the overlay.
 struct LineLayout {
   Overlay overlay;
-  std::vector<PixelRect> charts;  ///< from the top
+  std::vector<PixelRect> charts;  ///< from top to bottom
   std::vector<CurveItem> curves;
 };
 
+/// `exact` holds the exact distance at each sample of the line, or nothing.
 LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact);
 
+/// Blends an anti-aliased curve over the image.
 void paintCurve(Image& image, const CurveItem& curve);
 
 }  // namespace hpsdf::render

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hpsdf/render/picture.h"
-#include "picture/color_view.h"
+#include "coloring/color_view.h"
 #include "picture/line_layout.h"
 
 namespace hpsdf::render {
 namespace {
 
+/// Distance of x from the segment ab.
 double distanceToSegment(const Eigen::Vector2d& x, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector2d along = b - a;
   const double square = along.squaredNorm();
@@ -19,12 +19,12 @@ double distanceToSegment(const Eigen::Vector2d& x, const Eigen::Vector2d& a, con
 
 }  // namespace
 
-// Coverage is gathered before anything is blended, so that where a curve meets itself it is not darker.
+// The coverage by all segments is collected before blending, so that a curve is not darker where segments overlap.
 void paintCurve(Image& image, const CurveItem& curve) {
   const PixelRect& rect = curve.within;
   if (rect.empty()) return;
   std::vector<float> covered(std::size_t(rect.width()) * rect.height(), 0.0F);
-  const double half = curve.width / 2, reach = half + 1;
+  const double half = curve.width / 2, extent = half + 1;
   const auto pixel = [](double x, int low, int high) {
     return int(std::clamp(std::floor(x), double(low), double(high)));
   };
@@ -32,8 +32,9 @@ void paintCurve(Image& image, const CurveItem& curve) {
     const Eigen::Vector2d &a = curve.points[i - 1], &b = curve.points[i];
     if (!a.allFinite() || !b.allFinite()) continue;
     const Eigen::Vector2d low = a.cwiseMin(b), high = a.cwiseMax(b);
-    for (int y = pixel(low.y() - reach, rect.y0, rect.y1); y < pixel(high.y() + reach + 1, rect.y0, rect.y1); ++y)
-      for (int x = pixel(low.x() - reach, rect.x0, rect.x1); x < pixel(high.x() + reach + 1, rect.x0, rect.x1); ++x) {
+    const int x1 = pixel(high.x() + extent + 1, rect.x0, rect.x1), y1 = pixel(high.y() + extent + 1, rect.y0, rect.y1);
+    for (int y = pixel(low.y() - extent, rect.y0, rect.y1); y < y1; ++y)
+      for (int x = pixel(low.x() - extent, rect.x0, rect.x1); x < x1; ++x) {
         const double distance = distanceToSegment({x + 0.5, y + 0.5}, a, b);
         float& here = covered[std::size_t(y - rect.y0) * rect.width() + (x - rect.x0)];
         here = std::max(here, float(std::clamp(half + 0.5 - distance, 0.0, 1.0)));
@@ -47,7 +48,7 @@ void paintCurve(Image& image, const CurveItem& curve) {
 }
 
 Image drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height) {
-  viewSize(width, height);  // refuses a size out of range
+  checkPictureSize(width, height, 1);
   const LineLayout layout = layOutLine(frame(width, height), field, line, exact);
   Image image(width, height, paperColor());
   paint(image, layout.overlay);

@@ -8,35 +8,35 @@
 #include <utility>
 #include <vector>
 
+#include "coloring/color_view.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
-#include "picture/color_view.h"
 #include "picture/defect_marks.h"
 #include "picture/legend.h"
-#include "picture/picture_parts.h"
-#include "view/body_meshes.h"
+#include "scene/body_view.h"
 #include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace {
 
-constexpr double kFarthest = 1e15;  // for a camera's target, in about the mesh's size
-constexpr double kBorder = 0.04;    // left free around a whole mesh, of the view's width and height
+constexpr double kFarthest = 1e15;  // greatest coordinate of a camera's target, in a unit near the mesh's size
+constexpr double kBorder = 0.04;    // free border around a whole mesh, as a share of the view's width and height
 
-enum Look : std::uint32_t { front, back, crossing };
+/// The sides of faces, as indices of the picture's materials.
+enum Side : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
-constexpr Color kCrossing = {240, 146, 150};  // paler than the rings of where they meet
+constexpr Color kCrossing = {240, 146, 150};  // paler than the rings around crossings
 
-/// Where a mesh is about the origin and 1 to 2 in size: devices count in float, whose squares end near 1e19 and vanish
-/// near 1e-19.
-class NearOne {
+/// Maps a mesh to coordinates in which it surrounds the origin and has a size from 1 to 2: devices compute with floats,
+/// whose squares overflow near 1e19 and vanish near 1e-19.
+class Normalization {
  public:
-  explicit NearOne(const Box& box) : middle_(box.center()) {
+  explicit Normalization(const Box& box) : middle_(box.center()) {
     const double size = box.sizes().maxCoeff();
-    if (size > 0) unit_ = std::ldexp(1.0, std::ilogb(size));  // a power of two rounds nothing
+    if (size > 0) unit_ = std::ldexp(1.0, std::ilogb(size));  // division by a power of two is exact
   }
 
-  Vector3 operator()(const Vector3& place) const { return (place - middle_) / unit_; }
+  Vector3 operator()(const Vector3& point) const { return (point - middle_) / unit_; }
 
   TriangleMesh operator()(TriangleMesh mesh) const {
     for (Vector3& vertex : mesh.vertices) vertex = (*this)(vertex);
@@ -54,34 +54,34 @@ class NearOne {
   double unit_ = 1;
 };
 
-/// From as near as shows all of these places.
-OrbitCamera nearestForWhole(const std::vector<Vector3>& places, OrbitCamera orbit, const Box& domain, int width,
+/// Moves the camera to the least distance from which it shows all points.
+OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbit, const Box& domain, int width,
                             int height) {
   OrbitCamera inSpace = orbit;
   inSpace.projection = Projection::perspective;
   const Camera camera = cameraOf(inSpace, domain, width, height);
   const Vector3 target = orbit.target.value_or(domain.center());
   double distance = 0;
-  for (const Vector3& place : places) {
-    const Vector3 from = place - target;
+  for (const Vector3& point : points) {
+    const Vector3 from = point - target;
     const double nearer = orbit.projection == Projection::perspective ? -from.dot(camera.forward) : 0;
-    for (const Vector3& half : {camera.right, camera.up})  // of the view, as seen at distance 1
+    for (const Vector3& half : {camera.right, camera.up})  // half the view's sides at distance 1
       distance = std::max(distance, nearer + std::abs(from.dot(half)) / half.squaredNorm() / (1 - 2 * kBorder));
   }
   orbit.distance = distance / domain.diagonal().norm();
   return orbit;
 }
 
-/// For each triangle, whether it meets another.
+/// For each triangle 1 if it crosses another, else 0.
 std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
   std::vector<char> result(mesh.triangles.size(), 0);
-  for (const Defect& defect : defects.of(DefectKind::crossing))
+  for (const Defect& defect : defects.ofKind(DefectKind::crossing))
     for (const std::uint32_t face : defect.faces) result[face] = 1;
   return result;
 }
 
-/// Of the triangle that each pixel sees.
-void setLooks(const TriangleMesh& mesh, const MeshDefects& defects, const Camera& camera, BodyBuffers& seen) {
+/// Sets the material of each pixel by the side of the triangle that it shows.
+void setSides(const TriangleMesh& mesh, const MeshDefects& defects, const Camera& camera, BodyBuffers& seen) {
   const std::vector<char> crossing = areCrossing(mesh, defects);
   for (int y = 0; y < seen.height; ++y)
     for (int x = 0; x < seen.width; ++x) {
@@ -90,7 +90,7 @@ void setLooks(const TriangleMesh& mesh, const MeshDefects& defects, const Camera
       const auto& [a, b, c] = mesh.triangles[seen.triangle[i]];
       const Vector3 normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
       const bool fromBehind = normal.dot(pixelRay(camera, x, y, seen.width, seen.height)) > 0;
-      seen.body[i] = crossing[seen.triangle[i]] ? Look::crossing : fromBehind ? Look::back : Look::front;
+      seen.body[i] = crossing[seen.triangle[i]] ? Side::crossing : fromBehind ? Side::back : Side::front;
     }
 }
 
@@ -110,28 +110,34 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   checkPictureSize(picture.width, picture.height, picture.samples);
   const Frame frame = render::frame(picture.width, picture.height);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
+
+  // Place the camera in the coordinates of the normalised mesh.
   const Body body{.mesh = 0, .worldFromBody = Eigen::Isometry3d::Identity(), .color = surfaceColor()};
-  const NearOne nearOne(boundingBox(mesh));
-  const TriangleMesh nearMesh = nearOne(mesh);
-  const auto renderer = make({nearMesh});
+  const Normalization normalized(boundingBox(mesh));
+  const TriangleMesh normalizedMesh = normalized(mesh);
+  const auto renderer = make({normalizedMesh});
   OrbitCamera orbit = picture.camera;
-  if (orbit.target) orbit.target = nearOne(*orbit.target);
+  if (orbit.target) orbit.target = normalized(*orbit.target);
   if (orbit.target && !(orbit.target->cwiseAbs().maxCoeff() <= kFarthest))
-    throw Error("the camera's target is too far from the mesh: give a place nearer to it");
+    throw Error("the camera's target is too far from the mesh: give a point nearer to it");
   const Box box = renderer->bounds({&body, 1}), domain = domainAround(box);
-  if (picture.whole) orbit = nearestForWhole(nearMesh.vertices, orbit, domain, width, height);
+  if (picture.whole) orbit = nearestForWhole(normalizedMesh.vertices, orbit, domain, width, height);
   const Camera camera = startingBefore(box, cameraOf(orbit, domain, width, height));
+
+  // Render the mesh as a body.
   BodyBuffers seen = renderer->view(camera, {&body, 1}, width * samples, height * samples);
-  setLooks(mesh, defects, camera, seen);
+  setSides(mesh, defects, camera, seen);
   ViewBuffers buffers = emptyBuffers(seen.width, seen.height, true);
   addBodies(seen, buffers);
 
+  // Colour the view and mark the defects.
   Image image = backdropPicture(picture.width, picture.height, height);
-  const Sampling sampling{samples, lineWidthOf(frame), 1};
+  const Sampling sampling{samples, frame.lineWidth(), 1};
   const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
-  place(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
-  paintDefects(image, camera, buffers, samples, nearOne(defects), sampling.lineWidth);
+  pasteView(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
+  paintDefects(image, camera, buffers, samples, normalized(defects), sampling.lineWidth);
 
+  // Add panel and caption.
   Overlay overlay;
   addSwatches(overlay, frame, kDefectTitles, swatchesOf(defects));
   const std::array<std::string, 3> details = {formatCount(mesh.triangles.size()) + " faces",

@@ -10,10 +10,8 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kWiden = 4e-6;  // as in node_bounds.cpp
-
 /// A node and its box, in cells of depth kMaxDepth counted from the domain's lower corner.
-struct Placed {
+struct NodeBox {
   std::uint32_t node;
   int depth;
   std::array<std::int64_t, 3> lo;
@@ -21,30 +19,36 @@ struct Placed {
   std::int64_t width() const { return std::int64_t{1} << (kMaxDepth - depth); }
 };
 
-/// Calls visit(leaf) for each leaf below a node.
+/// Calls visit(leaf) for each leaf below a node, descending only into nodes that `enter` accepts.
 template <typename Enter, typename Visit>
-void visitLeaves(const FieldData& field, const Placed& at, const Enter& enter, const Visit& visit) {
+void visitLeaves(const FieldData& field, const NodeBox& at, const Enter& enter, const Visit& visit) {
   if (!enter(at)) return;
   const std::uint64_t bits = field.nodes[at.node];
   if (node::isLeaf(bits)) return visit(at);
   for (std::uint32_t child = 0; child < 8; ++child) {
-    Placed below{node::firstChild(bits) + child, at.depth + 1, at.lo};
+    NodeBox below{node::firstChild(bits) + child, at.depth + 1, at.lo};
     for (int axis = 0; axis < 3; ++axis)
       if ((child >> axis & 1) != 0) below.lo[axis] += below.width();
     visitLeaves(field, below, enter, visit);
   }
 }
 
-Placed baseCell(const FieldData& field, std::int64_t x, std::int64_t y, std::int64_t z) {
-  return {static_cast<std::uint32_t>((z * field.grid[1] + y) * field.grid[0] + x),
-          0,
-          {x << kMaxDepth, y << kMaxDepth, z << kMaxDepth}};
+/// Calls visit(cell) for each base cell with indices from `first` to `last`.
+template <typename Visit>
+void visitBaseCells(const FieldData& field, const std::array<std::int64_t, 3>& first,
+                    const std::array<std::int64_t, 3>& last, const Visit& visit) {
+  for (std::int64_t z = first[2]; z <= last[2]; ++z)
+    for (std::int64_t y = first[1]; y <= last[1]; ++y)
+      for (std::int64_t x = first[0]; x <= last[0]; ++x)
+        visit(NodeBox{static_cast<std::uint32_t>((z * field.grid[1] + y) * field.grid[0] + x),
+                      0,
+                      {x << kMaxDepth, y << kMaxDepth, z << kMaxDepth}});
 }
 
-/// Calls visit(other) for each leaf that touches this one, itself left out.
+/// Calls visit(other) for each other leaf that touches this one.
 template <typename Visit>
-void visitTouching(const FieldData& field, const Placed& leaf, const Visit& visit) {
-  const auto touches = [&](const Placed& other) {
+void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& visit) {
+  const auto touches = [&](const NodeBox& other) {
     for (int axis = 0; axis < 3; ++axis)
       if (other.lo[axis] > leaf.lo[axis] + leaf.width() || other.lo[axis] + other.width() < leaf.lo[axis]) return false;
     return true;
@@ -54,16 +58,15 @@ void visitTouching(const FieldData& field, const Placed& leaf, const Visit& visi
     first[axis] = std::max<std::int64_t>(0, (leaf.lo[axis] - 1) >> kMaxDepth);
     last[axis] = std::min<std::int64_t>(field.grid[axis] - 1, (leaf.lo[axis] + leaf.width()) >> kMaxDepth);
   }
-  for (std::int64_t z = first[2]; z <= last[2]; ++z)
-    for (std::int64_t y = first[1]; y <= last[1]; ++y)
-      for (std::int64_t x = first[0]; x <= last[0]; ++x)
-        visitLeaves(field, baseCell(field, x, y, z), touches, [&](const Placed& other) {
-          if (other.node != leaf.node) visit(other);
-        });
+  visitBaseCells(field, first, last, [&](const NodeBox& cell) {
+    visitLeaves(field, cell, touches, [&](const NodeBox& other) {
+      if (other.node != leaf.node) visit(other);
+    });
+  });
 }
 
-/// A polynomial's coefficients, those of i, j, k at (i · n + j) · n + k with n = degree + 1.
-class Cube {
+/// A polynomial on a box; the coefficient of L_i L_j L_k is at index (i · n + j) · n + k, n being the degree + 1.
+class Polynomial {
  public:
   template <typename T>
   void assign(const T* c, int degree, int size) {
@@ -76,16 +79,16 @@ class Cube {
 
   double& at(int i, int j, int k) { return c_[(std::size_t(i) * size_ + j) * size_ + k]; }
 
-  /// To the coordinate s along an axis of which the one up to now is scale · s + shift.
+  /// Restricts the box along an axis: the coordinate up to now is scale · s + shift, s being the new one.
   void restrict(int axis, double scale, double shift) {
     if (scale == 1 && shift == 0) return;
     findRows(scale, shift);
     const int n = size_, along = axis == 0 ? n * n : axis == 1 ? n : 1;
-    const int first = axis == 0 ? n : n * n, second = axis == 2 ? n : 1;  // steps along the other two
+    const int first = axis == 0 ? n : n * n, second = axis == 2 ? n : 1;  // strides of the other axes
     for (int a = 0; a < n; ++a)
       for (int b = 0; a + b < n; ++b) {
         double* line = c_.data() + a * first + b * second;
-        // entry i changes nothing above i: in place, from below
+        // Entry j of the result depends on entries j and above only, so that the line is overwritten from below.
         for (int j = 0; j < n - a - b; ++j) {
           double sum = 0;
           for (int i = j; i < n - a - b; ++i) sum += rows_[i][j] * line[i * along];
@@ -94,18 +97,20 @@ class Cube {
       }
   }
 
-  void subtract(const Cube& other) {
+  void subtract(const Polynomial& other) {
     for (std::size_t n = 0; n < c_.size(); ++n) c_[n] -= other.c_[n];
   }
 
+  /// The sum of the coefficients' magnitudes, which bounds the polynomial on its box.
   double magnitude() const {
     double sum = 0;
     for (const double c : c_) sum += std::abs(c);
     return sum;
   }
 
-  /// A bound of the gradient's length, of coordinates of which the present ones are `perUnit` each.
-  double steepness(const Vector3& perUnit) {
+  /// A bound of the gradient's length on the box, with respect to coordinates that change by 1 where those of this box
+  /// change by `perUnit`.
+  double gradientBound(const Vector3& perUnit) {
     Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)
       for (int j = 0; i + j < size_; ++j)
@@ -115,7 +120,8 @@ class Cube {
   }
 
  private:
-  /// L_i(scale · s + shift) = Σ rows_[i][j] L_j(s), by L_i's recurrence and s L_j = ((j+1) L_{j+1} + j L_{j−1})/(2j+1).
+  /// Fills rows_ such that L_i(scale · s + shift) = Σ rows_[i][j] L_j(s), by the recurrence of L_i and by
+  /// s L_j = ((j+1) L_{j+1} + j L_{j−1})/(2j+1).
   void findRows(double scale, double shift) {
     for (int i = 0; i < size_; ++i) std::fill_n(rows_[i].begin(), size_ + 1, 0.0);
     rows_[0][0] = 1;
@@ -132,85 +138,85 @@ class Cube {
   std::array<std::array<double, kMaxDegree + 3>, kMaxDegree + 1> rows_;
 };
 
-/// One thread's finder.
-class Finder {
+/// Computes the bounds of leaves; one for each thread.
+class LeafBounder {
  public:
-  explicit Finder(const Field& field) : field_(field.data()), reaches_(field.lookupGrid().blendExtents) {}
+  explicit LeafBounder(const Field& field) : field_(field.data()), extents_(field.lookupGrid().blendExtents) {}
 
-  ZoneBounds bounds(const Placed& leaf) {
-    double apart = 0, twist = 0;
-    int deepest = deepestReach(leaf);
-    visitTouching(field_, leaf, [&](const Placed& other) {
-      deepest = std::max(deepest, deepestReach(other));
-      const double rounding = restrictBoth(leaf, other);
+  BlendZoneBounds bounds(const NodeBox& leaf) {
+    double value = 0, gradient = 0;
+    int smallest = smallestNeighbour(leaf);
+    visitTouching(field_, leaf, [&](const NodeBox& other) {
+      smallest = std::max(smallest, smallestNeighbour(other));
+      const double rounding = kFloatRounding * restrictBoth(leaf, other);
       ofOther_.subtract(ofLeaf_);
-      apart = std::max(apart, ofOther_.magnitude() * (1 + kWiden) + kWiden * rounding);
-      twist = std::max(twist, ofOther_.steepness(perUnit_) * (1 + kWiden) + kWiden * rounding);
+      value = std::max(value, ofOther_.magnitude() * (1 + kFloatRounding) + rounding);
+      gradient = std::max(gradient, ofOther_.gradientBound(perUnit_) * (1 + kFloatRounding) + rounding);
     });
-    return {static_cast<float>(apart), static_cast<float>(twist),
-            static_cast<float>(std::ldexp(2 * field_.blend, leaf.depth - deepest))};
+    return {static_cast<float>(value), static_cast<float>(gradient),
+            static_cast<float>(std::ldexp(2 * field_.blend, leaf.depth - smallest))};
   }
 
  private:
-  int deepestReach(const Placed& leaf) const {
+  /// The depth of the smallest leaf that touches a face of this one, itself included.
+  int smallestNeighbour(const NodeBox& leaf) const {
     int deepest = leaf.depth;
     for (int axis = 0; axis < 3; ++axis)
       for (const bool upper : {false, true})
-        if (const int depth = blend_extent::depth(reaches_[leaf.node], axis, upper); depth != blend_extent::kWall)
+        if (const int depth = blend_extent::depth(extents_[leaf.node], axis, upper); depth != blend_extent::kDomainFace)
           deepest = std::max(deepest, depth);
     return deepest;
   }
 
-  /// Both polynomials on the part of the leaf that the other may reach; the sum of their coefficients' magnitudes.
-  double restrictBoth(const Placed& leaf, const Placed& other) {
+  /// Restricts the polynomials of both leaves to the part of `leaf` into which the weight of `other` may extend.
+  /// Returns the sum of the magnitudes of both polynomials' coefficients.
+  double restrictBoth(const NodeBox& leaf, const NodeBox& other) {
     const int size = std::max(degree(leaf), degree(other)) + 1;
     assign(ofLeaf_, leaf, size);
     assign(ofOther_, other, size);
-    const double reach = field_.blend * double(std::min(leaf.width(), other.width()));
+    const double extent = field_.blend * double(std::min(leaf.width(), other.width()));
     for (int axis = 0; axis < 3; ++axis) {
-      const double lo = std::max(double(leaf.lo[axis]), double(other.lo[axis]) - reach);
-      const double hi = std::min(double(leaf.lo[axis] + leaf.width()), double(other.lo[axis] + other.width()) + reach);
-      const auto take = [&](Cube& cube, const Placed& from) {
+      const double lo = std::max(double(leaf.lo[axis]), double(other.lo[axis]) - extent);
+      const double hi = std::min(double(leaf.lo[axis] + leaf.width()), double(other.lo[axis] + other.width()) + extent);
+      const auto restrict = [&](Polynomial& polynomial, const NodeBox& from) {
         const double half = 0.5 * double(from.width()), middle = double(from.lo[axis]) + half;
-        cube.restrict(axis, 0.5 * (hi - lo) / half, (0.5 * (lo + hi) - middle) / half);
+        polynomial.restrict(axis, 0.5 * (hi - lo) / half, (0.5 * (lo + hi) - middle) / half);
       };
-      take(ofLeaf_, leaf);
-      take(ofOther_, other);
+      restrict(ofLeaf_, leaf);
+      restrict(ofOther_, other);
       perUnit_[axis] = double(leaf.width()) / (hi - lo);
     }
     return ofLeaf_.magnitude() + ofOther_.magnitude();
   }
 
-  int degree(const Placed& leaf) const { return node::degree(field_.nodes[leaf.node]); }
+  int degree(const NodeBox& leaf) const { return node::degree(field_.nodes[leaf.node]); }
 
-  void assign(Cube& cube, const Placed& leaf, int size) const {
-    std::visit(
-        [&](const auto& c) { cube.assign(c.data() + node::offset(field_.nodes[leaf.node]), degree(leaf), size); },
-        field_.coefficients);
+  void assign(Polynomial& polynomial, const NodeBox& leaf, int size) const {
+    const std::uint64_t bits = field_.nodes[leaf.node];
+    std::visit([&](const auto& c) { polynomial.assign(c.data() + node::offset(bits), node::degree(bits), size); },
+               field_.coefficients);
   }
 
   const FieldData& field_;
-  const std::vector<std::uint32_t>& reaches_;
-  Cube ofLeaf_, ofOther_;
-  Vector3 perUnit_;
+  const std::vector<std::uint32_t>& extents_;
+  Polynomial ofLeaf_, ofOther_;
+  Vector3 perUnit_;  // change of the restricted box's coordinates where those of the leaf change by 1
 };
 
 }  // namespace
 
-std::vector<ZoneBounds> zoneBounds(const Field& field) {
+std::vector<BlendZoneBounds> blendZoneBounds(const Field& field) {
   const FieldData& data = field.data();
   if (!(data.blend > 0)) return {};
-  std::vector<Placed> leaves;
-  for (std::int64_t z = 0; z < data.grid[2]; ++z)
-    for (std::int64_t y = 0; y < data.grid[1]; ++y)
-      for (std::int64_t x = 0; x < data.grid[0]; ++x)
-        visitLeaves(
-            data, baseCell(data, x, y, z), [](const Placed&) { return true; },
-            [&](const Placed& leaf) { leaves.push_back(leaf); });
-  std::vector<ZoneBounds> bounds(data.nodes.size());
+  std::vector<NodeBox> leaves;
+  visitBaseCells(data, {0, 0, 0}, {data.grid[0] - 1, data.grid[1] - 1, data.grid[2] - 1}, [&](const NodeBox& cell) {
+    visitLeaves(
+        data, cell, [](const NodeBox&) { return true; }, [&](const NodeBox& leaf) { leaves.push_back(leaf); });
+  });
+  std::vector<BlendZoneBounds> bounds(data.nodes.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
-    Finder finder(field);
-    for (std::size_t n = range.begin(); n < range.end(); ++n) bounds[leaves[n].node] = finder.bounds(leaves[n]);
+    LeafBounder bounder(field);
+    for (std::size_t n = range.begin(); n < range.end(); ++n) bounds[leaves[n].node] = bounder.bounds(leaves[n]);
   });
   return bounds;
 }

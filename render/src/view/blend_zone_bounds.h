@@ -6,18 +6,20 @@
 
 namespace hpsdf::render {
 
-/// What is certain about a leaf of a blended field beside the `NodeBounds` of its polynomial. The field is
-/// F = f + Σ wₙ dₙ / Σ wₙ there, f the leaf's polynomial, dₙ what those of the leaves that reach into it differ by.
-struct ZoneBounds {
-  float apart = 0;  ///< |F − f| is at most this, throughout the leaf, where others reach into it |dₙ| too
-  float twist = 0;  ///< |∇dₙ| is at most this there, in local coordinates
-  /// The shortest reach of any weight there, from half of its own to none, in local coordinates. Over a step of a
-  /// quarter of it F sags below its chord by a few hundredths of what the dₙ differ by, at most.
-  float reach = 0;
+/// Relative rounding error that bounds of the field allow for on devices that compute in single precision.
+constexpr double kFloatRounding = 4e-6;
+
+/// Bounds of the blending within a leaf. The field there is F = f + Σ wₙ dₙ / Σ wₙ, where f is the leaf's polynomial
+/// and dₙ the difference to f of the polynomial of another leaf whose weight wₙ extends into this leaf.
+struct BlendZoneBounds {
+  float valueDifference = 0;     ///< greatest |dₙ| where wₙ > 0, and so greatest |F − f|
+  float gradientDifference = 0;  ///< greatest |∇dₙ| where wₙ > 0, in local coordinates
+  /// The shortest distance over which any weight within the leaf falls from a half to zero, in local coordinates. Over
+  /// a step of a quarter of it, F sags below its chord by at most a few hundredths of `valueDifference`.
+  float extent = 0;
 };
 
-/// One for every node, none for a field without blending. A little wider than certain, by what single precision may
-/// add.
-std::vector<ZoneBounds> zoneBounds(const Field& field);
+/// The bounds of all nodes, widened by the rounding errors of single precision; empty for a field without blending.
+std::vector<BlendZoneBounds> blendZoneBounds(const Field& field);
 
 }  // namespace hpsdf::render

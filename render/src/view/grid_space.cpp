@@ -2,43 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "hpsdf/error.h"
-#include "view/view_buffers.h"
+#include "view/view_checks.h"
+#include "view/view_size.h"
 
 namespace hpsdf::render {
-namespace {
-
-void checkFinite(const Vector3& v, const char* what) {
-  if (!v.allFinite()) throw Error(std::string("a view's ") + what + " is not finite: give finite numbers");
-}
-
-}  // namespace
-
-void checkViewSize(int width, int height) {
-  constexpr int kLargest = 1 << 20;
-  if (std::min(width, height) < 1 || std::max(width, height) > kLargest)
-    throw Error("a view of " + std::to_string(width) + "x" + std::to_string(height) +
-                " pixels is out of range: give 1 to 2^20 pixels a side");
-}
-
-void checkCamera(const Camera& camera, int width, int height) {
-  checkViewSize(width, height);
-  checkFinite(camera.eye, "eye");
-  checkFinite(camera.forward, "forward vector");
-  checkFinite(camera.right, "right vector");
-  checkFinite(camera.up, "up vector");
-  if (camera.forward.isZero(0)) throw Error("a camera's forward vector is zero: give a direction to look along");
-}
 
 GridSpace::GridSpace(const FieldData& field)
     : lo(field.domain.min()),
       size(field.domain.max() - lo),
       grid(field.grid[0], field.grid[1], field.grid[2]),
       diagonal(size.norm()) {}
-
-Vector3 GridSpace::point(const Vector3& x) const { return (x - lo).cwiseQuotient(size).cwiseProduct(grid); }
 
 SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int w, int h)
     : origin(space.point(view.origin)),
@@ -52,7 +26,7 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
   checkFinite(view.origin, "origin");
   checkFinite(view.right, "right vector");
   checkFinite(view.up, "up vector");
-  // a plane that lies in the domain's boundary may have been rounded to just outside
+  // A plane in the domain's boundary may have been rounded to just outside of the domain.
   for (int axis = 0; axis < 3; ++axis) {
     if (right[axis] != 0 || up[axis] != 0) continue;
     const double clamped = std::clamp(origin[axis], 0.0, space.grid[axis]);
@@ -61,9 +35,9 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
 }
 
 bool eyeAbove(const Camera& camera, const ClipPlane& clip) {
-  constexpr double kAlong = 1e-9;  // of a direction: runs along the plane but for rounding
+  constexpr double kParallel = 1e-9;  // component of a unit direction that counts as rounding of 0
   const double ahead = camera.forward[clip.axis];
-  if (camera.projection == Projection::orthographic && std::abs(ahead) > kAlong) return ahead < 0;
+  if (camera.projection == Projection::orthographic && std::abs(ahead) > kParallel) return ahead < 0;
   return camera.eye[clip.axis] >= clip.offset;
 }
 
@@ -84,11 +58,12 @@ RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, in
   checkCamera(camera, w, h);
   checkClip(clip);
   if (!clip) return;
-  // a little within what is kept: a cut along faces then starts in cells on that side, in single precision too
+  // The visible part ends slightly behind the plane, so that a ray that starts at a cut along faces starts in a cell
+  // behind the plane in single precision too.
   const bool above = eyeAbove(camera, *clip);
   const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];
-  const double within = cut + (above ? -kClipNudge : kClipNudge) * space.grid[clip->axis];
-  (above ? hi : lo)[clip->axis] = std::clamp(within, 0.0, space.grid[clip->axis]);
+  const double behind = cut + (above ? -kClipNudge : kClipNudge) * space.grid[clip->axis];
+  (above ? hi : lo)[clip->axis] = std::clamp(behind, 0.0, space.grid[clip->axis]);
 }
 
 }  // namespace hpsdf::render

@@ -1,6 +1,6 @@
 #pragma once
-// Grid coordinates, in which both renderers work: the domain is [0, grid], a base cell a unit cube. Views are turned
-// into grid coordinates here, once and in double precision, so that CPU and GPU start from the same numbers.
+// Grid coordinates, in which both renderers work: the domain is [0, grid], a base cell a unit cube. Views are
+// transformed to grid coordinates once, in double precision, so that CPU and GPU start from the same numbers.
 
 #include <optional>
 
@@ -9,31 +9,26 @@
 
 namespace hpsdf::render {
 
-/// Throws `Error` for a width or height below 1 or above 2^20.
-void checkViewSize(int width, int height);
-
-/// Throws `Error` for a size as above, or a camera that is not finite or looks nowhere.
-void checkCamera(const Camera& camera, int width, int height);
-
-/// World to grid coordinates; in the order of operations of core's queries, so that a plane through the middle of the
-/// domain lands on the same side of a face.
+/// The transform from world to grid coordinates. Its operations have the order of those in core's queries, so that both
+/// put a plane through the middle of the domain on the same side of a face.
 struct GridSpace {
   explicit GridSpace(const FieldData& field);
 
-  Vector3 point(const Vector3& x) const;
-  Vector3 direction(const Vector3& d) const { return d.cwiseQuotient(size).cwiseProduct(grid); }
+  Vector3 point(const Vector3& world) const { return (world - lo).cwiseQuotient(size).cwiseProduct(grid); }
+  Vector3 direction(const Vector3& world) const { return world.cwiseQuotient(size).cwiseProduct(grid); }
 
-  Vector3 lo;    ///< corner of the domain, world units
-  Vector3 size;  ///< of the domain, world units
-  Vector3 grid;  ///< base cells an axis
-  double diagonal;
+  Vector3 lo;       ///< lower corner of the domain, world units
+  Vector3 size;     ///< extent of the domain, world units
+  Vector3 grid;     ///< number of base cells along each axis
+  double diagonal;  ///< diagonal of the domain, world units
 };
 
-/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) + up · (h−2y−1) · stepY: only
-/// products and sums, which every IEEE device rounds alike.
+/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) + up · (h−2y−1) · stepY: these
+/// are products and sums only, which every IEEE device rounds alike.
 struct SliceGeometry {
   SliceGeometry(const GridSpace& space, const SliceView& view, int width, int height);
 
+  /// The point that a pixel samples.
   Vector3 point(int x, int y) const {
     return (origin + right * ((2 * x + 1 - width) * stepX)) + up * ((height - 2 * y - 1) * stepY);
   }
@@ -43,40 +38,42 @@ struct SliceGeometry {
   double stepX, stepY;  ///< 1/(2w), 1/(2h)
 };
 
-/// How far behind a clipping plane one looks, in parts of the domain.
+/// Distance behind a clipping plane at which rays start, in parts of the domain's extent across the plane. Cells of a
+/// section are looked up at the same distance.
 constexpr double kClipNudge = 1e-6;
 
-/// Whether the eye is on the side of greater coordinates of a clipping plane.
+/// Whether a clipping plane removes its side of greater coordinates, on which the eye is.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
-/// The rays of a camera. With across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, pixel (x, y) looks from the
-/// eye along forward + across or, where rays are parallel, from eye + across along forward; across and directions in
-/// world units, which `scale` takes to grid coordinates.
+/// The rays of a camera. With across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, the ray of pixel (x, y) starts
+/// at the eye and runs along forward + across or, where rays are parallel, starts at eye + across · scale and runs
+/// along forward.
 struct RayGeometry {
   RayGeometry(const GridSpace& space, const Camera& camera, int width, int height,
               const std::optional<ClipPlane>& clip = {});
 
-  /// Where the pixel's ray starts, grid coordinates.
+  /// The start of a pixel's ray, grid coordinates.
   Vector3 start(int x, int y) const {
     return parallel ? Vector3(eye + onPicture(Vector3::Zero(), x, y).cwiseProduct(scale)) : eye;
   }
 
-  /// World units, unit.
+  /// The unit direction of a pixel's ray, in world coordinates.
   Vector3 direction(int x, int y) const {
     if (parallel) return forward;
     const Vector3 d = onPicture(forward, x, y);
     return d / d.norm();
   }
 
-  bool parallel;               ///< rays: orthographic
+  bool parallel;               ///< whether rays are parallel: an orthographic view
   Vector3 eye;                 ///< grid coordinates
-  Vector3 lo, hi;              ///< what of the domain is shown, grid coordinates
-  Vector3 forward, right, up;  ///< world units
-  Vector3 scale;
+  Vector3 lo, hi;              ///< corners of the visible part of the domain, grid coordinates
+  Vector3 forward, right, up;  ///< vectors of the camera, world units
+  Vector3 scale;               ///< grid coordinates per world unit
   int width, height;
   double stepX, stepY;  ///< 1/w, 1/h
 
  private:
+  /// `middle` plus the vector from the picture's middle to the pixel, world units.
   Vector3 onPicture(const Vector3& middle, int x, int y) const {
     return middle + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
   }

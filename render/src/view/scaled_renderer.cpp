@@ -16,11 +16,11 @@ Field scaled(const Field& field, double factor) {
         for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
       },
       data.coefficients);
-  data.bounds.clear();  // no renderer asks for them
+  data.bounds.clear();  // they would have to be scaled, and no renderer uses them
   return Field(std::move(data));
 }
 
-/// Views come in world units, `inner` counts in `unit` of them.
+/// Passes views to `inner`, whose unit of length is `unit` world units, and its buffers back in world units.
 class ScaledRenderer final : public Renderer {
  public:
   ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}
@@ -57,9 +57,9 @@ class ScaledRenderer final : public Renderer {
 }  // namespace
 
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make) {
-  constexpr int kNear = 30;
+  constexpr int kGreatestExponent = 30;
   const int exponent = std::ilogb(field.domain().sizes().maxCoeff());
-  if (std::abs(exponent) <= kNear) return make(field);
+  if (std::abs(exponent) <= kGreatestExponent) return make(field);
   const double unit = std::ldexp(1.0, exponent);
   return std::make_unique<ScaledRenderer>(make(scaled(field, 1 / unit)), unit);
 }

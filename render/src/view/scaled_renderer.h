@@ -1,5 +1,6 @@
 #pragma once
-// Fields whose units are far from 1: devices count in float, whose squares end near 1e19 and vanish near 1e-19.
+// Rendering of very large and very small fields: devices compute in float, in which the square of a length overflows
+// above 1e19 and vanishes below 1e-19.
 
 #include <functional>
 #include <memory>
@@ -10,9 +11,10 @@ namespace hpsdf::render {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Field&)>;
 
-/// What `make` makes of the field, or, where its domain is not near 1 in size (2^±30), of the same field in units of a
-/// power of two, which rounds nothing; what it shows is in the field's own units all the same. `make` keeps no
-/// reference to the field.
+/// A renderer for the field whose lengths are near 1 inside `make`. Calls `make` with the field itself where its
+/// domain's size lies within 2^±30, else with a copy in units of a power of two, which rounds nothing; views and
+/// buffers of the result are in the field's own units. The renderer that `make` returns must keep no reference to the
+/// field.
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make);
 
 }  // namespace hpsdf::render

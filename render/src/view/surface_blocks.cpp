@@ -8,15 +8,23 @@
 namespace hpsdf::render {
 namespace {
 
-/// Blocks, half-open.
+/// A rectangle of blocks, half-open.
 struct BlockRect {
   int x0, y0, x1, y1;
 };
 
-class Finder {
+/// The bounds of a box's projection to the view, in which the view is [−1, 1]².
+struct Projected {
+  double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
+  int behind = 0;                    ///< number of corners behind the eye, which perspective leaves out of the bounds
+  std::array<int, 4> outside{};      ///< number of corners beyond each edge of the view's frustum
+  Vector3 corner = Vector3::Zero();  ///< the lower corner in the camera's frame
+};
+
+class BlockFinder {
  public:
-  Finder(const FieldData& field, const std::vector<NodeBounds>& bounds, const GridSpace& space, const RayGeometry& rays,
-         double offset)
+  BlockFinder(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
+              const RayGeometry& rays, double offset)
       : field_(field),
         bounds_(bounds),
         rays_(rays),
@@ -36,7 +44,7 @@ class Finder {
     std::uint32_t node = 0;
     for (std::uint32_t z = 0; z < field_.grid[2]; ++z)
       for (std::uint32_t y = 0; y < field_.grid[1]; ++y)
-        for (std::uint32_t x = 0; x < field_.grid[0]; ++x) visit(node++, Vector3(x, y, z), 1);
+        for (std::uint32_t x = 0; x < field_.grid[0]; ++x) markBlocks(node++, Vector3(x, y, z), 1);
     SurfaceBlocks found{side_, {}};
     for (int y = 0; y < rows_; ++y)
       for (int x = 0; x < columns_; ++x) {
@@ -49,7 +57,7 @@ class Finder {
  private:
   static constexpr float kNone = std::numeric_limits<float>::infinity();
 
-  /// A guess, which decides how much can be left out and nothing else.
+  /// Guesses the side on which rays start. A wrong guess costs time but does not change the picture.
   float sideAt(const Vector3& p) const {
     std::uint32_t node = 0;
     for (int axis = 2; axis >= 0; --axis)
@@ -57,7 +65,8 @@ class Finder {
     return 0.5 * (double(bounds_[node].lo) + bounds_[node].hi) >= offset_ ? 1 : -1;
   }
 
-  void visit(std::uint32_t node, const Vector3& lo, double size) {
+  /// Marks the blocks that may see parts of a node which are not on `side_`.
+  void markBlocks(std::uint32_t node, const Vector3& lo, double size) {
     const bool above = bounds_[node].lo > offset_;
     const bool below = bounds_[node].hi < offset_;
     if (side_ > 0 ? above : below) return;
@@ -70,61 +79,65 @@ class Finder {
     }
     const std::uint32_t first = node::firstChild(field_.nodes[node]);
     for (std::uint32_t child = 0; child < 8; ++child)
-      visit(first + child, lo + 0.5 * size * Vector3(child & 1, child >> 1 & 1, child >> 2), 0.5 * size);
+      markBlocks(first + child, lo + 0.5 * size * Vector3(child & 1, child >> 1 & 1, child >> 2), 0.5 * size);
   }
 
-  /// Blocks of the view whose rays may pass the box.
-  BlockRect blocksOf(const Vector3& lo, double size) const {
-    const BlockRect whole{0, 0, columns_, rows_};
-    double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
-    int behind = 0;
-    std::array<int, 4> beyond{};  // corners beyond each edge of the view, also those behind the eye
-    const Vector3 corner = viewFromGrid_ * (lo - rays_.eye);
+  Projected projected(const Vector3& lo, double size) const {
+    Projected result;
+    result.corner = viewFromGrid_ * (lo - rays_.eye);
     const Eigen::Matrix3d edges = viewFromGrid_ * size;
     for (int i = 0; i < 8; ++i) {
-      Vector3 p = corner;
+      Vector3 p = result.corner;
       for (int axis = 0; axis < 3; ++axis)
         if (i >> axis & 1) p += edges.col(axis);
       const double edge = rays_.parallel ? 1 : p.x();
-      beyond[0] += p.y() > edge;
-      beyond[1] += -p.y() > edge;
-      beyond[2] += p.z() > edge;
-      beyond[3] += -p.z() > edge;
+      result.outside[0] += p.y() > edge;
+      result.outside[1] += -p.y() > edge;
+      result.outside[2] += p.z() > edge;
+      result.outside[3] += -p.z() > edge;
       if (!(p.x() > near_)) {
-        ++behind;
+        ++result.behind;
         if (!rays_.parallel) continue;
       }
-      x0 = std::min(x0, p.y() / edge);
-      x1 = std::max(x1, p.y() / edge);
-      y0 = std::min(y0, -p.z() / edge);
-      y1 = std::max(y1, -p.z() / edge);
+      result.x0 = std::min(result.x0, p.y() / edge);
+      result.x1 = std::max(result.x1, p.y() / edge);
+      result.y0 = std::min(result.y0, -p.z() / edge);
+      result.y1 = std::max(result.y1, -p.z() / edge);
     }
-    if (!corner.allFinite()) return whole;
-    if (behind == 8 || std::ranges::count(beyond, 8) > 0) return {0, 0, 0, 0};
-    if (behind > 0 && !rays_.parallel) return whole;
-    // the centre of pixel i is at 2i + 1 = (1 + x) · width; a pixel more on either side
-    const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };
-    const auto last = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) + 1) / kBlock) + 1; };
-    const auto within = [](double block, int blocks) { return int(std::clamp(block, 0.0, double(blocks))); };
-    if (!std::isfinite(x0 + x1 + y0 + y1)) return whole;
-    return {within(first(x0, rays_.width), columns_), within(first(y0, rays_.height), rows_),
-            within(last(x1, rays_.width), columns_), within(last(y1, rays_.height), rows_)};
+    return result;
   }
 
-  /// From where rays start to the box, a little less for rounding.
+  /// The blocks of the view whose rays may pass a box.
+  BlockRect blocksOf(const Vector3& lo, double size) const {
+    const BlockRect whole{0, 0, columns_, rows_};
+    const Projected box = projected(lo, size);
+    if (!box.corner.allFinite()) return whole;
+    if (box.behind == 8 || std::ranges::count(box.outside, 8) > 0) return {0, 0, 0, 0};
+    if (box.behind > 0 && !rays_.parallel) return whole;
+    if (!std::isfinite(box.x0 + box.x1 + box.y0 + box.y1)) return whole;
+    // The centre of pixel i is at 2i + 1 = (1 + x) · width. The rectangle has a margin of one pixel.
+    const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };
+    const auto last = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) + 1) / kBlock) + 1; };
+    const auto clamped = [](double block, int blocks) { return int(std::clamp(block, 0.0, double(blocks))); };
+    return {clamped(first(box.x0, rays_.width), columns_), clamped(first(box.y0, rays_.height), rows_),
+            clamped(last(box.x1, rays_.width), columns_), clamped(last(box.y1, rays_.height), rows_)};
+  }
+
+  /// A lower bound of the distance along rays from their start to a box, which allows for rounding.
   float distance(const Vector3& lo, double size) const {
-    constexpr double kLess = 1 - 1e-6;
+    constexpr double kRoundingFactor = 1 - 1e-6;
     if (rays_.parallel) {
       const Vector3 toMiddle = lo + Vector3::Constant(0.5 * size) - rays_.eye;
       const Vector3 half = 0.5 * size * worldFromGrid_;
       const double toCorner =
           rays_.forward.dot(toMiddle.cwiseProduct(worldFromGrid_)) - rays_.forward.cwiseAbs().dot(half);
-      return static_cast<float>(kLess * std::max(0.0, toCorner));
+      return static_cast<float>(kRoundingFactor * std::max(0.0, toCorner));
     }
     const Vector3 nearest = rays_.eye.cwiseMax(lo).cwiseMin(lo + Vector3::Constant(size));
-    return static_cast<float>(kLess * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
+    return static_cast<float>(kRoundingFactor * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
   }
 
+  /// Lowers the start of the blocks in a rectangle.
   void mark(const BlockRect& rect, float start) {
     for (int y = rect.y0; y < rect.y1; ++y)
       for (int x = rect.x0; x < rect.x1; ++x) {
@@ -134,22 +147,22 @@ class Finder {
   }
 
   const FieldData& field_;
-  const std::vector<NodeBounds>& bounds_;
+  const std::vector<SurfaceBounds>& bounds_;
   const RayGeometry& rays_;
   double offset_;
-  double near_;  ///< world units: what is closer before the eye counts as behind it
+  double near_;  ///< depth up to which a corner counts as behind the eye, world units
   Vector3 worldFromGrid_;
-  Eigen::Matrix3d viewFromGrid_;  ///< forward, right and up as multiples of the camera's
+  Eigen::Matrix3d viewFromGrid_;  ///< to the camera's frame, whose axes are its forward, right and up vectors
   float side_;
   int columns_, rows_;
-  std::vector<float> starts_;
+  std::vector<float> starts_;  ///< `Block::start` of every block of the view, kNone for blocks that see nothing
 };
 
 }  // namespace
 
-SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<NodeBounds>& bounds, const GridSpace& space,
+SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset) {
-  return Finder(field, bounds, space, rays, offset).find();
+  return BlockFinder(field, bounds, space, rays, offset).find();
 }
 
 }  // namespace hpsdf::render

@@ -1,6 +1,6 @@
 #pragma once
-// Where in a view rays may meet the surface, and how far along them at the nearest: so that pixels which see nothing
-// of it are not drawn at all, and the others start next to it.
+// Blocks of pixels whose rays may meet the surface, and a lower bound of the distance to it: pixels that do not see the
+// surface are not drawn at all, and rays of the others start near it.
 
 #include <vector>
 
@@ -9,22 +9,22 @@
 
 namespace hpsdf::render {
 
-constexpr int kBlock = 8;  // pixels a side
+constexpr int kBlock = 8;  // pixels along each side of a block
 
-/// A square of kBlock × kBlock pixels.
 struct Block {
-  float x, y;   ///< its upper left pixel
-  float start;  ///< world units along a ray: up to there no ray of the block has left `SurfaceBlocks::side`
+  float x, y;   ///< upper left pixel
+  float start;  ///< distance along the block's rays, world units, up to which none has left `SurfaceBlocks::side`
 };
 
 struct SurfaceBlocks {
-  float side;  ///< 1 or −1: the sign of f − offset along every ray from where it enters the domain up to `Block::start`
-  std::vector<Block> blocks;  ///< rays of all other pixels stay on that side, or never enter the domain
+  /// The sign, 1 or −1, of f − offset along every ray from its entry into the domain to `Block::start`, or to its exit
+  /// where its pixel is in none of the blocks.
+  float side;
+  std::vector<Block> blocks;
 };
 
-/// By the bounds of the octree's nodes as the view sees them: those not wholly on `side`, down to nodes that cover no
-/// more than a block or so.
-SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<NodeBounds>& bounds, const GridSpace& space,
+/// Projects the nodes whose bounds are not wholly on `side` to the view, down to nodes that cover about one block.
+SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset);
 
 }  // namespace hpsdf::render

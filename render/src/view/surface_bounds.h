@@ -9,27 +9,25 @@
 
 namespace hpsdf::render {
 
-/// What is certain about the field within a node, from its coefficients alone (|L_i| ≤ 1, |L_i'| ≤ i(i+1)/2,
-/// |L_i''| ≤ (i−1)i(i+1)(i+2)/8): it lets a ray pass a node without evaluating it, and step within a leaf without ever
-/// passing a zero.
-struct NodeBounds {
-  float
-      lo;  ///< the field's values within the node lie in [lo, hi], blended or not; all else is of the polynomial alone
-  float hi;
-  /// Leaves: the gradient in local coordinates differs from that of the polynomial's linear part by at most this.
-  /// Internal nodes: −1.
-  float bend;
-  float rest;   ///< leaves: the value differs from the linear part's by at most this
-  float curve;  ///< leaves: no second derivative in local coordinates, along any unit vector, is larger than this
-  /// Leaves: the linear part, c_100, c_010, c_001 and c_000.
-  std::array<float, 4> linear;
+/// Bounds of the field within a node, derived from its coefficients by |L_i| ≤ 1, |L_i'| ≤ i(i+1)/2 and
+/// |L_i''| ≤ (i−1)i(i+1)(i+2)/8 on [−1, 1]. They let a ray pass a node without an evaluation, and step within a leaf
+/// without passing a zero. All but the range [lo, hi] bound the leaf's polynomial, before blending.
+struct SurfaceBounds {
+  float lo;  ///< least value of the field within the node, blended or not
+  float hi;  ///< greatest value of the field within the node, blended or not
+  /// Leaves: greatest length of the difference between the polynomial's gradient and that of its linear part, in local
+  /// coordinates. Internal nodes: −1.
+  float gradientDeviation;
+  float valueDeviation;         ///< leaves: greatest difference between the polynomial and its linear part
+  float secondDerivative;       ///< leaves: greatest second derivative along any unit vector, in local coordinates
+  std::array<float, 4> linear;  ///< leaves: the linear part's coefficients c_100, c_010, c_001 and c_000
 };
 
-/// One for every node. A little wider than the coefficients say, by what single precision may add.
-/// `zones` are those of a blended field.
-std::vector<NodeBounds> nodeBounds(const FieldData& field, const std::vector<ZoneBounds>& zones = {});
+/// The bounds of all nodes, widened by the rounding errors of single precision. `zones` are those of a blended field.
+std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vector<BlendZoneBounds>& zones = {});
 
-/// The range [lo, hi] in 32 bits: the upper halves of the two floats, hi's in the high bits, lo rounded down and hi up.
+/// The range [lo, hi] in 32 bits: the upper halves of the two floats, that of hi in the high bits, lo rounded down and
+/// hi rounded up.
 std::uint32_t packOutwards(float lo, float hi);
 
 }  // namespace hpsdf::render

@@ -6,13 +6,13 @@
 #include <string>
 
 #include "hpsdf/error.h"
-#include "view/grid_space.h"
+#include "view/view_size.h"
 
 namespace hpsdf::render {
 namespace {
 
-constexpr double kBorder = 0.025;       // left free around the section, of the picture's width or height
-constexpr double kBeforeDomain = 0.01;  // where parallel rays start, in domain diagonals
+constexpr double kBorder = 0.025;    // margin around the section, in parts of the picture's width or height
+constexpr double kRayMargin = 0.01;  // distance from the start of parallel rays to the domain, in domain diagonals
 
 std::string text(double x) {
   char buffer[32];
@@ -25,7 +25,8 @@ void checkDomain(const Box& domain) {
     throw Error("a view's domain is empty or not finite: give a field's domain");
 }
 
-/// The rectangle with square pixels that shows [lo, hi], two coordinates along the unit vectors `right` and `up`.
+/// The view with square pixels that shows the rectangle [lo, hi], given by coordinates from `base` along the unit
+/// vectors `right` and `up`.
 SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vector3& base, const Vector3& right,
                  const Vector3& up, int width, int height) {
   const Eigen::Vector2d center = 0.5 * (lo + hi);
@@ -34,8 +35,8 @@ SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vec
   return {base + center.x() * right + center.y() * up, right * (pixel * width), up * (pixel * height)};
 }
 
-/// Unit vectors on screen for a plane: up is the projection of z, or of y where the plane is nearly level; right is
-/// turned towards growing coordinates, so that planes of one family are shown alike whichever way their normals point.
+/// The unit vectors that point right and up on screen for a plane. Up is the projection of z, or of y where the plane
+/// is nearly level. Right points towards growing coordinates, so that the picture does not depend on the normal's sign.
 std::pair<Vector3, Vector3> screenAxes(const Vector3& normal) {
   const Vector3 upwards = std::abs(normal.z()) > 0.9 ? Vector3::UnitY() : Vector3::UnitZ();
   const Vector3 up = (upwards - upwards.dot(normal) * normal).normalized();
@@ -46,7 +47,7 @@ std::pair<Vector3, Vector3> screenAxes(const Vector3& normal) {
   return {right, up};
 }
 
-/// Corners of the plane's section with the box: where it meets the box's edges. In no particular order.
+/// The intersections of a plane with the edges of a box, in no particular order: the corners of its section.
 std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3& normal) {
   std::vector<Vector3> corners;
   for (int axis = 0; axis < 3; ++axis)
@@ -65,7 +66,7 @@ std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3
   return corners;
 }
 
-/// The picture's pixel when its middle is given.
+/// `middle` plus the vector from the picture's middle to the pixel.
 Vector3 onPicture(const Camera& camera, const Vector3& middle, int x, int y, int width, int height) {
   return middle + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
 }
@@ -75,6 +76,16 @@ double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
 void checkRange(const char* what, double value, bool inRange, const char* range) {
   if (!std::isfinite(value) || !inRange)
     throw Error(std::string("camera ") + what + " " + text(value) + " is out of range: give " + range);
+}
+
+void checkOrbit(const OrbitCamera& camera) {
+  checkRange("azimuth", camera.azimuthDegrees, true, "a finite angle in degrees");
+  checkRange("elevation", camera.elevationDegrees, std::abs(camera.elevationDegrees) <= 90, "-90 to 90 degrees");
+  checkRange("distance", camera.distance, camera.distance > 0, "a number above 0, in domain diagonals");
+  checkRange("field of view", camera.fieldOfViewDegrees,
+             camera.fieldOfViewDegrees > 0 && camera.fieldOfViewDegrees < 180, "more than 0 and less than 180 degrees");
+  if (camera.target && !camera.target->allFinite())
+    throw Error("the camera's target is not finite: give three coordinates");
 }
 
 }  // namespace
@@ -103,7 +114,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
     return Error("the slice plane through (" + text(point.x()) + ", " + text(point.y()) + ", " + text(point.z()) +
                  ") misses the domain: give a point within it");
   };
-  // exactly along an axis: no rounding, so that the plane stays on a face between cells
+  // Treat a plane across an axis without rounding, so that it stays on a face between cells.
   for (int axis = 0; axis < 3; ++axis) {
     if (normal[(axis + 1) % 3] != 0 || normal[(axis + 2) % 3] != 0) continue;
     if (!(point[axis] >= domain.min()[axis] && point[axis] <= domain.max()[axis])) throw misses();
@@ -113,7 +124,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
   const std::vector<Vector3> corners = section(domain, point, unit);
   if (corners.empty()) throw misses();
   const auto [right, up] = screenAxes(unit);
-  // the point nearest to the domain's centre, so that coordinates stay small whatever point was given
+  // Start from the plane's point nearest to the domain's centre, so that coordinates stay small.
   const Vector3 base = domain.center() - unit.dot(domain.center() - point) * unit;
   Eigen::AlignedBox2d extent;
   for (const Vector3& corner : corners) extent.extend(Eigen::Vector2d(right.dot(corner - base), up.dot(corner - base)));
@@ -124,36 +135,30 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height) {
   checkDomain(domain);
   checkViewSize(width, height);
-  checkRange("azimuth", camera.azimuthDegrees, true, "a finite angle in degrees");
-  checkRange("elevation", camera.elevationDegrees, std::abs(camera.elevationDegrees) <= 90, "-90 to 90 degrees");
-  checkRange("distance", camera.distance, camera.distance > 0, "a number above 0, in domain diagonals");
-  checkRange("field of view", camera.fieldOfViewDegrees,
-             camera.fieldOfViewDegrees > 0 && camera.fieldOfViewDegrees < 180, "more than 0 and less than 180 degrees");
+  checkOrbit(camera);
   const double azimuth = radians(std::remainder(camera.azimuthDegrees, 360));
   const double elevation = radians(camera.elevationDegrees);
-  // the horizontal direction towards the eye and the one to its right, as seen from the eye
   const bool upY = camera.up == UpAxis::y;
   const Vector3 vertical = upY ? Vector3::UnitY() : Vector3::UnitZ();
   const Vector3 front = upY ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
-  const Vector3 outward = std::sin(azimuth) * Vector3::UnitX() + std::cos(azimuth) * front;
+  const Vector3 outward = std::sin(azimuth) * Vector3::UnitX() + std::cos(azimuth) * front;  // level, towards the eye
   const Vector3 right = std::cos(azimuth) * Vector3::UnitX() - std::sin(azimuth) * front;
   const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
   const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
-  Camera result;
+  const double distance = camera.distance * domain.diagonal().norm();
   const Vector3 target = camera.target.value_or(domain.center());
-  if (!target.allFinite()) throw Error("the camera's target is not finite: give three coordinates");
-  result.eye = target + camera.distance * domain.diagonal().norm() * towardsEye;
+  Camera result;
+  result.eye = target + distance * towardsEye;
   result.forward = -towardsEye;
   result.right = right * (halfHeight * width / height);
   result.up = up * halfHeight;
   if (camera.projection == Projection::orthographic) {
-    const double atTarget = camera.distance * domain.diagonal().norm();
-    result.right *= atTarget;
-    result.up *= atTarget;
+    result.right *= distance;
+    result.up *= distance;
     const double toCorner =
         (domain.center() - target).dot(towardsEye) + 0.5 * domain.sizes().dot(towardsEye.cwiseAbs());
-    result.eye = target + (toCorner + kBeforeDomain * domain.diagonal().norm()) * towardsEye;
+    result.eye = target + (toCorner + kRayMargin * domain.diagonal().norm()) * towardsEye;
     result.projection = Projection::orthographic;
   }
   return result;

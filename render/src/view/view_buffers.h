@@ -1,14 +1,10 @@
 #pragma once
-// What both renderers do with buffers and the numbers of a view.
 
-#include <cmath>
-#include <optional>
-
-#include "hpsdf/error.h"
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
 
+/// Buffers of a view in which no pixel shows anything. `surface` adds the buffers that slices lack.
 inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   const std::size_t pixels = std::size_t(width) * height;
   ViewBuffers buffers;
@@ -24,15 +20,6 @@ inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
     buffers.crack.assign(pixels, 0);
   }
   return buffers;
-}
-
-inline void checkClip(const std::optional<ClipPlane>& clip) {
-  if (clip && !std::isfinite(clip->offset))
-    throw Error("a clipping plane's offset is not finite: give a finite number");
-}
-
-inline void checkOffset(double offset) {
-  if (!std::isfinite(offset)) throw Error("the surface's offset is not finite: give a distance in world units");
 }
 
 }  // namespace hpsdf::render

@@ -8,11 +8,12 @@
 
 namespace hpsdf {
 
-/// Where a mesh meets itself, decided without rounding (Shewchuk 1997). Corners are the same where their indices are:
-/// weld them first. Triangles whose corners lie on one line are passed over, as their neighbours hold their sides.
+/// Returns the self-intersections of a mesh, found by exact predicates (Shewchuk 1997). Corners are shared where their
+/// vertex indices are equal: weld the mesh first. Degenerate triangles are ignored, because their neighbours contain
+/// their edges.
 ///
-/// `limit` of them at most, the same ones for any number of threads. Throws `Error` as `ExactDistance` does,
-/// `Cancelled`.
-Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit = kMostCrossings, const Progress& progress = {});
+/// Returns at most `limit` crossings, the same ones for any number of threads. Throws `Error` for what `ExactDistance`
+/// refuses too, and `Cancelled`.
+Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit = kMaxCrossings, const Progress& progress = {});
 
 }  // namespace hpsdf

@@ -12,27 +12,27 @@
 
 namespace hpsdf {
 
-/// Points and Φ there. Neighbours in the list are neighbours in space.
+/// Points with their exact distances. Points that follow each other in the list are close to each other in space.
 struct ExactSamples {
   std::vector<Vector3> points;
-  std::vector<double> distances;  ///< Φ, negative inside
+  std::vector<double> distances;  ///< Φ at the points, negative inside
 };
 
-/// How points are drawn. The same seed gives the same points, whatever the number of threads.
+/// Options of random points. The points depend on the seed, not on the number of threads.
 struct SampleOptions {
   std::size_t count = 500'000;
   std::uint64_t seed = 1;
-  int threads = 0;  ///< at most; 0: all that the machine offers
+  int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
 };
 
-/// Points that are uniform in the domain, or, with a `band` above 0, in the part of it where |Φ| is at most that.
-/// Throws `Error` where no such part was found, or for a Φ that is not finite; `Cancelled` when progress says so.
+/// Draws points uniformly from the domain or, if `band` is above 0, from the part of the domain where |Φ| ≤ band.
+/// Throws `Error` if no such part is found or Φ is not finite, `Cancelled` when `progress` says so.
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band = 0,
                            const SampleOptions& options = {}, const Progress& progress = {});
 
-/// Points near a surface: one at random on it, uniform by area, moved by a vector that is uniform in the ball of
-/// `radius` (above 0). Those outside the domain are drawn anew; throws `Error` when there are hardly any others, for a
-/// surface without area, or for a Φ that is not finite; `Cancelled` when progress says so.
+/// Draws points near a surface: points that are uniform on the surface, moved by vectors that are uniform in a ball of
+/// `radius` (above 0). Points outside the domain are drawn again. Throws `Error` if hardly any point lies in the
+/// domain, if the surface has no area or Φ is not finite, `Cancelled` when `progress` says so.
 ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& surface, const Box& domain, double radius,
                         const SampleOptions& options = {}, const Progress& progress = {});
 

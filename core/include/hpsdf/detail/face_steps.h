@@ -1,5 +1,5 @@
 #pragma once
-// How far queries on either side of a face disagree.
+// Jumps as queries see them, measured at random points of faces.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,18 +11,17 @@
 
 namespace hpsdf {
 
-/// The greatest steps from one side of a face to the other.
+/// The greatest differences between queries on both sides of faces.
 struct FaceSteps {
-  std::size_t points = 0;
-  double value = 0;     ///< of f, in the field's units
-  double gradient = 0;  ///< length of the difference of the gradients
+  std::size_t points = 0;  ///< number of points at which both sides were queried
+  double value = 0;        ///< greatest difference of f, in the field's units
+  double gradient = 0;     ///< greatest length of the difference of the gradients
 };
 
-/// What queries answer on either side of `count` random points of faces: at two points that are neighbours in floating
-/// point and lie in different leaves, so that the answers share nothing. Each point lies on a random one of `faces`,
-/// which are the field's own (`Jumps::interfaces`): small ones count like large ones. The same seed gives the same
-/// figures, whatever the number of `threads` (0: all that the machine offers). Throws `Cancelled` when progress says
-/// so.
+/// Queries a field on both sides of `count` random points of faces. The two queries of a point are at neighbouring
+/// floating-point numbers that lie in different leaves. Each point lies on a random one of `faces`, which are
+/// interfaces of the field (`Jumps::interfaces`); small faces are as likely as large ones. The result depends on the
+/// seed, not on `threads` (0: all that the machine offers). Throws `Cancelled` when `progress` says so.
 FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces, std::size_t count,
                            std::uint64_t seed = 1, int threads = 0, const Progress& progress = {});
 

@@ -13,62 +13,51 @@
 
 namespace hpsdf {
 
-/// How a field came to be: stored with it, shown by `info`. Distances are in mesh units unless said.
+/// How a field was built: stored with it, shown by `info`. Lengths are in the field's own units.
 struct FieldMetadata {
   Source source;
-  double targetError = 0;      ///< τ at the paper's scale (longest side 2)
-  double totalError = 0;       ///< ε, weighted by nearness, at the paper's scale: comparable with targetError
+  /// The settings as they took effect: where errors by distance were asked for, τ is the error reached and θ the
+  /// exponent that followed from them. Files keep those that `BuildSetting::storedAt` numbers.
+  BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
+  double totalError = 0;       ///< ε, weighted by nearness, at the paper's scale: comparable with τ
   double referenceLength = 2;  ///< L: an error at the paper's scale times (L/2)^5 is one in the field's own units^5
-  double nearness = 0;         ///< θ
-  std::uint32_t maxDegree = 0;
-  std::uint32_t maxDepth = 0;
-  std::uint32_t quadrature = 0;  ///< order as a multiple of the degree
-  Strategy strategy = Strategy::hp;
-  double band = 0;                     ///< width of the narrow band, 0 for none
-  std::uint64_t exactEvaluations = 0;  ///< of Φ during the construction
-  /// Leaves that the construction raised or split; nothing where that is not known, as of files of version 1.
+  std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction
+  /// Leaves that the construction raised or split; nothing where that is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
-  double roundingRms = 0;  ///< RMS change of the field by keeping its coefficients as float; 0 for double
-  Estimator estimator = Estimator::embedded;
-  Criterion criterion = Criterion::paper;
-  NearnessKind nearnessKind = NearnessKind::polynomial;
-  double maxError = 0;  ///< |f − Φ| that no place looked at was to exceed, in the field's units; 0: not asked for
-  /// The greatest at those places, of the leaves' own polynomials, where it was asked for, and what rounding
-  /// may add where that is more than a hundredth of `maxError`.
+  double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
+  /// Greatest |f − Φ| at the probed points, for the leaves' own polynomials, if a maximum error was asked for; the
+  /// effect of rounding is added where it exceeds a hundredth of that maximum.
   double measuredError = 0;
-  bool enriched = false;        ///< every cell was fitted anew, one degree higher, at the end
-  double continuityWeight = 0;  ///< λ of weak continuity, see `continuity.h`; 0: the cells' own fits
 
-  /// √(ε/|Ω|) in the field's own units: the estimated RMS error that the construction ended with.
+  /// √(ε/|Ω|): the estimated RMS error that the construction ended with.
   double rmsEstimate(const Box& domain) const;
 };
 
-/// What holds throughout a leaf, whatever lies between samples. See `safe_distance.h`.
+/// Bounds that are proven to hold throughout a leaf (see `safe_distance.h`).
 struct CellBound {
-  float error = 0;  ///< |f − Φ| at most, in the field's units
-  float slope = 0;  ///< ‖∇f‖ at most
+  float error = 0;  ///< bound of |f − Φ| in the field's units
+  float slope = 0;  ///< bound of ‖∇f‖
 };
 
-/// The finished octree as arrays. The first `grid.prod()` nodes are the base cells, x fastest, then y, then z. A node
-/// is
-///   internal: bit 63 clear, low 32 bits the index of the first of its 8 children (child number = x + 2y + 4z);
-///   leaf:     bit 63 set, bits 32..39 the degree p, low 32 bits the offset of its n(p) coefficients.
-/// All other bits are 0.
-/// Coefficients c_ijk of a cell stand in lexicographic order of (i, j, k), i+j+k ≤ p, k fastest; they multiply plain
-/// Legendre polynomials L_i(u) L_j(v) L_k(w), local coordinates in [-1, 1], so that they are in units of length.
+/// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. A node is either
+///   internal: bit 63 is clear, the low 32 bits are the index of its first child (child number x + 2y + 4z); or
+///   a leaf:   bit 63 is set, bits 32..39 are the degree p, the low 32 bits the offset of its n(p) coefficients.
+/// All other bits are 0. The coefficients c_ijk of a leaf stand in lexicographic order of (i, j, k), i+j+k ≤ p, k
+/// fastest. They multiply the products L_i(u) L_j(v) L_k(w) of Legendre polynomials, which are not normalised, in local
+/// coordinates in [−1, 1]³, so that they are in units of length.
 struct FieldData {
   Box domain;
-  std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< base cells an axis
+  std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
   std::variant<std::vector<double>, std::vector<float>> coefficients;
-  /// Width of the zone along a leaf's faces, as a part of its edges, in which it is blended with its neighbours, so
-  /// that the field and its gradient are continuous; 0 to `kMaxBlend`. 0: leaves answer alone, and the field jumps.
+  /// Width of the zones along a leaf's faces in which it is blended with its neighbours, in edges of the leaf: 0, for
+  /// no blending, to `kMaxBlend`.
   double blend = 0;
-  std::vector<CellBound> bounds = {};  ///< by node, those of internal nodes 0; empty where they are not kept
+  std::vector<CellBound> bounds = {};  ///< by node, 0 for internal nodes; empty if the field has no bounds
   FieldMetadata metadata = {};
 };
 
-/// A node's bits, in one place.
+/// Packs and unpacks the bits of a node.
 namespace node {
 constexpr std::uint64_t kLeafBit = std::uint64_t{1} << 63;
 constexpr bool isLeaf(std::uint64_t n) { return (n & kLeafBit) != 0; }
@@ -84,26 +73,26 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// How far a leaf of a blended field goes beyond its sides, and as far within them its say grows to the whole: by so
-/// much of an edge of a cell of a certain depth as `FieldData::blend` says. The depth is that of the deepest leaf that
-/// touches the side, itself included, or `kWall` where the domain ends; 5 bits each.
+/// Blend extents of a leaf: how far its weight overlaps the neighbours across each face, and how far inside the face it
+/// grows to 1. Each extent is `FieldData::blend` edges of the deepest leaf that touches the face, the leaf itself
+/// included; 5 bits hold the depth of that leaf, or `kDomainFace` where the domain ends.
 namespace blend_extent {
-constexpr int kWall = 31;
+constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {
   return std::uint32_t(depth) << (10 * axis + (upper ? 5 : 0));
 }
-constexpr int depth(std::uint32_t reach, int axis, bool upper) {
-  return static_cast<int>(reach >> (10 * axis + (upper ? 5 : 0)) & 31);
+constexpr int depth(std::uint32_t extents, int axis, bool upper) {
+  return static_cast<int>(extents >> (10 * axis + (upper ? 5 : 0)) & 31);
 }
 }  // namespace blend_extent
 
 /// A leaf of the octree.
 struct Cell {
-  std::uint32_t id;  ///< its node's index: names the cell within its field
-  Box box;           ///< half-open but for rounding: [min, max)
+  std::uint32_t id;  ///< index of its node, which identifies the cell within its field
+  Box box;           ///< half-open [min, max) up to rounding
   int degree;
   int depth;     ///< 0 for a base cell
-  double error;  ///< ε_e: squared error that the top degree stands for, in units^5, without nearness (paper, eq. 6)
+  double error;  ///< embedded estimate ε_e of the squared L2 error, in units^5, without nearness (paper, eq. 6)
 };
 
 struct ValueAndGradient {

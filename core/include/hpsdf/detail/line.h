@@ -1,5 +1,5 @@
 #pragma once
-// A field along a segment: the leaves that it passes, and what each of them says there.
+// A field along a segment: the leaves that the segment crosses, and samples within each.
 
 #include <cstddef>
 #include <optional>
@@ -9,53 +9,55 @@
 
 namespace hpsdf {
 
-/// The part of a segment within one leaf, or one end of it outside of the domain.
+/// The part of a segment within one leaf, or a part outside the domain.
 struct Piece {
-  std::optional<Cell> cell;  ///< none outside of the domain
-  double tEnter, tLeave;     ///< along the segment: 0 at its first point, 1 at its last; tEnter < tLeave
+  std::optional<Cell> cell;  ///< empty outside the domain
+  double tEnter, tLeave;     ///< ends of the piece, 0 at the segment's start and 1 at its end; tEnter < tLeave
 };
 
-/// Cuts a segment at the faces that it crosses: pieces in order from 0 to 1, each beginning where the one before ends.
-/// Leaves are half-open: a segment along a face or an edge runs through those of greater coordinates. Through an edge
-/// or a corner it goes to the leaf on the other side at once; leaves that hold less than 1e-12 of it are left out,
-/// since rounding decides on them. Throws `Error` where the points are equal or not finite.
+/// Cuts a segment at the faces that it crosses. The pieces are in order from 0 to 1, and each begins where the one
+/// before it ends. Leaves are half-open, so that a segment along a face or an edge runs through the leaves of greater
+/// coordinates, and one through an edge or a corner continues in the opposite leaf. Leaves that hold less than 1e-12 of
+/// the segment are left out, because rounding decides about them. Throws `Error` if the points are equal or not finite.
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to);
 
-/// As `Field::valueAndGradient` answers for a point of this leaf; on its faces, the limits from within. Without
-/// blending it is the leaf's polynomial wherever x is.
+/// Evaluates the field at a point of a leaf; on the leaf's faces, the result is the limit from within the leaf. In a
+/// field without blending it is the leaf's polynomial at any x.
 ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x);
 
 struct LineSample {
-  double t;
-  std::size_t piece;  ///< its number
+  double t;           ///< position along the segment, 0 at its start and 1 at its end
+  std::size_t piece;  ///< index into `Line::pieces`
   Vector3 point;
   double value;
   Vector3 gradient;
 };
 
-/// Samples of a segment. Where two pieces meet there are two of one t, the limits from either side, so that jumps are
-/// steps.
+/// Samples of a field along a segment. Where two pieces meet, two samples with equal t hold the limits from both
+/// pieces, so that a plot shows jumps as steps.
 struct Line {
   Vector3 from, to;
   std::vector<Piece> pieces;
-  std::vector<LineSample> samples;  ///< t ascends
+  std::vector<LineSample> samples;  ///< in the order of t
 
-  double length() const { return (to - from).stableNorm(); }  // though its square may vanish or overflow
-  /// The gradient's component along the segment: the value's change per length.
+  /// Returns the segment's length, even if its square would vanish or overflow.
+  double length() const { return (to - from).stableNorm(); }
+  /// Returns the gradient's component along the segment.
   double slopeAlong(const LineSample& sample) const { return sample.gradient.dot(to - from) / length(); }
 };
 
-/// `count` ≥ 2 evenly spaced samples, the two ends among them, and both ends of every piece; within the domain from
-/// within the piece's own leaf, outside of it by the field's continuation. Throws as `piecesAlong` does.
+/// Samples a field at `count` ≥ 2 evenly spaced points, which include the segment's ends, and at both ends of every
+/// piece. Samples within the domain are limits from the piece's leaf, those outside use the field's continuation.
+/// Throws `Error` as `piecesAlong` does.
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count);
 
-/// A border between two leaves on a segment.
+/// The jump of f where a segment crosses from one leaf to the next.
 struct LineJump {
-  double t;
-  double value;  ///< f after it less f before
+  double t;      ///< position along the segment, 0 at its start and 1 at its end
+  double value;  ///< f after the crossing less f before it
 };
 
-/// At each border within the domain, in order.
+/// Returns the jumps at all crossings within the domain, in order.
 std::vector<LineJump> jumpsAlong(const Line& line);
 
 }  // namespace hpsdf

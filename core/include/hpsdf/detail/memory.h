@@ -1,19 +1,19 @@
 #pragma once
-// How much memory may be taken, before it is.
+// The memory that a process may take, tested before large arrays are made.
 
 #include <string>
 #include <string_view>
 
 namespace hpsdf {
 
-/// Three quarters of the machine's, or of what control groups (Linux) leave this process, in bytes.
+/// Three quarters of the machine's memory, or of what control groups (Linux) leave this process, in bytes.
 double allowedMemory();
 
-/// In the unit that suits, such as "8.40 MB".
+/// A number of bytes in the unit that suits it, such as "8.40 MB".
 std::string bytesText(double bytes);
 
-/// Throws `Error` where `what` ("a cloth of 1e6 nodes") would take more bytes than `allowedMemory`; `advice` says what
-/// to do then.
+/// Throws `Error` (limit) where `what`, such as "a cloth of 1e6 nodes", would take more bytes than `allowedMemory`. The
+/// message ends with `advice`, which says what the user can do.
 void requireMemory(const std::string& what, double bytes, std::string_view advice);
 
 }  // namespace hpsdf

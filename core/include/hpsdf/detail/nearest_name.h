@@ -12,13 +12,14 @@
 
 namespace hpsdf {
 
-/// The least number of letters to insert, drop, replace or swap with the next that turns `a` into `b`, no letter being
-/// touched twice; upper and lower case are alike.
+/// The least number of letters to insert, drop, replace or swap with the next one that turns `a` into `b`, where no
+/// letter is edited twice (the optimal string alignment distance). Upper and lower case are alike.
 inline std::size_t editDistance(std::string_view a, std::string_view b) {
   const auto same = [](char x, char y) {
     return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
   };
-  // row[j]: distance of the first i letters of a from the first j of b; before and twoBefore: for i - 1 and i - 2
+  // row[j] is the distance between the first i letters of a and the first j of b; `before` and `twoBefore` are the rows
+  // of i - 1 and i - 2.
   std::vector<std::size_t> twoBefore, before, row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 1; i <= a.size(); ++i) {
@@ -33,10 +34,9 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// The known name that was probably meant, for "did you mean" in messages; the first of equally near ones. Empty when
-/// nothing is near: a name is near when at most a third of the letters (at least one) differ, or when what was asked
-/// for is its beginning, three letters or more. Names of more than 64 letters are not compared: strangers' files have
-/// some without end.
+/// The known name that was probably meant, the first of equally near ones; empty when none is near. A name is near when
+/// at most a third of the letters (at least one) differ, or when `wanted` is its beginning of three letters or more.
+/// Names of more than 64 letters are not compared, because names in untrusted files can be very long.
 inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
   constexpr std::size_t kLongest = 64;
   std::string best;
@@ -53,6 +53,12 @@ inline std::string nearestName(std::string_view wanted, std::span<const std::str
     }
   }
   return best;
+}
+
+/// The end of a message about an unknown name: "did you mean 'NAME'?" where a known name is near, else `otherwise`.
+inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise) {
+  const std::string name = nearestName(wanted, known);
+  return name.empty() ? std::string(otherwise) : "did you mean '" + name + "'?";
 }
 
 }  // namespace hpsdf

@@ -8,38 +8,40 @@
 
 namespace hpsdf {
 
-/// A file that appears whole or not at all: written under a temporary name beside `file`, renamed by `commit`. Whatever
-/// happens before leaves an older file as it was; without `commit` the destructor removes the temporary one.
+/// A file that appears whole or not at all: it is written under a temporary name in the same folder, and `commit`
+/// renames it. An older file of that name stays as it was until then; without `commit` the destructor removes the
+/// temporary file.
 class OutputFile {
  public:
-  /// Throws `Error` when the folder does not exist or cannot be written, or when `file` names something that is not a
-  /// regular file.
+  /// Throws `Error` (file) when the folder does not exist or cannot be written, or when `file` names something that is
+  /// not a regular file.
   explicit OutputFile(const std::filesystem::path& file);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Appends; throws `Error` naming the file when the disk is full or failing.
+  /// Appends to the file. Throws `Error` (file) when the disk is full or fails.
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
 
-  /// Takes all that was written to the disk: what fails for want of space fails here at the latest. Throws as `write`.
+  /// Forces everything written so far onto the disk, so that a lack of space shows here at the latest. Throws as
+  /// `write` does.
   void flush();
 
   /// Flushes and renames; throws `Error` as `write` does. Nothing can be written afterwards.
   void commit();
 
-  /// Removes the temporary files of all that are not yet committed: for a signal handler that is about to end the
-  /// process. Does only what a signal handler may do.
+  /// Removes the temporary files of all `OutputFile`s that are not committed. A signal handler that is about to end the
+  /// process may call this: it makes async-signal-safe calls only.
   static void removeUnfinished() noexcept;
 
-  /// Whose temporary files beside a file are abandoned.
+  /// The processes whose temporary files `removeAbandoned` removes.
   enum class Writers {
-    killed,  ///< processes of this machine that are no more
-    others,  ///< all but this process: for who knows that nobody else is writing the file now
+    killed,  ///< processes of this machine that no longer run
+    others,  ///< all processes but this one; for a caller that holds the lock on the file
   };
 
-  /// Removes the temporary files that such writers left beside `file` when they wrote it.
+  /// Removes the temporary files that such writers of `file` left in its folder.
   static void removeAbandoned(const std::filesystem::path& file, Writers writers = Writers::killed);
 
  private:
@@ -50,7 +52,7 @@ class OutputFile {
   std::FILE* stream_ = nullptr;
 };
 
-/// Throws the `Error` that writing `file` would end with, as far as it can be told beforehand: before long work.
+/// Throws the `Error` that writing `file` would end with, as far as it is known beforehand. Call it before long work.
 void checkWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

@@ -7,11 +7,11 @@
 
 namespace hpsdf {
 
-/// Calls `work` in a TBB arena of its own, so that its parallel work uses at most so many threads; 0: all that the
-/// machine offers. What it throws is thrown.
+/// Calls `work` in a TBB arena of its own, which limits its parallel work to `threads` threads; 0 stands for all that
+/// the machine offers. An exception of `work` reaches the caller.
 void runWithThreads(int threads, const std::function<void()>& work);
 
-/// The same for work that returns something, or nothing.
+/// Calls `work` as `runWithThreads` does and returns its result.
 template <typename Work>
 std::invoke_result_t<Work&> withThreads(int threads, Work&& work) {
   using Result = std::invoke_result_t<Work&>;

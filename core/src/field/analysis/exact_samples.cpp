@@ -1,7 +1,5 @@
 #include "hpsdf/detail/exact_samples.h"
 
-// Seeded points with their exact distances.
-
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
@@ -19,12 +17,14 @@
 namespace hpsdf {
 namespace {
 
-constexpr std::size_t kBatch = 512;  // points handed to Φ at once
-/// Where a point takes more candidates than this, the rest is not to be had.
-constexpr std::size_t kMostCandidates = 1000;
+/// Number of points for which Φ is called at once.
+constexpr std::size_t kBatch = 512;
 
-/// Every third bit of a 64-bit number.
-std::uint64_t spread(std::uint64_t x) {
+/// Drawing gives up if a sample takes more candidates than this on average.
+constexpr std::size_t kMaxCandidates = 1000;
+
+/// Spreads the low 21 bits of a number to every third bit.
+std::uint64_t spreadBits(std::uint64_t x) {
   x &= 0x1fffff;
   x = (x | x << 32) & 0x1f00000000ffff;
   x = (x | x << 16) & 0x1f0000ff0000ff;
@@ -34,13 +34,14 @@ std::uint64_t spread(std::uint64_t x) {
   return x;
 }
 
-/// The order of points along a Morton curve through the domain: exact distances are fastest for neighbours.
-std::vector<std::uint32_t> orderAlongCurve(std::span<const Vector3> points, const Box& domain) {
+/// Returns the order of points along a Morton curve through the domain. Exact distances are fastest for points in this
+/// order, because consecutive points are close to each other.
+std::vector<std::uint32_t> mortonOrder(std::span<const Vector3> points, const Box& domain) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
   const Vector3 scale = domain.sizes().cwiseInverse() * double(1 << 21);
   tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
     const Vector3 at = (points[n] - domain.min()).cwiseProduct(scale).cwiseMax(0).cwiseMin((1 << 21) - 1);
-    const auto bits = [&](int axis) { return spread(static_cast<std::uint64_t>(at[axis])) << axis; };
+    const auto bits = [&](int axis) { return spreadBits(static_cast<std::uint64_t>(at[axis])) << axis; };
     keys[n] = {bits(0) | bits(1) | bits(2), static_cast<std::uint32_t>(n)};
   });
   tbb::parallel_sort(keys.begin(), keys.end());
@@ -50,25 +51,25 @@ std::vector<std::uint32_t> orderAlongCurve(std::span<const Vector3> points, cons
 }
 
 template <typename T>
-std::vector<T> arranged(const std::vector<T>& items, const std::vector<std::uint32_t>& order) {
+std::vector<T> permuted(const std::vector<T>& items, const std::vector<std::uint32_t>& order) {
   std::vector<T> result(items.size());
   for (std::size_t n = 0; n < items.size(); ++n) result[n] = items[order[n]];
   return result;
 }
 
-/// Φ at points in any order.
+/// Computes Φ at points in any order. Throws `Error` if it is not finite.
 std::vector<double> distancesAt(const DistanceFunction& distance, const std::vector<Vector3>& points, const Box& domain,
                                 const Progress& progress) {
-  const std::vector<std::uint32_t> order = orderAlongCurve(points, domain);
+  const std::vector<std::uint32_t> order = mortonOrder(points, domain);
   std::vector<double> distances(points.size());
-  const auto take = [&](std::size_t, std::size_t first, std::size_t count) {
+  const auto computeChunk = [&](std::size_t, std::size_t first, std::size_t count) {
     std::array<Vector3, kBatch> at;
     std::array<double, kBatch> found;
     for (std::size_t n = 0; n < count; ++n) at[n] = points[order[first + n]];
     distance(std::span(at).first(count), std::span(found).first(count));
     for (std::size_t n = 0; n < count; ++n) distances[order[first + n]] = found[n];
   };
-  forEachChunk(points.size(), kBatch, progress, "taking exact distances", take);
+  detail::forEachChunk(points.size(), kBatch, progress, "taking exact distances", computeChunk);
   for (std::size_t n = 0; n < points.size(); ++n) {
     if (std::isfinite(distances[n])) continue;
     std::ostringstream where;
@@ -79,14 +80,15 @@ std::vector<double> distancesAt(const DistanceFunction& distance, const std::vec
   return distances;
 }
 
-/// The first `count` candidates that lie in the domain and in the band; `draw(n)` is the n-th.
+/// Draws candidates draw(0), draw(1), … until `options.count` of them lie in the domain and, if `band` is above 0, in
+/// the band. Throws `Error` with `noneMessage` if hardly any does.
 template <typename Draw>
 ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, double band, const SampleOptions& options,
                          const Progress& progress, const std::string& noneMessage, const Draw& draw) {
   if (options.count >= std::size_t{1} << 32) throw Error("too many points; give fewer than 4,294,967,296");
   ExactSamples samples;
   for (std::size_t drawn = 0; samples.points.size() < options.count;) {
-    if (drawn > kMostCandidates * (samples.points.size() + 1)) throw Error(noneMessage);
+    if (drawn > kMaxCandidates * (samples.points.size() + 1)) throw Error(noneMessage);
     const std::size_t missing = options.count - samples.points.size();
     std::vector<Vector3> round(drawn == 0 ? missing : 2 * missing);
     tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t n) { round[n] = draw(drawn + n); });
@@ -99,13 +101,13 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
       samples.distances.push_back(distances[n]);
     }
   }
-  const std::vector<std::uint32_t> order = orderAlongCurve(samples.points, domain);
-  return {arranged(samples.points, order), arranged(samples.distances, order)};
+  const std::vector<std::uint32_t> order = mortonOrder(samples.points, domain);
+  return {permuted(samples.points, order), permuted(samples.distances, order)};
 }
 
-/// The blocks of a regular division of the domain that the band may reach, Φ being 1-Lipschitz.
+/// Divides the domain into blocks and returns those that may intersect the band, because Φ is 1-Lipschitz.
 std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domain, double band) {
-  constexpr int kBlocks = 32;  // an axis
+  constexpr int kBlocks = 32;  // along each axis
   const Vector3 size = domain.sizes() / kBlocks;
   std::vector<Box> blocks;
   std::vector<Vector3> centers;
@@ -117,29 +119,30 @@ std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domai
         centers.push_back(blocks.back().center());
       }
   const std::vector<double> distances = distancesAt(distance, centers, domain, {});
-  std::vector<Box> reached;
+  std::vector<Box> inBand;
   for (std::size_t n = 0; n < blocks.size(); ++n)
-    if (std::abs(distances[n]) <= band + size.norm() / 2) reached.push_back(blocks[n]);
-  return reached;
+    if (std::abs(distances[n]) <= band + size.norm() / 2) inBand.push_back(blocks[n]);
+  return inBand;
 }
 
-/// Points on a surface, uniform by area.
+/// Draws points on a surface, uniformly by area.
 class SurfacePoints {
  public:
   explicit SurfacePoints(const TriangleMesh& mesh) : mesh_(mesh) {
-    areas_.reserve(mesh.triangles.size());
+    cumulativeAreas_.reserve(mesh.triangles.size());
     double area = 0;
     for (const auto& [a, b, c] : mesh.triangles) {
       const Vector3& p = mesh.vertices[a];
       area += (mesh.vertices[b] - p).cross(mesh.vertices[c] - p).norm() / 2;
-      areas_.push_back(area);
+      cumulativeAreas_.push_back(area);
     }
-    if (!(area > 0)) throw Error("points near the surface: the surface has no area");
+    if (!(area > 0)) throw Error("points near the surface: the surface has no area; give a mesh with faces");
   }
 
-  Vector3 draw(Random& random) const {
-    const auto found = std::upper_bound(areas_.begin(), areas_.end(), random.unit() * areas_.back());
-    const std::size_t triangle = std::min(std::size_t(found - areas_.begin()), areas_.size() - 1);
+  Vector3 draw(detail::Random& random) const {
+    const auto found =
+        std::upper_bound(cumulativeAreas_.begin(), cumulativeAreas_.end(), random.unit() * cumulativeAreas_.back());
+    const std::size_t triangle = std::min(std::size_t(found - cumulativeAreas_.begin()), cumulativeAreas_.size() - 1);
     const auto& [a, b, c] = mesh_.triangles[triangle];
     const double side = std::sqrt(random.unit()), along = random.unit();
     return (1 - side) * mesh_.vertices[a] + side * (1 - along) * mesh_.vertices[b] + side * along * mesh_.vertices[c];
@@ -147,22 +150,22 @@ class SurfacePoints {
 
  private:
   const TriangleMesh& mesh_;
-  std::vector<double> areas_;  // of the triangles up to each
+  std::vector<double> cumulativeAreas_;  ///< total area of the triangles up to each
 };
 
 }  // namespace
 
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band,
                            const SampleOptions& options, const Progress& progress) {
-  const std::string none = "hardly any point of the domain was found within the band; give a wider one";
+  const std::string noneMessage = "hardly any point of the domain was found within the band; give a wider one";
   return withThreads(options.threads, [&] {
     if (!(band > 0))
-      return drawSamples(distance, domain, band, options, progress, none,
-                         [&](std::uint64_t n) { return Random(options.seed, n).inBox(domain); });
+      return drawSamples(distance, domain, band, options, progress, noneMessage,
+                         [&](std::uint64_t n) { return detail::Random(options.seed, n).inBox(domain); });
     const std::vector<Box> blocks = blocksInBand(distance, domain, band);
-    if (blocks.empty()) throw Error(none);
-    return drawSamples(distance, domain, band, options, progress, none, [&](std::uint64_t n) {
-      Random random(options.seed, n);
+    if (blocks.empty()) throw Error(noneMessage);
+    return drawSamples(distance, domain, band, options, progress, noneMessage, [&](std::uint64_t n) {
+      detail::Random random(options.seed, n);
       const double block = random.unit() * static_cast<double>(blocks.size());
       return random.inBox(blocks[static_cast<std::size_t>(block)]);
     });
@@ -177,7 +180,7 @@ ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& su
         distance, domain, 0, options, progress,
         "hardly any point near the surface lies in the domain: it misses the surface, or near means too far",
         [&](std::uint64_t n) {
-          Random random(options.seed, n);
+          detail::Random random(options.seed, n);
           const Vector3 onSurface = points.draw(random);
           return Vector3(onSurface + random.inBall(radius));
         });

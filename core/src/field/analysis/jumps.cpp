@@ -15,16 +15,19 @@
 #include "util/chunks.h"
 
 namespace hpsdf {
+
+using namespace query;
+
 namespace {
 
-/// Where a face is sampled along either of its sides, in [-1, 1]: the points of a Gauss rule and, with weight 0, the
-/// ends, so that the product of two such holds inner points, edges and corners.
+/// Sample coordinates along one side of a face, in [−1, 1]: the points of a Gauss rule, and the ends with weight 0. The
+/// product of two such lists samples the inside, the edges and the corners of a face.
 struct Samples {
   std::vector<double> points, weights;
 
-  /// Exact for the square of a polynomial of this degree.
+  /// Makes samples that integrate the square of a polynomial of this degree exactly.
   explicit Samples(int degree) {
-    const QuadratureRule rule = gaussLegendre(degree + 1);
+    const basis::QuadratureRule rule = basis::gaussLegendre(degree + 1);
     points = {-1, 1};
     weights = {0, 0};
     points.insert(points.end() - 1, rule.points.begin(), rule.points.end());
@@ -32,13 +35,16 @@ struct Samples {
   }
 };
 
-/// Values and gradients at the product of two lists of points on a plane across a cell.
-class Sheet {
+/// The axes along a face across `axis`: those that follow `axis` cyclically.
+constexpr std::array<int, 2> axesAlong(int axis) { return {(axis + 1) % 3, (axis + 2) % 3}; }
+
+/// The trace of a leaf's field on a face: values and world gradients at the product of two lists of sample coordinates,
+/// of which the second is fastest.
+class FaceTrace {
  public:
   const double* value() const { return out_[0].data(); }
   const double* derivative(int axis) const { return out_[1 + axis].data(); }
 
-  /// Room for so many numbers of each kind, to be filled by `set`.
   void resize(std::size_t size) {
     for (auto& out : out_) out.resize(size);
   }
@@ -47,23 +53,39 @@ class Sheet {
     for (int axis = 0; axis < 3; ++axis) out_[1 + axis][at] = result.gradient[axis];
   }
 
-  /// The plane lies across `axis` at the local coordinate t; `along` are local coordinates along the axes that follow
-  /// it cyclically, the second fastest. Derivatives by local coordinates times `toWorld` are by the world's.
+  /// Evaluates a polynomial on the plane across `axis` at the local coordinate t. `along` holds the samples' local
+  /// coordinates along `axesAlong(axis)`. `toWorld` converts derivatives from local coordinates to the world.
   template <typename T>
   void evaluate(const T* coefficients, int degree, int axis, double t, const std::array<std::vector<double>, 2>& along,
                 const Vector3& toWorld) {
-    const int n = degree + 1;
+    tabulateBasis(degree, along);
+    restrictToPlane(coefficients, degree, axis, t);
     const std::size_t size[2] = {along[0].size(), along[1].size()};
-    double across[kMaxDegree + 1], acrossSlope[kMaxDegree + 1];
-    legendreValuesAndDerivatives(t, degree, across, acrossSlope);
-    for (int side = 0; side < 2; ++side) {
-      basis_[side].resize(size[side] * n);
-      slope_[side].resize(size[side] * n);
-      for (std::size_t s = 0; s < size[side]; ++s)
-        legendreValuesAndDerivatives(along[side][s], degree, &basis_[side][s * n], &slope_[side][s * n]);
+    resize(size[0] * size[1]);
+    for (std::size_t s1 = 0; s1 < size[1]; ++s1) {
+      restrictToLine(degree, s1);
+      for (std::size_t s0 = 0; s0 < size[0]; ++s0) evaluatePoint(degree, axis, s0, s0 * size[1] + s1, toWorld);
     }
+  }
 
-    // a polynomial of the plane's two coordinates, and that of its derivative across
+ private:
+  /// Evaluates the Legendre polynomials at all samples.
+  void tabulateBasis(int degree, const std::array<std::vector<double>, 2>& along) {
+    const int n = degree + 1;
+    for (int side = 0; side < 2; ++side) {
+      basis_[side].resize(along[side].size() * n);
+      slope_[side].resize(along[side].size() * n);
+      for (std::size_t s = 0; s < along[side].size(); ++s)
+        basis::legendreValuesAndDerivatives(along[side][s], degree, &basis_[side][s * n], &slope_[side][s * n]);
+    }
+  }
+
+  /// Computes the coefficients of the polynomial and of its derivative across the plane, in the plane's coordinates.
+  template <typename T>
+  void restrictToPlane(const T* coefficients, int degree, int axis, double t) {
+    const int n = degree + 1;
+    double across[kMaxDegree + 1], acrossSlope[kMaxDegree + 1];
+    basis::legendreValuesAndDerivatives(t, degree, across, acrossSlope);
     plane_.assign(2 * n * n, 0);
     std::array<int, 3> index;
     for (index[0] = 0; index[0] < n; ++index[0])
@@ -74,162 +96,186 @@ class Sheet {
           at[0] += c * across[index[axis]];
           at[1] += c * acrossSlope[index[axis]];
         }
+  }
 
-    resize(size[0] * size[1]);
-    for (std::size_t s1 = 0; s1 < size[1]; ++s1) {
-      struct Line {
-        double value = 0, across = 0, along = 0;
-      };
-      std::array<Line, kMaxDegree + 1> line;  // by the first coordinate's degree
-      for (int i = 0; i < n; ++i) {
-        line[i] = {};
-        for (int j = 0; i + j < n; ++j) {
-          const double* c = &plane_[2 * (i * n + j)];
-          line[i].value += c[0] * basis_[1][s1 * n + j];
-          line[i].across += c[1] * basis_[1][s1 * n + j];
-          line[i].along += c[0] * slope_[1][s1 * n + j];
-        }
-      }
-      for (std::size_t s0 = 0; s0 < size[0]; ++s0) {
-        double value = 0, d0 = 0, d1 = 0, dAcross = 0;
-        for (int i = 0; i < n; ++i) {
-          const double b = basis_[0][s0 * n + i];
-          value += b * line[i].value;
-          dAcross += b * line[i].across;
-          d0 += slope_[0][s0 * n + i] * line[i].value;
-          d1 += b * line[i].along;
-        }
-        const std::size_t at = s0 * size[1] + s1;
-        out_[0][at] = value;
-        const auto derivative = [&](int a, double d) { out_[1 + a % 3][at] = d * toWorld[a % 3]; };
-        derivative(axis, dAcross);
-        derivative(axis + 1, d0);
-        derivative(axis + 2, d1);
+  /// Computes the coefficients on the line through sample s1 of the second axis.
+  void restrictToLine(int degree, std::size_t s1) {
+    const int n = degree + 1;
+    for (int i = 0; i < n; ++i) {
+      line_[i] = {};
+      for (int j = 0; i + j < n; ++j) {
+        const double* c = &plane_[2 * (i * n + j)];
+        line_[i].value += c[0] * basis_[1][s1 * n + j];
+        line_[i].across += c[1] * basis_[1][s1 * n + j];
+        line_[i].along += c[0] * slope_[1][s1 * n + j];
       }
     }
   }
 
- private:
-  std::array<std::vector<double>, 2> basis_, slope_;
-  std::vector<double> plane_;
-  std::array<std::vector<double>, 4> out_;
+  /// Evaluates sample s0 of the first axis on the line.
+  void evaluatePoint(int degree, int axis, std::size_t s0, std::size_t at, const Vector3& toWorld) {
+    const int n = degree + 1;
+    double value = 0, d0 = 0, d1 = 0, dAcross = 0;
+    for (int i = 0; i < n; ++i) {
+      const double b = basis_[0][s0 * n + i];
+      value += b * line_[i].value;
+      dAcross += b * line_[i].across;
+      d0 += slope_[0][s0 * n + i] * line_[i].value;
+      d1 += b * line_[i].along;
+    }
+    out_[0][at] = value;
+    const auto derivative = [&](int a, double d) { out_[1 + a % 3][at] = d * toWorld[a % 3]; };
+    derivative(axis, dAcross);
+    derivative(axis + 1, d0);
+    derivative(axis + 2, d1);
+  }
+
+  /// Coefficients on a line: of the polynomial and of its derivatives across the plane and along the second axis.
+  struct LineCoefficients {
+    double value = 0, across = 0, along = 0;
+  };
+
+  std::array<std::vector<double>, 2> basis_, slope_;   ///< L_i and L_i' at the samples of each axis
+  std::vector<double> plane_;                          ///< pairs of coefficients, of the value and of the derivative
+  std::array<LineCoefficients, kMaxDegree + 1> line_;  ///< by degree along the first axis
+  std::array<std::vector<double>, 4> out_;             ///< value, then derivatives
 };
 
-/// One thread's measure of faces.
+/// Measures the jumps on faces; each thread needs its own.
 class FaceMeter {
  public:
   FaceMeter(const Field& field, std::span<const Samples> samples)
-      : whole_(field), field_(field.data()), samples_(samples) {}
+      : field_(field), data_(field.data()), samplesOfDegree_(samples) {}
 
-  /// The face of `small` across `axis` towards `step`, shared with `large`.
-  Interface measure(const Leaf& small, const Leaf& large, int axis, int step) {
-    const std::array<const Leaf*, 2> sides = {step > 0 ? &small : &large, step > 0 ? &large : &small};
+  /// Appends the interfaces that a leaf shares with larger leaves, and with equal ones at its upper faces, so that each
+  /// interface is measured once.
+  void measureLeaf(const OctreeNode& leaf, std::vector<Interface>& faces) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int step : {-1, 1})
+        if (const auto neighbour = equalOrLargerFaceNeighbour(data_, leaf, axis, step))
+          if (neighbour->depth < leaf.depth || step > 0) faces.push_back(measure(leaf, *neighbour, axis, step));
+  }
+
+ private:
+  /// Measures the face of `small` at its lower (step −1) or upper (step 1) end along `axis`, beyond which `large` lies.
+  Interface measure(const OctreeNode& small, const OctreeNode& large, int axis, int step) {
+    const std::array<const OctreeNode*, 2> sides = {step > 0 ? &small : &large, step > 0 ? &large : &small};
     Interface face;
     face.axis = axis;
     for (int side = 0; side < 2; ++side) {
       face.cells[side] = sides[side]->node;
-      face.degrees[side] = static_cast<std::uint8_t>(node::degree(field_.nodes[sides[side]->node]));
+      face.degrees[side] = static_cast<std::uint8_t>(node::degree(data_.nodes[sides[side]->node]));
       face.depths[side] = static_cast<std::uint8_t>(sides[side]->depth);
     }
-    const Samples& samples = samples_[std::max(face.degrees[0], face.degrees[1])];
-    for (int side = 0; side < 2; ++side) {
-      if (field_.blend > 0)
-        sampleBlended(sheets_[side], *sides[side], small, axis, step, samples);
-      else
-        sample(sheets_[side], *sides[side], small, axis, side == 0 ? 1 : -1, samples);
-    }
 
-    const Vector3 size = cellSize(field_, small.depth);
-    const int axis0 = (axis + 1) % 3, axis1 = (axis + 2) % 3;
+    // Compute the traces from both leaves.
+    const Samples& samples = samplesOfDegree_[std::max(face.degrees[0], face.degrees[1])];
+    for (int side = 0; side < 2; ++side) {
+      if (data_.blend > 0)
+        traceBlended(traces_[side], *sides[side], small, axis, step, samples);
+      else
+        tracePolynomial(traces_[side], *sides[side], small, axis, side == 0 ? 1 : -1, samples);
+    }
+    const std::size_t worst = compareTraces(samples, face);
+
+    // Locate the face and its worst sample.
+    const Vector3 size = cellSize(data_, small.depth);
+    const auto [axis0, axis1] = axesAlong(axis);
     face.area = size[axis0] * size[axis1];
+    std::array<double, 3> local{};
+    local[axis] = step;
+    face.center = worldAt(small, local);
+    if (face.value.max > 0) {
+      local[axis0] = samples.points[worst / samples.points.size()];
+      local[axis1] = samples.points[worst % samples.points.size()];
+    }
+    face.worst = worldAt(small, local);
+    return face;
+  }
+
+  /// Sets the jumps of a face from both traces. Returns the sample at which the value jumps most.
+  std::size_t compareTraces(const Samples& samples, Interface& face) const {
     const std::size_t n = samples.points.size();
     std::size_t worst = 0;
-    double valueSquares = 0, gradientSquares = 0, greatestGradientSquare = 0;
+    double valueSquares = 0, gradientSquares = 0, maxGradientSquare = 0;
     for (std::size_t at = 0; at < n * n; ++at) {
-      const double jump = std::abs(sheets_[1].value()[at] - sheets_[0].value()[at]);
+      const double jump = std::abs(traces_[1].value()[at] - traces_[0].value()[at]);
       double gradientSquare = 0;
       for (int a = 0; a < 3; ++a) {
-        const double difference = sheets_[1].derivative(a)[at] - sheets_[0].derivative(a)[at];
+        const double difference = traces_[1].derivative(a)[at] - traces_[0].derivative(a)[at];
         gradientSquare += difference * difference;
       }
       const double weight = samples.weights[at / n] * samples.weights[at % n] / 4;
       valueSquares += weight * jump * jump;
       gradientSquares += weight * gradientSquare;
-      greatestGradientSquare = std::max(greatestGradientSquare, gradientSquare);
+      maxGradientSquare = std::max(maxGradientSquare, gradientSquare);
       if (jump > face.value.max) {
         face.value.max = jump;
         worst = at;
       }
     }
     face.value.rms = std::sqrt(valueSquares);
-    face.gradient = {std::sqrt(gradientSquares), std::sqrt(greatestGradientSquare)};
-
-    std::array<double, 3> local{};
-    local[axis] = step;
-    face.center = worldAt(small, local);
-    if (face.value.max > 0) {
-      local[axis0] = samples.points[worst / n];
-      local[axis1] = samples.points[worst % n];
-    }
-    face.worst = worldAt(small, local);
-    return face;
+    face.gradient = {std::sqrt(gradientSquares), std::sqrt(maxGradientSquare)};
+    return worst;
   }
 
- private:
-  /// `leaf`'s polynomial at the samples on `small`'s face, which lies in the leaf at the local coordinate t.
-  void sample(Sheet& sheet, const Leaf& leaf, const Leaf& small, int axis, double t, const Samples& samples) {
+  /// Evaluates a leaf's polynomial at the samples of a face of `small`, which has the local coordinate t in the leaf.
+  void tracePolynomial(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, double t,
+                       const Samples& samples) {
     const int levels = small.depth - leaf.depth;
     const double scale = std::ldexp(1.0, -levels);
     for (int side = 0; side < 2; ++side) {
-      const int along = (axis + 1 + side) % 3;
-      const auto offset = static_cast<double>(small.place[along] - (leaf.place[along] << levels));
+      const int along = axesAlong(axis)[side];
+      const auto offset = static_cast<double>(small.cellIndex[along] - (leaf.cellIndex[along] << levels));
       along_[side] = samples.points;
       if (levels > 0)
         for (double& u : along_[side]) u = (2 * offset + u + 1) * scale - 1;
     }
-    const std::uint64_t bits = field_.nodes[leaf.node];
-    const Vector3 toWorld = 2 * cellSize(field_, leaf.depth).cwiseInverse();
+    const std::uint64_t bits = data_.nodes[leaf.node];
+    const Vector3 toWorld = 2 * cellSize(data_, leaf.depth).cwiseInverse();
     std::visit(
         [&](const auto& c) {
-          sheet.evaluate(c.data() + node::offset(bits), node::degree(bits), axis, t, along_, toWorld);
+          trace.evaluate(c.data() + node::offset(bits), node::degree(bits), axis, t, along_, toWorld);
         },
-        field_.coefficients);
+        data_.coefficients);
   }
 
-  /// The limits from within `leaf` at the samples on `small`'s face across `axis` towards `step`.
-  void sampleBlended(Sheet& sheet, const Leaf& leaf, const Leaf& small, int axis, int step, const Samples& samples) {
+  /// Evaluates the blended field's limits from within `leaf` at the samples of a face of `small`.
+  void traceBlended(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, int step,
+                    const Samples& samples) {
     const std::size_t n = samples.points.size();
-    sheet.resize(n * n);
+    trace.resize(n * n);
     std::array<double, 3> local{};
     local[axis] = step;
     for (std::size_t at = 0; at < n * n; ++at) {
       local[(axis + 1) % 3] = samples.points[at / n];
       local[(axis + 2) % 3] = samples.points[at % n];
-      const std::array<double, 3> coordinates = gridAt(small, local);
-      const FoundLeaf found = leafWithin(field_.nodes[leaf.node], leaf.depth, leaf.node, leaf.place, coordinates);
-      sheet.set(at, answerWithin<ValueAndGradient>(field_, whole_.lookupGrid(), coordinates, found));
+      const std::array<double, 3> coordinates = gridCoordinatesAt(small, local);
+      const LeafPoint point = leafPoint(data_.nodes[leaf.node], leaf.depth, leaf.node, leaf.cellIndex, coordinates);
+      trace.set(at, evaluateInLeaf<ValueAndGradient>(data_, field_.lookupGrid(), coordinates, point));
     }
   }
 
-  static std::array<double, 3> gridAt(const Leaf& leaf, const std::array<double, 3>& local) {
+  static std::array<double, 3> gridCoordinatesAt(const OctreeNode& leaf, const std::array<double, 3>& local) {
     std::array<double, 3> coordinates;
     for (int axis = 0; axis < 3; ++axis)
-      coordinates[axis] = std::ldexp(static_cast<double>(leaf.place[axis]) + (local[axis] + 1) / 2, -leaf.depth);
+      coordinates[axis] = std::ldexp(static_cast<double>(leaf.cellIndex[axis]) + (local[axis] + 1) / 2, -leaf.depth);
     return coordinates;
   }
 
-  Vector3 worldAt(const Leaf& leaf, const std::array<double, 3>& local) const {
-    return worldPoint(whole_.lookupGrid().frame, gridAt(leaf, local));
+  Vector3 worldAt(const OctreeNode& leaf, const std::array<double, 3>& local) const {
+    return worldPoint(field_.lookupGrid().frame, gridCoordinatesAt(leaf, local));
   }
 
-  const Field& whole_;
-  const FieldData& field_;
-  std::span<const Samples> samples_;
-  std::array<Sheet, 2> sheets_;
-  std::array<std::vector<double>, 2> along_;
+  const Field& field_;
+  const FieldData& data_;
+  std::span<const Samples> samplesOfDegree_;
+  std::array<FaceTrace, 2> traces_;           ///< of the leaf on the lower and on the upper side
+  std::array<std::vector<double>, 2> along_;  ///< local coordinates of the samples along the face
 };
 
-void sumUp(Jumps& jumps) {
+/// Computes the totals over all interfaces.
+void computeTotals(Jumps& jumps) {
   double valueSquares = 0, gradientSquares = 0;
   for (const Interface& face : jumps.interfaces) {
     jumps.hanging += face.hanging();
@@ -249,25 +295,20 @@ void sumUp(Jumps& jumps) {
 
 Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   const FieldData& data = field.data();
-  const std::vector<Leaf> leaves = leavesOf(data);
-  int highest = 0;
-  for (const Leaf& leaf : leaves) highest = std::max(highest, node::degree(data.nodes[leaf.node]));
+  const std::vector<OctreeNode> leaves = allLeaves(data);
+  int maxDegree = 0;
+  for (const OctreeNode& leaf : leaves) maxDegree = std::max(maxDegree, node::degree(data.nodes[leaf.node]));
   std::vector<Samples> samples;
-  for (int degree = 0; degree <= highest; ++degree) samples.emplace_back(degree);
+  for (int degree = 0; degree <= maxDegree; ++degree) samples.emplace_back(degree);
 
   constexpr std::size_t kChunk = 256;
-  std::vector<std::vector<Interface>> found(chunksOf(leaves.size(), kChunk));
+  std::vector<std::vector<Interface>> found(detail::chunksOf(leaves.size(), kChunk));
   withThreads(threads, [&] {
     const auto measure = [&](std::size_t chunk, std::size_t first, std::size_t count) {
       FaceMeter meter(field, samples);
-      for (std::size_t n = first; n < first + count; ++n)
-        for (int axis = 0; axis < 3; ++axis)
-          for (const int step : {-1, 1})
-            if (const auto beside = notSmallerBeside(data, leaves[n], axis, step))
-              if (beside->depth < leaves[n].depth || step > 0)
-                found[chunk].push_back(meter.measure(leaves[n], *beside, axis, step));
+      for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves[n], found[chunk]);
     };
-    forEachChunk(leaves.size(), kChunk, progress, "measuring jumps", measure);
+    detail::forEachChunk(leaves.size(), kChunk, progress, "measuring jumps", measure);
   });
 
   Jumps jumps;
@@ -278,7 +319,7 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
     jumps.interfaces.insert(jumps.interfaces.end(), faces.begin(), faces.end());
     faces = {};
   }
-  sumUp(jumps);
+  computeTotals(jumps);
   return jumps;
 }
 

@@ -13,35 +13,31 @@
 namespace hpsdf {
 namespace {
 
-constexpr double kShortest = 1e-12;  // of a segment: what is shorter is rounding
+/// The shortest piece, in parts of the segment. Shorter pieces are rounding errors.
+constexpr double kShortest = 1e-12;
 
-/// A coordinate along the segment, in cells of the greatest depth, whose faces are the whole numbers. Every leaf at a
-/// face takes the same `when` for it, and faces farther on never come earlier.
+/// One coordinate along a segment, in cells of the greatest depth, whose faces lie at integers. All leaves at a face
+/// compute the same t for it, and faces farther along the segment never get a smaller t.
 struct Axis {
-  double start = 0, speed = 0;
+  double start = 0, speed = 0;  ///< coordinate at t = 0 and its change over the whole segment
   std::int64_t cells = 0;
 
-  double at(double t) const { return start + t * speed; }
-  double when(std::int64_t face) const { return (static_cast<double>(face) - start) / speed; }
+  double coordinate(double t) const { return start + t * speed; }
+  double tAtFace(std::int64_t face) const { return (static_cast<double>(face) - start) / speed; }
 };
 using Axes = std::array<Axis, 3>;
-using Place = std::array<std::int64_t, 3>;
 
-std::int64_t cellWithin(double coordinate, std::int64_t first, std::int64_t last) {
+std::int64_t clampedCell(double coordinate, std::int64_t first, std::int64_t last) {
   return static_cast<std::int64_t>(
       std::clamp(std::floor(coordinate), static_cast<double>(first), static_cast<double>(last)));
 }
 
-double gridCoordinate(const GridFrame& frame, int axis, double x) {
-  return ((x - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
-}
-
-Axes axesOf(const GridFrame& frame, const Vector3& from, const Vector3& to) {
-  constexpr auto kOne = static_cast<double>(std::int64_t{1} << kMaxDepth);
+Axes segmentAxes(const GridFrame& frame, const Vector3& from, const Vector3& to) {
+  constexpr auto kOne = static_cast<double>(query::kFixedPointOne);
   Axes axes;
   for (int a = 0; a < 3; ++a) {
-    axes[a].start = gridCoordinate(frame, a, from[a]) * kOne;
-    axes[a].speed = gridCoordinate(frame, a, to[a]) * kOne - axes[a].start;
+    axes[a].start = query::gridCoordinate(frame, a, from[a]) * kOne;
+    axes[a].speed = query::gridCoordinate(frame, a, to[a]) * kOne - axes[a].start;
     axes[a].cells = frame.last[a] + 1;
     if (!std::isfinite(axes[a].start) || !std::isfinite(axes[a].speed))
       throw Error("a segment's ends must be finite, and not too far from the field: give other points");
@@ -49,67 +45,74 @@ Axes axesOf(const GridFrame& frame, const Vector3& from, const Vector3& to) {
   return axes;
 }
 
+/// A range of t.
 struct Span {
   double first, last;
 };
 
-/// The part within the domain, if there is any.
-std::optional<Span> spanWithin(const Axes& axes) {
+/// Returns the part of the segment within the domain, if there is any.
+std::optional<Span> clipToDomain(const Axes& axes) {
   Span span{0, 1};
   for (const Axis& axis : axes) {
     if (axis.speed == 0) {
       if (axis.start < 0 || axis.start > static_cast<double>(axis.cells)) return {};
       continue;
     }
-    const auto [enter, leave] = std::minmax({axis.when(0), axis.when(axis.cells)});
+    const auto [enter, leave] = std::minmax({axis.tAtFace(0), axis.tAtFace(axis.cells)});
     span = {std::max(span.first, enter), std::min(span.last, leave)};
   }
   if (!(span.last - span.first > kShortest)) return {};
   return span;
 }
 
-/// As `gridPoint` makes it of a point.
-GridPoint pointIn(const Place& place) {
-  GridPoint point{};
-  point.fixed = place;
-  for (int a = 0; a < 3; ++a) point.path |= pathAlong(a, place[a]);
-  return point;
+/// Returns the width of the leaf that holds a cell of the greatest depth, in such cells.
+std::int64_t leafWidth(const Field& field, const query::CellIndex& cell) {
+  query::GridPoint point{{}, cell, 0};
+  for (int a = 0; a < 3; ++a) point.path |= query::pathBits(a, cell[a]);
+  return std::int64_t{1} << (kMaxDepth - query::findLeafNode(field.data(), point).depth);
 }
 
-Vector3 centerOf(const GridFrame& frame, const Place& corner, std::int64_t width) {
+Vector3 centerOf(const GridFrame& frame, const query::CellIndex& corner, std::int64_t width) {
   std::array<double, 3> center;
   for (int a = 0; a < 3; ++a)
     center[a] = std::ldexp(static_cast<double>(corner[a]) + 0.5 * static_cast<double>(width), -kMaxDepth);
-  return worldPoint(frame, center);
+  return query::worldPoint(frame, center);
 }
 
-/// From leaf to leaf. Each step goes on along one axis at least and along none back, whatever is rounded: so it ends,
-/// and no leaf comes twice.
+/// Returns the t of the face through which a segment leaves a leaf along one axis.
+double tAtExit(const Axis& axis, std::int64_t corner, std::int64_t width) {
+  if (axis.speed > 0) return axis.tAtFace(corner + width);
+  return axis.speed < 0 ? axis.tAtFace(corner) : std::numeric_limits<double>::infinity();
+}
+
+/// Walks from leaf to leaf. Each step advances along at least one axis and goes back along none, whatever is rounded,
+/// so that the walk ends and visits no leaf twice. Cells are those of the greatest depth.
 std::vector<Piece> walk(const Field& field, const GridFrame& frame, const Axes& axes, const Span& span) {
   std::vector<Piece> pieces;
-  Place place, corner;
-  for (int a = 0; a < 3; ++a) place[a] = cellWithin(axes[a].at(span.first), 0, frame.last[a]);
+  query::CellIndex cell, corner;
+  for (int a = 0; a < 3; ++a) cell[a] = clampedCell(axes[a].coordinate(span.first), 0, frame.last[a]);
   for (double t = span.first;;) {
-    const std::int64_t width = std::int64_t{1} << (kMaxDepth - locate(field.data(), pointIn(place)).depth);
-    std::array<double, 3> leave;
+    // Find where the segment leaves the leaf.
+    const std::int64_t width = leafWidth(field, cell);
+    std::array<double, 3> exit;
     for (int a = 0; a < 3; ++a) {
-      corner[a] = place[a] & ~(width - 1);
-      leave[a] = axes[a].speed > 0   ? axes[a].when(corner[a] + width)
-                 : axes[a].speed < 0 ? axes[a].when(corner[a])
-                                     : std::numeric_limits<double>::infinity();
+      corner[a] = cell[a] & ~(width - 1);
+      exit[a] = tAtExit(axes[a], corner[a], width);
     }
-    const double next = *std::ranges::min_element(leave);
+    const double next = *std::ranges::min_element(exit);
     if (const double end = std::min(next, span.last); end - t > kShortest) {
       pieces.push_back({field.cellAt(centerOf(frame, corner, width)), t, end});
       t = end;
     }
     if (next >= span.last) return pieces;
+
+    // Cross all faces that the segment meets there.
     for (int a = 0; a < 3; ++a) {
-      if (leave[a] == next)
-        place[a] = axes[a].speed > 0 ? corner[a] + width : corner[a] - 1;
+      if (exit[a] == next)
+        cell[a] = axes[a].speed > 0 ? corner[a] + width : corner[a] - 1;
       else
-        place[a] = cellWithin(axes[a].at(next), corner[a], corner[a] + width - 1);
-      if (place[a] < 0 || place[a] > frame.last[a]) return pieces;
+        cell[a] = clampedCell(axes[a].coordinate(next), corner[a], corner[a] + width - 1);
+      if (cell[a] < 0 || cell[a] > frame.last[a]) return pieces;
     }
   }
 }
@@ -118,14 +121,14 @@ Vector3 pointAt(const Vector3& from, const Vector3& to, double t) {
   return {std::lerp(from.x(), to.x(), t), std::lerp(from.y(), to.y(), t), std::lerp(from.z(), to.z(), t)};
 }
 
-/// Of a piece outside of the domain. On the wall itself the leaf there would answer, whose gradient is another one: its
-/// limit is taken a little way out.
-ValueAndGradient continued(const Field& field, const Line& line, const Piece& piece, double t) {
-  constexpr double kAside = 1e-9;
-  const double margin = kAside * (piece.tLeave - piece.tEnter);
-  const double aside = std::clamp(t, piece.tEnter + margin, piece.tLeave - margin);
+/// Evaluates the continuation outside the domain. On the domain's boundary the boundary leaf's gradient differs from
+/// that of the continuation, so that the gradient is taken slightly inside the piece.
+ValueAndGradient evaluateOutside(const Field& field, const Line& line, const Piece& piece, double t) {
+  constexpr double kMargin = 1e-9;
+  const double margin = kMargin * (piece.tLeave - piece.tEnter);
+  const double inside = std::clamp(t, piece.tEnter + margin, piece.tLeave - margin);
   return {field.value(pointAt(line.from, line.to, t)),
-          field.valueAndGradient(pointAt(line.from, line.to, aside)).gradient};
+          field.valueAndGradient(pointAt(line.from, line.to, inside)).gradient};
 }
 
 }  // namespace
@@ -133,8 +136,8 @@ ValueAndGradient continued(const Field& field, const Line& line, const Piece& pi
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to) {
   if (from == to) throw Error("a segment's ends are one and the same point: give two");
   const GridFrame& frame = field.lookupGrid().frame;
-  const Axes axes = axesOf(frame, from, to);
-  const std::optional<Span> span = spanWithin(axes);
+  const Axes axes = segmentAxes(frame, from, to);
+  const std::optional<Span> span = clipToDomain(axes);
   std::vector<Piece> pieces;
   if (span) pieces = walk(field, frame, axes, *span);
   if (pieces.empty()) return {{std::nullopt, 0, 1}};
@@ -154,32 +157,33 @@ std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Ve
 ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x) {
   const GridFrame& frame = field.lookupGrid().frame;
   std::array<double, 3> coordinates;
-  std::array<std::int64_t, 3> place;
+  query::CellIndex cellIndex;
   for (int axis = 0; axis < 3; ++axis) {
-    coordinates[axis] = gridCoordinate(frame, axis, x[axis]);
-    place[axis] = std::llround(std::ldexp(gridCoordinate(frame, axis, cell.box.min()[axis]), cell.depth));
+    coordinates[axis] = query::gridCoordinate(frame, axis, x[axis]);
+    cellIndex[axis] = std::llround(std::ldexp(query::gridCoordinate(frame, axis, cell.box.min()[axis]), cell.depth));
   }
-  const FoundLeaf leaf = leafWithin(field.data().nodes[cell.id], cell.depth, cell.id, place, coordinates);
-  return answerWithin<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
+  const query::LeafPoint leaf =
+      query::leafPoint(field.data().nodes[cell.id], cell.depth, cell.id, cellIndex, coordinates);
+  return query::evaluateInLeaf<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
 }
 
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count) {
   assert(count >= 2);
   Line line{from, to, piecesAlong(field, from, to), {}};
   line.samples.reserve(static_cast<std::size_t>(count) + 2 * line.pieces.size());
-  int even = 0;  // of the evenly spaced samples, the next
-  const auto evenAt = [&] { return static_cast<double>(even) / (count - 1); };
+  int next = 0;  // number of the next evenly spaced sample
+  const auto nextT = [&] { return static_cast<double>(next) / (count - 1); };
   for (std::size_t n = 0; n < line.pieces.size(); ++n) {
     const Piece& piece = line.pieces[n];
     const auto add = [&](double t) {
       const Vector3 x = pointAt(from, to, t);
       const auto [value, gradient] =
-          piece.cell ? valueAndGradientIn(field, *piece.cell, x) : continued(field, line, piece, t);
+          piece.cell ? valueAndGradientIn(field, *piece.cell, x) : evaluateOutside(field, line, piece, t);
       line.samples.push_back({t, n, x, value, gradient});
     };
     add(piece.tEnter);
-    while (even < count && evenAt() <= piece.tEnter) ++even;
-    for (; even < count && evenAt() < piece.tLeave; ++even) add(evenAt());
+    while (next < count && nextT() <= piece.tEnter) ++next;
+    for (; next < count && nextT() < piece.tLeave; ++next) add(nextT());
     add(piece.tLeave);
   }
   return line;

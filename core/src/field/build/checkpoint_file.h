@@ -1,5 +1,5 @@
 #pragma once
-// The file that keeps the state of a construction; what the state is, the construction knows.
+// The file that keeps the state of a construction; see construction_state.h for its contents.
 
 #include <chrono>
 #include <cstdint>
@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "field/build/build_tree.h"
 #include "hpsdf/build_options.h"
+#include "hpsdf/distance_function.h"
 #include "util/checked_file.h"
 
-namespace hpsdf {
+namespace hpsdf::detail {
 
 class CheckpointFile {
  public:
@@ -20,23 +20,24 @@ class CheckpointFile {
   CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
                  const BuildOptions& options);
 
-  /// At the state, where there is one; throws `Error` for that of another construction.
-  std::optional<CheckedReader> open() const;
+  /// A reader at the beginning of the state, if there is one. Throws `Error` for the state of another construction.
+  std::optional<detail::CheckedReader> open() const;
 
-  /// Whether enough time has gone by since the construction began or the last state was kept.
+  /// Tells whether enough time has passed since the construction began or the last state was kept.
   bool isDue() const;
 
-  void keep(const std::function<void(CheckedWriter&)>& writeState);
+  /// Writes the state. Errors go to `Checkpoint::failed` if there is one.
+  void keep(const std::function<void(detail::CheckedWriter&)>& writeState);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// What a state must have in common with the construction that takes it up.
+  /// Digests in which a state must agree with the construction that continues it.
   struct Identity {
-    std::string program;  ///< its version
+    std::string program;  ///< version of the program
     std::uint64_t surface = 0;
-    std::uint64_t options = 0;   ///< and domain
-    std::uint64_t distance = 0;  ///< Φ by its values at some places
+    std::uint64_t options = 0;   ///< of settings and domain
+    std::uint64_t distance = 0;  ///< of values of Φ at 4096 points
   };
 
   void waitFor(double seconds);
@@ -46,15 +47,4 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
-/// The tree with all fits.
-void treeItems(CheckedWriter& writer, const BuildTree& tree);
-
-/// Into a tree that has its domain and grid; `fitted`: so many base cells have a fit. Throws `Error` for one that a
-/// construction with these options cannot have.
-void treeItems(CheckedReader& reader, BuildTree& tree, std::uint64_t fitted, const BuildOptions& options);
-
-/// Nodes.
-void listItems(CheckedWriter& writer, const std::vector<std::uint32_t>& nodes);
-void listItems(CheckedReader& reader, std::vector<std::uint32_t>& nodes);
-
-}  // namespace hpsdf
+}  // namespace hpsdf::detail

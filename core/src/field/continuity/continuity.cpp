@@ -13,26 +13,26 @@ namespace hpsdf {
 
 WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& options, int threads,
                                   const Progress& progress) {
-  checkWeakContinuity(options);
-  if (field.metadata().continuityWeight > 0)
+  continuity::checkWeakContinuity(options);
+  if (field.metadata().settings.continuityWeight)
     throw Error("the field is weakly continuous already: take it as it was before, or build it anew");
   FieldData data = field.data();
-  toDouble(data);
-  const WeakContinuityFigures figures =
-      withThreads(threads, [&] { return makeWeaklyContinuous(data, options, progress); });
+  query::toDouble(data);
+  const continuity::WeakContinuityFigures figures =
+      withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
   if (field.singlePrecision()) {
-    data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, roundingOf(data).rms);
-    toFloat(data);
+    data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);
+    query::toFloat(data);
   }
   return {Field(std::move(data)), figures.iterations, figures.residual, figures.change};
 }
 
 Field blended(const Field& field, double width) {
   if (!(width >= 0 && width <= kMaxBlend))
-    throw Error("blended zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
+    throw Error("blend zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
   FieldData data = field.data();
   data.blend = width;
-  data.bounds.clear();  // neighbours have a say in a leaf now, or no more
+  data.bounds.clear();  // Bounds depend on the leaves that have a weight, which blending changes.
   return Field(std::move(data));
 }
 

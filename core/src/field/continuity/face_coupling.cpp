@@ -1,7 +1,5 @@
 #include "field/continuity/face_coupling.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,24 +11,25 @@
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/error.h"
+#include "util/chunks.h"
 
-namespace hpsdf {
+namespace hpsdf::continuity {
 namespace {
 
 constexpr std::size_t kChunk = 256;
-constexpr std::size_t kMostOnFace = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
 
-constexpr std::size_t chunks(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+/// Returns the number of coefficients of a polynomial of total degree p on a face.
+constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
+/// Returns the index of the product of degrees a and b among the coefficients on a face.
+constexpr std::size_t faceIndex(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
+constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 
-/// Coefficients of a polynomial of total degree p on a face, and the place of the product of degrees a and b.
-constexpr std::size_t countOnFace(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
-constexpr std::size_t placeOnFace(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
-
-/// What orthonormal polynomial a of the half of an axis has of polynomial i of the whole.
-class Halving {
+/// Restricts polynomials on a face to quarters of it. `share_[half][i][a]` is the coefficient of the orthonormal
+/// polynomial a of the half in the orthonormal polynomial i of the whole axis.
+class QuarterRestriction {
  public:
-  Halving() {
-    const HalfShares shares;
+  QuarterRestriction() {
+    const basis::HalfShares shares;
     for (int i = 0; i <= kMaxDegree; ++i)
       for (int a = 0; a <= i; ++a) {
         const double scale = 2 * std::sqrt((2 * a + 1.0) / (2 * i + 1));
@@ -39,13 +38,14 @@ class Halving {
       }
   }
 
-  /// A face's polynomial onto a quarter of it; bits of `quarter`: upper half of the first, of the second axis.
+  /// Restricts a face's polynomial to a quarter in place. Bit 0 and 1 of `quarter`: upper half of the first and of the
+  /// second axis.
   template <typename Degree>
-  void restrict(double* face, Degree degree, int quarter) const {
+  void apply(double* face, Degree degree, int quarter) const {
     for (int along = 0; along < 2; ++along) {
       const auto& share = share_[quarter >> along & 1];
       for (int b = 0; b <= degree; ++b)
-        for (int a = 0; a <= degree - b; ++a) {  // upwards: the higher ones are still those of the whole
+        for (int a = 0; a <= degree - b; ++a) {  // ascending, because a needs the old values from a upwards
           double sum = 0;
           for (int i = a; i <= degree - b; ++i) sum += share[i][a] * at(face, along, i, b);
           at(face, along, a, b) = sum;
@@ -54,7 +54,7 @@ class Halving {
   }
 
   template <typename Degree>
-  void transposed(double* face, Degree degree, int quarter) const {
+  void applyTransposed(double* face, Degree degree, int quarter) const {
     for (int along = 0; along < 2; ++along) {
       const auto& share = share_[quarter >> along & 1];
       for (int b = 0; b <= degree; ++b)
@@ -68,57 +68,58 @@ class Halving {
 
  private:
   static double& at(double* face, int along, int a, int b) {
-    return face[along == 0 ? placeOnFace(a, b) : placeOnFace(b, a)];
+    return face[along == 0 ? faceIndex(a, b) : faceIndex(b, a)];
   }
 
   std::array<std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>, 2> share_{};
 };
 
-const Halving halving;
+const QuarterRestriction quarterRestriction;
 
-/// Where coefficients of a degree that is known when compiling go on a face across an axis.
+/// `FaceCoupling::Trace` for a degree and an axis that are known at compile time, which gives unrolled code.
 template <int P, int Axis>
 struct KnownTrace {
   static constexpr int kCount = coefficientCount(P);
   struct Entry {
-    std::uint8_t place;
-    std::uint8_t order;  ///< along the axis
+    std::uint8_t faceIndex;
+    std::uint8_t order;  ///< degree along the axis across the face
   };
   static constexpr std::array<Entry, kCount> kEntries = [] {
     std::array<Entry, kCount> entries{};
     int index = 0;
     for (int i = 0; i <= P; ++i)
       for (int j = 0; j <= P - i; ++j)
-        for (int k = 0; k <= P - i - j; ++k)
-          entries[index++] =
-              Axis == 0   ? Entry{static_cast<std::uint8_t>(placeOnFace(j, k)), static_cast<std::uint8_t>(i)}
-              : Axis == 1 ? Entry{static_cast<std::uint8_t>(placeOnFace(i, k)), static_cast<std::uint8_t>(j)}
-                          : Entry{static_cast<std::uint8_t>(placeOnFace(i, j)), static_cast<std::uint8_t>(k)};
+        for (int k = 0; k <= P - i - j; ++k) {
+          const std::array<int, 3> order{i, j, k};
+          entries[index++] = {static_cast<std::uint8_t>(faceIndex(order[Axis == 0], order[Axis == 2 ? 1 : 2])),
+                              static_cast<std::uint8_t>(order[Axis])};
+        }
     return entries;
   }();
 
-  /// `ends`: the orthonormal polynomials at the end where the face lies.
-  static void take(const double* ends, const double* x, double* face) {
-    std::array<double, countOnFace(P)> sums{};
+  /// Restricts a leaf's coefficients x to its face. `ends` holds the orthonormal polynomials at the face.
+  static void apply(const double* ends, const double* x, double* face) {
+    std::array<double, faceCoefficientCount(P)> sums{};
     [&]<std::size_t... C>(std::index_sequence<C...>) {
-      ((sums[kEntries[C].place] += ends[kEntries[C].order] * x[C]), ...);
+      ((sums[kEntries[C].faceIndex] += ends[kEntries[C].order] * x[C]), ...);
     }
     (std::make_index_sequence<kCount>());
     for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
   }
 
-  static void give(const double* ends, double scale, const double* face, double* out) {
-    std::array<double, countOnFace(P)> scaled;
+  /// Adds the transposed restriction of `face`, times `scale`, to `out`.
+  static void addTransposed(const double* ends, double scale, const double* face, double* out) {
+    std::array<double, faceCoefficientCount(P)> scaled;
     for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
     [&]<std::size_t... C>(std::index_sequence<C...>) {
-      ((out[C] += ends[kEntries[C].order] * scaled[kEntries[C].place]), ...);
+      ((out[C] += ends[kEntries[C].order] * scaled[kEntries[C].faceIndex]), ...);
     }
     (std::make_index_sequence<kCount>());
   }
 };
 
-/// The orthonormal polynomials at the lower and the upper end.
-const auto ends = [] {
+/// The orthonormal polynomials at the lower and at the upper end of an axis.
+const auto endValues = [] {
   std::array<std::array<double, kMaxDegree + 1>, 2> values{};
   for (int i = 0; i <= kMaxDegree; ++i) {
     values[1][i] = std::sqrt(2 * i + 1.0);
@@ -127,18 +128,29 @@ const auto ends = [] {
   return values;
 }();
 
-template <int P>
-void takeKnown(int axis, int side, const double* x, double* face) {
-  if (axis == 0) KnownTrace<P, 0>::take(ends[side].data(), x, face);
-  if (axis == 1) KnownTrace<P, 1>::take(ends[side].data(), x, face);
-  if (axis == 2) KnownTrace<P, 2>::take(ends[side].data(), x, face);
+template <int P, typename F>
+bool withAxis(int axis, const F& f) {
+  if (axis == 0) f(KnownTrace<P, 0>());
+  if (axis == 1) f(KnownTrace<P, 1>());
+  if (axis == 2) f(KnownTrace<P, 2>());
+  return true;
 }
 
-template <int P>
-void giveKnown(int axis, int side, double scale, const double* face, double* out) {
-  if (axis == 0) KnownTrace<P, 0>::give(ends[side].data(), scale, face, out);
-  if (axis == 1) KnownTrace<P, 1>::give(ends[side].data(), scale, face, out);
-  if (axis == 2) KnownTrace<P, 2>::give(ends[side].data(), scale, face, out);
+/// Calls f(KnownTrace) for the degrees that most leaves have. Returns whether it did.
+template <typename F>
+bool withKnownTrace(int degree, int axis, const F& f) {
+  switch (degree) {
+    case 2:
+      return withAxis<2>(axis, f);
+    case 3:
+      return withAxis<3>(axis, f);
+    case 4:
+      return withAxis<4>(axis, f);
+    case 5:
+      return withAxis<5>(axis, f);
+    default:
+      return false;
+  }
 }
 
 int quarterOf(const std::array<std::uint32_t, 2>& along, int level) {
@@ -147,9 +159,9 @@ int quarterOf(const std::array<std::uint32_t, 2>& along, int level) {
 
 }  // namespace
 
-FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(leavesOf(field)) {
+FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(query::allLeaves(field)) {
   start_.push_back(0);
-  for (const Leaf& leaf : leaves_) {
+  for (const query::OctreeNode& leaf : leaves_) {
     degree_.push_back(static_cast<std::uint8_t>(node::degree(field.nodes[leaf.node])));
     start_.push_back(start_.back() + coefficientCount(degree_.back()));
   }
@@ -158,72 +170,81 @@ FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(leavesOf(field)) {
                 " coefficients, more than 2^32; raise the target error");
   const double baseCells = double(field.grid[0]) * field.grid[1] * field.grid[2];
   for (int depth = 0; depth <= kMaxDepth; ++depth) scale_.push_back(std::sqrt(std::ldexp(1.0, -3 * depth) / baseCells));
+  makeTraces();
+  linkLeaves(field);
+  groupLinksByLeaf();
+}
+
+void FaceCoupling::makeTraces() {
   for (const std::uint8_t degree : degree_) {
-    if (!traces_[degree][0].place.empty()) continue;
-    forEachCoefficient(degree, [&](int i, int j, int k, int) {
-      const std::array<int, 3> index{i, j, k};
+    if (!traces_[degree][0].faceIndex.empty()) continue;
+    basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
+      const std::array<int, 3> order{i, j, k};
       for (int axis = 0; axis < 3; ++axis) {
         Trace& trace = traces_[degree][axis];
-        const double end = std::sqrt(2 * index[axis] + 1.0);
-        trace.place.push_back(static_cast<std::uint16_t>(placeOnFace(index[axis == 0], index[axis == 2 ? 1 : 2])));
-        trace.factor[0].push_back(index[axis] % 2 == 0 ? end : -end);
-        trace.factor[1].push_back(end);
+        trace.faceIndex.push_back(static_cast<std::uint16_t>(faceIndex(order[axis == 0], order[axis == 2 ? 1 : 2])));
+        for (int side = 0; side < 2; ++side) trace.factor[side].push_back(endValues[side][order[axis]]);
       }
     });
   }
-  linkLeaves(field);
-  collectAround();
+}
+
+/// Returns the link of a leaf's face at the lower (step −1) or upper (step 1) end of an axis; nothing if the leaf
+/// across makes the link.
+std::optional<FaceCoupling::Link> FaceCoupling::linkAcross(const FieldData& field,
+                                                           std::span<const std::uint32_t> leafOfNode,
+                                                           std::uint32_t small, int axis, int step) const {
+  const query::OctreeNode& leaf = leaves_[small];
+  const auto neighbour = query::equalOrLargerFaceNeighbour(field, leaf, axis, step);
+  if (!neighbour || (neighbour->depth == leaf.depth && step < 0)) return {};
+  Link link{.small = small,
+            .large = leafOfNode[neighbour->node],
+            .along = {},
+            .axis = static_cast<std::uint8_t>(axis),
+            .levels = static_cast<std::uint8_t>(leaf.depth - neighbour->depth),
+            .side = static_cast<std::uint8_t>(step > 0)};
+  const std::array<int, 2> axes{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
+  for (int a = 0; a < 2; ++a)
+    link.along[a] =
+        static_cast<std::uint32_t>(leaf.cellIndex[axes[a]] - (neighbour->cellIndex[axes[a]] << link.levels));
+  return link;
 }
 
 void FaceCoupling::linkLeaves(const FieldData& field) {
-  std::vector<std::uint32_t> leafOf(field.nodes.size());
-  for (std::size_t n = 0; n < leaves_.size(); ++n) leafOf[leaves_[n].node] = static_cast<std::uint32_t>(n);
-  std::vector<std::vector<Link>> found(chunks(leaves_.size()));
-  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
-    for (std::size_t n = chunk * kChunk; n < std::min(leaves_.size(), (chunk + 1) * kChunk); ++n)
+  std::vector<std::uint32_t> leafOfNode(field.nodes.size());
+  for (std::size_t n = 0; n < leaves_.size(); ++n) leafOfNode[leaves_[n].node] = static_cast<std::uint32_t>(n);
+  std::vector<std::vector<Link>> found(detail::chunksOf(leaves_.size(), kChunk));
+  detail::forEachChunk(leaves_.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+    for (std::size_t n = first; n < first + count; ++n)
       for (int axis = 0; axis < 3; ++axis)
-        for (const int step : {-1, 1}) {
-          const Leaf& small = leaves_[n];
-          const auto large = notSmallerBeside(field, small, axis, step);
-          if (!large || (large->depth == small.depth && step < 0)) continue;
-          Link link{.small = static_cast<std::uint32_t>(n),
-                    .large = leafOf[large->node],
-                    .along = {},
-                    .axis = static_cast<std::uint8_t>(axis),
-                    .levels = static_cast<std::uint8_t>(small.depth - large->depth),
-                    .side = static_cast<std::uint8_t>(step > 0)};
-          const std::array<int, 2> axes{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
-          for (int a = 0; a < 2; ++a)
-            link.along[a] = static_cast<std::uint32_t>(small.place[axes[a]] - (large->place[axes[a]] << link.levels));
-          found[chunk].push_back(link);
-        }
+        for (const int step : {-1, 1})
+          if (const auto link = linkAcross(field, leafOfNode, static_cast<std::uint32_t>(n), axis, step))
+            found[chunk].push_back(*link);
   });
-  differsAt_.push_back(0);
+  jumpStart_.push_back(0);
   for (auto& links : found) {
     for (const Link& link : links) {
       links_.push_back(link);
-      differsAt_.push_back(differsAt_.back() + countOnFace(std::max(degree_[link.small], degree_[link.large])));
+      jumpStart_.push_back(jumpStart_.back() +
+                           faceCoefficientCount(std::max(degree_[link.small], degree_[link.large])));
     }
     links = {};
   }
-  differences_.resize(differsAt_.back());
+  jumps_.resize(jumpStart_.back());
 }
 
-void FaceCoupling::collectAround() {
+void FaceCoupling::groupLinksByLeaf() {
   if (links_.size() > 0xffffffffu)
     throw Error("the field has more than 2^32 faces between its cells; raise the target error");
-  aroundAt_.assign(leaves_.size() + 1, 0);
-  for (const Link& link : links_) {
-    ++aroundAt_[link.small + 1];
-    ++aroundAt_[link.large + 1];
-  }
-  std::partial_sum(aroundAt_.begin(), aroundAt_.end(), aroundAt_.begin());
-  around_.resize(2 * links_.size());
-  std::vector<std::size_t> next(aroundAt_.begin(), aroundAt_.end() - 1);
-  for (std::size_t n = 0; n < links_.size(); ++n) {
-    around_[next[links_[n].small]++] = static_cast<std::uint32_t>(n);
-    around_[next[links_[n].large]++] = static_cast<std::uint32_t>(n);
-  }
+  linksOfLeafStart_.assign(leaves_.size() + 1, 0);
+  for (const Link& link : links_)
+    for (const std::uint32_t leaf : {link.small, link.large}) ++linksOfLeafStart_[leaf + 1];
+  std::partial_sum(linksOfLeafStart_.begin(), linksOfLeafStart_.end(), linksOfLeafStart_.begin());
+  linksOfLeaf_.resize(2 * links_.size());
+  std::vector<std::size_t> next(linksOfLeafStart_.begin(), linksOfLeafStart_.end() - 1);
+  for (std::size_t n = 0; n < links_.size(); ++n)
+    for (const std::uint32_t leaf : {links_[n].small, links_[n].large})
+      linksOfLeaf_[next[leaf]++] = static_cast<std::uint32_t>(n);
 }
 
 std::vector<double> FaceCoupling::toUnknowns(const FieldData& field) const {
@@ -231,8 +252,8 @@ std::vector<double> FaceCoupling::toUnknowns(const FieldData& field) const {
   std::vector<double> x(start_.back());
   for (std::size_t n = 0; n < leaves_.size(); ++n) {
     const double* c = &coefficients[node::offset(field.nodes[leaves_[n].node])];
-    forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
-      x[start_[n] + index] = c[index] * scale_[leaves_[n].depth] * std::sqrt(squaredNorm(i, j, k));
+    basis::forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
+      x[start_[n] + index] = c[index] * scale_[leaves_[n].depth] * std::sqrt(basis::squaredNorm(i, j, k));
     });
   }
   return x;
@@ -242,94 +263,83 @@ void FaceCoupling::fromUnknowns(std::span<const double> x, FieldData& field) con
   std::vector<double> coefficients(start_.back());
   for (std::size_t n = 0; n < leaves_.size(); ++n) {
     field.nodes[leaves_[n].node] = node::leaf(degree_[n], static_cast<std::uint32_t>(start_[n]));
-    forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
+    basis::forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
       const std::size_t at = start_[n] + index;
-      coefficients[at] = x[at] / (scale_[leaves_[n].depth] * std::sqrt(squaredNorm(i, j, k)));
+      coefficients[at] = x[at] / (scale_[leaves_[n].depth] * std::sqrt(basis::squaredNorm(i, j, k)));
     });
   }
   field.coefficients = std::move(coefficients);
 }
 
-/// A leaf's polynomial on its face across a link's axis, at the lower (0) or upper (1) end.
-void FaceCoupling::take(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const {
+/// Restricts a leaf's polynomial to its face across the link's axis, at the leaf's lower (0) or upper (1) end.
+void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const {
   x += start_[leaf];
-  switch (degree_[leaf]) {
-    case 2:
-      return takeKnown<2>(link.axis, side, x, face);
-    case 3:
-      return takeKnown<3>(link.axis, side, x, face);
-    case 4:
-      return takeKnown<4>(link.axis, side, x, face);
-    case 5:
-      return takeKnown<5>(link.axis, side, x, face);
-  }
-  std::fill_n(face, countOnFace(degree_[leaf]), 0.0);
+  if (withKnownTrace(degree_[leaf], link.axis, [&](auto trace) { trace.apply(endValues[side].data(), x, face); }))
+    return;
+  std::fill_n(face, faceCoefficientCount(degree_[leaf]), 0.0);
   const Trace& trace = traces_[degree_[leaf]][link.axis];
-  for (std::size_t c = 0; c < trace.place.size(); ++c) face[trace.place[c]] += trace.factor[side][c] * x[c];
+  for (std::size_t c = 0; c < trace.faceIndex.size(); ++c) face[trace.faceIndex[c]] += trace.factor[side][c] * x[c];
 }
 
-/// The other way: adds what acts on the face to the leaf.
-void FaceCoupling::give(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
-                        double* out) const {
+/// Adds the transpose of `restrictToFace`, times `scale`, to the leaf's part of `out`.
+void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
+                               double* out) const {
   out += start_[leaf];
-  switch (degree_[leaf]) {
-    case 2:
-      return giveKnown<2>(link.axis, side, scale, face, out);
-    case 3:
-      return giveKnown<3>(link.axis, side, scale, face, out);
-    case 4:
-      return giveKnown<4>(link.axis, side, scale, face, out);
-    case 5:
-      return giveKnown<5>(link.axis, side, scale, face, out);
-  }
+  if (withKnownTrace(degree_[leaf], link.axis,
+                     [&](auto trace) { trace.addTransposed(endValues[side].data(), scale, face, out); }))
+    return;
   const Trace& trace = traces_[degree_[leaf]][link.axis];
-  for (std::size_t c = 0; c < trace.place.size(); ++c) out[c] += scale * trace.factor[side][c] * face[trace.place[c]];
+  for (std::size_t c = 0; c < trace.faceIndex.size(); ++c)
+    out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// The jump across a link, times √(w_F·area/|Ω|), by the small face's polynomials: the small leaf's trace less the
-/// large one's, whose unknowns carry a greater volume's root.
-void FaceCoupling::differ(std::size_t n, const double* x) {
+/// Computes the jump across a link, times √(w_F·area/|Ω|), in the polynomials of the small face. The large leaf's
+/// unknowns carry the root of a greater volume, which `scale` takes off.
+void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
-  std::array<double, kMostOnFace> large;
-  take(link, link.large, 1 - link.side, x, large.data());
+  std::array<double, kMaxFaceCoefficients> large;
+  restrictToFace(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
-    withDegree(degree_[link.large],
-               [&](auto degree) { halving.restrict(large.data(), degree, quarterOf(link.along, level)); });
-  double* const difference = &differences_[differsAt_[n]];
-  const std::size_t ofSmall = countOnFace(degree_[link.small]), ofLarge = countOnFace(degree_[link.large]);
-  take(link, link.small, link.side, x, difference);
-  for (std::size_t c = ofSmall; c < ofLarge; ++c) difference[c] = 0;
+    query::withDegree(degree_[link.large], [&](auto degree) {
+      quarterRestriction.apply(large.data(), degree, quarterOf(link.along, level));
+    });
+  double* const jump = &jumps_[jumpStart_[n]];
+  const std::size_t smallCount = faceCoefficientCount(degree_[link.small]);
+  const std::size_t largeCount = faceCoefficientCount(degree_[link.large]);
+  restrictToFace(link, link.small, link.side, x, jump);
+  for (std::size_t c = smallCount; c < largeCount; ++c) jump[c] = 0;
   const double scale = scale_[link.levels] / scale_[0];
-  for (std::size_t c = 0; c < ofLarge; ++c) difference[c] -= scale * large[c];
+  for (std::size_t c = 0; c < largeCount; ++c) jump[c] -= scale * large[c];
 }
 
-/// Adds what a link does to one of its leaves.
-void FaceCoupling::pull(std::uint32_t leaf, std::size_t n, double* out) const {
+/// Adds a link's part of Mx to one of its leaves: the transpose of `computeJump` times the jump.
+void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const {
   const Link& link = links_[n];
-  const double* face = &differences_[differsAt_[n]];
-  if (leaf == link.small) return give(link, leaf, link.side, 1, face, out);
-  std::array<double, kMostOnFace> whole;
+  const double* face = &jumps_[jumpStart_[n]];
+  if (leaf == link.small) return addFromFace(link, leaf, link.side, 1, face, out);
+  std::array<double, kMaxFaceCoefficients> whole;
   if (link.levels > 0) {
-    for (std::size_t a = 0; a < countOnFace(degree_[leaf]); ++a) whole[a] = face[a];
+    for (std::size_t a = 0; a < faceCoefficientCount(degree_[leaf]); ++a) whole[a] = face[a];
     for (int level = 0; level < link.levels; ++level)
-      withDegree(degree_[leaf],
-                 [&](auto degree) { halving.transposed(whole.data(), degree, quarterOf(link.along, level)); });
+      query::withDegree(degree_[leaf], [&](auto degree) {
+        quarterRestriction.applyTransposed(whole.data(), degree, quarterOf(link.along, level));
+      });
     face = whole.data();
   }
-  give(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);
+  addFromFace(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);
 }
 
 double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vector<double>& out) {
-  tbb::parallel_for(std::size_t{0}, chunks(links_.size()), [&](std::size_t chunk) {
-    for (std::size_t n = chunk * kChunk; n < std::min(links_.size(), (chunk + 1) * kChunk); ++n) differ(n, x.data());
+  detail::forEachChunk(links_.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+    for (std::size_t n = first; n < first + count; ++n) computeJump(n, x.data());
   });
-  std::vector<double> sums(chunks(leaves_.size()));
-  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t chunk) {
-    const std::size_t first = chunk * kChunk, last = std::min(leaves_.size(), first + kChunk);
+  std::vector<double> sums(detail::chunksOf(leaves_.size(), kChunk));
+  detail::forEachChunk(leaves_.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+    const std::size_t last = first + count;
     for (std::size_t c = start_[first]; c < start_[last]; ++c) out[c] = weight * x[c];
     for (std::size_t leaf = first; leaf < last; ++leaf)
-      for (std::size_t n = aroundAt_[leaf]; n < aroundAt_[leaf + 1]; ++n)
-        pull(static_cast<std::uint32_t>(leaf), around_[n], out.data());
+      for (std::size_t n = linksOfLeafStart_[leaf]; n < linksOfLeafStart_[leaf + 1]; ++n)
+        addJump(static_cast<std::uint32_t>(leaf), linksOfLeaf_[n], out.data());
     for (std::size_t c = start_[first]; c < start_[last]; ++c) sums[chunk] += x[c] * out[c];
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
@@ -346,4 +356,4 @@ std::vector<double> FaceCoupling::diagonal() const {
   return result;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::continuity

@@ -4,18 +4,19 @@
 #include "hpsdf/detail/field_data.h"
 #include "hpsdf/error.h"
 
-namespace hpsdf {
+namespace hpsdf::continuity {
 
-/// Throws `Error` for a setting out of range.
+/// Throws `Error` if an option is out of range.
 void checkWeakContinuity(const WeakContinuity& options);
 
+/// The figures of `WeaklyContinuous`.
 struct WeakContinuityFigures {
   int iterations = 0;
   double residual = 0;
   double change = 0;
 };
 
-/// As `weaklyContinuous`, of coefficients in double, which stay so, and where TBB is called.
+/// Does what `weaklyContinuous` does to a field with coefficients in double, on the caller's TBB threads.
 WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuity& options, const Progress& progress);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::continuity

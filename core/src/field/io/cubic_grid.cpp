@@ -1,4 +1,4 @@
-// The layout of files is described in docs/export.md.
+// docs/export.md describes the layout of the files.
 #include "hpsdf/detail/cubic_grid.h"
 
 #include <algorithm>
@@ -20,23 +20,24 @@
 namespace hpsdf {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "files are little-endian and arrays are written as they are");
+static_assert(std::endian::native == std::endian::little,
+              "files are little-endian and arrays are written without conversion");
 static_assert(sizeof(double) == 8 && std::numeric_limits<double>::is_iec559);
 
-constexpr std::size_t kChunk = 4096;  // points that are looked up together
+constexpr std::size_t kChunk = 4096;  // number of points for which the field is queried at once
 constexpr int kNodesOfCell = 32;
-constexpr std::size_t kSizesInFile = 8;  // numbers of cells and fields, and two lengths of each of three lists
+constexpr std::size_t kSizesInFile = 8;  // number of cells, number of fields, and two sizes for each of three lists
 
-using Place = std::array<std::uint64_t, 3>;
+using CellIndex = std::array<std::uint64_t, 3>;
 
-/// A node: at a cell's corner, or on an edge.
+/// A node of the grid, at a cell's corner or on an edge.
 struct Node {
-  Place place;    ///< of the corner, or of the edge's lower end, in cells from the domain's lower corner
-  int axis = -1;  ///< along which the edge runs
-  int third = 0;  ///< 0 or 1: the node on the edge
+  CellIndex index;  ///< the corner, or the lower end of the edge, in cells from the domain's lower corner
+  int axis = -1;    ///< axis of the edge; −1 for a corner
+  int third = 0;    ///< 0 or 1: the lower or the upper node of the edge
 };
 
-/// Numbers all nodes of a grid, as the format has it (`CubicGrid::nodes`).
+/// Numbers all nodes of a grid in the order of `CubicGrid::nodes`.
 class Numbering {
  public:
   explicit Numbering(const GridResolution& resolution) : cells_{resolution[0], resolution[1], resolution[2]} {
@@ -47,43 +48,44 @@ class Numbering {
 
   std::uint64_t count() const { return first_[3]; }
 
-  std::uint64_t numberOf(const Node& node) const {
-    const Place& at = node.place;
+  std::uint64_t number(const Node& node) const {
+    const CellIndex& at = node.index;
     if (node.axis < 0) return at[0] + (cells_[0] + 1) * (at[1] + (cells_[1] + 1) * at[2]);
     const int a = node.axis, b = after(a, 1), c = after(a, 2);
     return first_[a] + 2 * (at[a] + cells_[a] * (at[b] + (cells_[b] + 1) * at[c])) + std::uint64_t(node.third);
   }
 
-  Node nodeOf(std::uint64_t number) const {
-    const auto divided = [](std::uint64_t& rest, std::uint64_t by) {
-      const std::uint64_t remainder = rest % by;
-      rest /= by;
-      return remainder;
+  Node node(std::uint64_t number) const {
+    const auto takeDigit = [&number](std::uint64_t base) {
+      const std::uint64_t digit = number % base;
+      number /= base;
+      return digit;
     };
     Node node{};
     if (number < first_[0]) {
-      for (int axis = 0; axis < 3; ++axis) node.place[axis] = divided(number, cells_[axis] + 1);
+      for (int axis = 0; axis < 3; ++axis) node.index[axis] = takeDigit(cells_[axis] + 1);
       return node;
     }
     node.axis = number < first_[1] ? 0 : number < first_[2] ? 1 : 2;
     number -= first_[node.axis];
-    node.third = int(divided(number, 2));
-    node.place[node.axis] = divided(number, cells_[node.axis]);
-    node.place[after(node.axis, 1)] = divided(number, cells_[after(node.axis, 1)] + 1);
-    node.place[after(node.axis, 2)] = number;
+    node.third = int(takeDigit(2));
+    node.index[node.axis] = takeDigit(cells_[node.axis]);
+    node.index[after(node.axis, 1)] = takeDigit(cells_[after(node.axis, 1)] + 1);
+    node.index[after(node.axis, 2)] = number;
     return node;
   }
 
   static int after(int axis, int steps) { return (axis + steps) % 3; }
 
  private:
-  Place cells_;
-  std::array<std::uint64_t, 4> first_{};  // number of the first node on an edge along each axis; of all nodes
+  CellIndex cells_;
+  std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis, then of all nodes
 };
 
-/// The n-th node of the cell with this lower corner: corners 0 to 7, n = x + 2y + 4z, then the nodes on edges along x,
-/// along y and along z. Of the four edges along axis a, those apart along a+2 are neighbours.
-Node nodeOfCell(Place corner, int n) {
+/// Returns the n-th node of the cell with this lower corner. Nodes 0 to 7 are the corners, n = x + 2y + 4z; then come
+/// those on edges along x, along y and along z. Of the four edges along axis a, those that differ along a+2 (cyclic)
+/// follow each other.
+Node nodeOfCell(CellIndex corner, int n) {
   if (n < 8) {
     for (int axis = 0; axis < 3; ++axis) corner[axis] += n >> axis & 1;
     return {corner};
@@ -94,21 +96,21 @@ Node nodeOfCell(Place corner, int n) {
   return {corner, axis, n % 2};
 }
 
-/// Where a grid's nodes lie, by the same operations as the loaders': a cell's lower corner first.
+/// Returns the position of a node. The operations and their order are those of the programs that load the files.
 Vector3 positionOf(const Node& node, const Vector3& lower, const Vector3& cellSize) {
   Vector3 x = lower;
-  for (int axis = 0; axis < 3; ++axis) x[axis] += cellSize[axis] * static_cast<double>(node.place[axis]);
+  for (int axis = 0; axis < 3; ++axis) x[axis] += cellSize[axis] * static_cast<double>(node.index[axis]);
   if (node.axis >= 0) x[node.axis] += (1 + node.third) / 3.0 * cellSize[node.axis];
   return x;
 }
 
-/// The cubic serendipity polynomial that is 1 at a cell's n-th node and 0 at its others, at local coordinates in
-/// [-1, 1].
-double shape(int n, const Vector3& local) {
+/// Evaluates the cubic serendipity polynomial that is 1 at a cell's n-th node and 0 at all others, at local coordinates
+/// in [−1, 1]³.
+double shapeFunction(int n, const Vector3& local) {
   const Node node = nodeOfCell({0, 0, 0}, n);
   double product = 1;
   for (int axis = 0; axis < 3; ++axis)
-    if (axis != node.axis) product *= node.place[axis] == 0 ? 1 - local[axis] : 1 + local[axis];
+    if (axis != node.axis) product *= node.index[axis] == 0 ? 1 - local[axis] : 1 + local[axis];
   if (node.axis < 0) return product * (9 * local.squaredNorm() - 19) / 64;
   const double t = local[node.axis];
   return product * (1 - t * t) * (node.third == 0 ? 1 - 3 * t : 1 + 3 * t) * 9 / 64;
@@ -118,36 +120,35 @@ void checkResolution(const GridResolution& resolution) {
   if (std::ranges::find(resolution, 0u) != resolution.end())
     throw Error("a grid without cells; give at least one cell along each axis");
   const double bytes = cubicGridBytes(resolution);
-  if (bytes <= double(kMostCubicGridBytes)) return;
+  if (bytes <= double(kMaxCubicGridBytes)) return;
   std::ostringstream message;
   message << "a grid of " << resolution[0] << " x " << resolution[1] << " x " << resolution[2] << " cells takes "
           << std::uint64_t(std::min(std::ceil(bytes / 1e6), 1e18))
-          << " MB as a file, of which Bullet's loader reads 2147 at most;"
-          << " give fewer cells";
+          << " MB as a file, of which Bullet's loader reads 2147 at most; give fewer cells";
   throw Error(message.str());
 }
 
 template <typename T>
-void putAll(OutputFile& out, std::span<const T> values) {
+void writeAll(OutputFile& out, std::span<const T> values) {
   out.write(std::as_bytes(values));
 }
-void putSize(OutputFile& out, std::uint64_t size) { putAll(out, std::span<const std::uint64_t>(&size, 1)); }
-void putVector(OutputFile& out, const Vector3& v) { putAll(out, std::span<const double>(v.data(), 3)); }
+void writeSize(OutputFile& out, std::uint64_t size) { writeAll(out, std::span<const std::uint64_t>(&size, 1)); }
+void writeVector(OutputFile& out, const Vector3& v) { writeAll(out, std::span<const double>(v.data(), 3)); }
 
-/// The nodes of a row of cells along x.
+/// Computes the numbers of the nodes of a row of cells along x.
 void numberRow(const Numbering& numbering, std::uint32_t cells, std::uint64_t y, std::uint64_t z,
                std::vector<std::uint32_t>& row) {
   row.clear();
   for (std::uint64_t x = 0; x < cells; ++x)
     for (int n = 0; n < kNodesOfCell; ++n)
-      row.push_back(static_cast<std::uint32_t>(numbering.numberOf(nodeOfCell({x, y, z}, n))));
+      row.push_back(static_cast<std::uint32_t>(numbering.number(nodeOfCell({x, y, z}, n))));
 }
 
 }  // namespace
 
 double CubicGrid::value(const Vector3& x) const {
   const Vector3 size = cellSize();
-  Place cell;
+  CellIndex cell;
   for (int axis = 0; axis < 3; ++axis) {
     const double at = (x[axis] - domain.min()[axis]) / size[axis];
     cell[axis] = static_cast<std::uint64_t>(std::clamp(at, 0.0, double(resolution[axis] - 1)));
@@ -156,7 +157,7 @@ double CubicGrid::value(const Vector3& x) const {
   const Vector3 local = 2 * (x - lower).cwiseQuotient(size) - Vector3::Ones();
   const Numbering numbering(resolution);
   double sum = 0;
-  for (int n = 0; n < kNodesOfCell; ++n) sum += nodes[numbering.numberOf(nodeOfCell(cell, n))] * shape(n, local);
+  for (int n = 0; n < kNodesOfCell; ++n) sum += nodes[numbering.number(nodeOfCell(cell, n))] * shapeFunction(n, local);
   return sum;
 }
 
@@ -200,26 +201,26 @@ CubicGrid sampleCubicGrid(const Field& field, const GridResolution& resolution, 
   withThreads(threads, [&] {
     const auto sample = [&](std::size_t, std::size_t first, std::size_t count) {
       std::vector<Vector3> points(count);
-      for (std::size_t n = 0; n < count; ++n) points[n] = positionOf(numbering.nodeOf(first + n), lower, cellSize);
+      for (std::size_t n = 0; n < count; ++n) points[n] = positionOf(numbering.node(first + n), lower, cellSize);
       field.values(points, std::span(grid.nodes).subspan(first, count));
     };
-    forEachChunk(grid.nodes.size(), kChunk, progress, "sampling", sample);
+    detail::forEachChunk(grid.nodes.size(), kChunk, progress, "sampling", sample);
   });
   return grid;
 }
 
 CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::size_t points, std::uint64_t seed,
                                 int threads, const Progress& progress) {
-  struct Both {
-    Sums everywhere, nearSurface;
+  struct Differences {
+    detail::Sums everywhere, nearSurface;
   };
   const double near = grid.cellSize().norm();
-  std::vector<Both> parts(chunksOf(points, kChunk));
+  std::vector<Differences> parts(detail::chunksOf(points, kChunk));
   withThreads(threads, [&] {
-    forEachChunk(points, kChunk, progress, "measuring", [&](std::size_t chunk, std::size_t first, std::size_t count) {
+    detail::forEachChunk(points, kChunk, progress, "measuring", [&](std::size_t chunk, std::size_t first, std::size_t count) {
       std::vector<Vector3> at(count);
       std::vector<double> values(count);
-      for (std::size_t n = 0; n < count; ++n) at[n] = Random(seed, first + n).inBox(grid.domain);
+      for (std::size_t n = 0; n < count; ++n) at[n] = detail::Random(seed, first + n).inBox(grid.domain);
       field.values(at, values);
       for (std::size_t n = 0; n < count; ++n) {
         const double difference = std::abs(grid.value(at[n]) - values[n]);
@@ -228,12 +229,12 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
       }
     });
   });
-  Both all;
-  for (const Both& part : parts) {
+  Differences all;
+  for (const Differences& part : parts) {
     all.everywhere.add(part.everywhere);
     all.nearSurface.add(part.nearSurface);
   }
-  const auto figures = [](const Sums& of) { return GridDifference{of.count, of.rms(), of.max}; };
+  const auto figures = [](const detail::Sums& sums) { return GridDifference{sums.count, sums.rms(), sums.max}; };
   return {figures(all.everywhere), figures(all.nearSurface), near};
 }
 
@@ -245,35 +246,38 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
                 std::to_string(numbering.count()) + "; sample it anew");
   const auto& [nx, ny, nz] = grid.resolution;
   const std::uint64_t cells = std::uint64_t{nx} * ny * nz;
-  putVector(out, grid.domain.min());
-  putVector(out, grid.domain.max());
-  putAll(out, std::span<const std::uint32_t>(grid.resolution));
-  putVector(out, grid.cellSize());
-  putVector(out, grid.cellSize().cwiseInverse());
-  putSize(out, cells);
-  putSize(out, 1);  // fields
+  writeVector(out, grid.domain.min());
+  writeVector(out, grid.domain.max());
+  writeAll(out, std::span<const std::uint32_t>(grid.resolution));
+  writeVector(out, grid.cellSize());
+  writeVector(out, grid.cellSize().cwiseInverse());
+  writeSize(out, cells);
+  writeSize(out, 1);  // number of fields
 
-  putSize(out, 1);  // lists of nodes, one a field
-  putSize(out, grid.nodes.size());
-  putAll(out, std::span<const double>(grid.nodes));
+  // There is one list of nodes for each field.
+  writeSize(out, 1);
+  writeSize(out, grid.nodes.size());
+  writeAll(out, std::span<const double>(grid.nodes));
 
-  putSize(out, 1);  // lists of cells
-  putSize(out, cells);
-  Parts parts(progress, "writing", std::size_t{ny} * nz);
+  // There is one list of cells for each field.
+  writeSize(out, 1);
+  writeSize(out, cells);
+  detail::Parts parts(progress, "writing", std::size_t{ny} * nz);
   std::vector<std::uint32_t> row;
   for (std::uint32_t z = 0; z < nz; ++z)
     for (std::uint32_t y = 0; y < ny; ++y) {
       parts.begin();
       numberRow(numbering, nx, y, z, row);
-      putAll(out, std::span<const std::uint32_t>(row));
+      writeAll(out, std::span<const std::uint32_t>(row));
       parts.end();
     }
 
-  putSize(out, 1);  // lists of where in the list of cells each cell is: none is left out
-  putSize(out, cells);
-  std::vector<std::uint32_t> places(cells);
-  std::iota(places.begin(), places.end(), 0u);
-  putAll(out, std::span<const std::uint32_t>(places));
+  // The list of each cell's position in the cell list is the identity because no cell is omitted.
+  writeSize(out, 1);
+  writeSize(out, cells);
+  std::vector<std::uint32_t> positions(cells);
+  std::iota(positions.begin(), positions.end(), 0u);
+  writeAll(out, std::span<const std::uint32_t>(positions));
   out.flush();
 }
 

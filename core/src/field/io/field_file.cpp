@@ -1,6 +1,7 @@
 // The layout is described in docs/file-format.md.
 #include "hpsdf/field_file.h"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
@@ -8,19 +9,20 @@
 #include <utility>
 #include <vector>
 
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/error.h"
 #include "util/checked_file.h"
 
 namespace hpsdf {
 namespace {
 
-// Like PNG's: a carriage return, a line feed and an end-of-file mark show a transfer that took it for text.
+// The carriage return, line feed and end-of-file mark show a transfer that took the file for text, like PNG's.
 constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-constexpr std::uint32_t kVersion =
-    4;  // 1 had no steps, 2 nothing of continuity, bounds and other ways to steer, 3 no sign
+// Version 1 has no steps; 2 neither continuity, bounds, maximum error nor criteria; 3 no inside test.
+constexpr std::uint32_t kVersion = 4;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
-constexpr FileKind kKind{"field file", "a .hpsdf file", "build or copy it again"};
+constexpr detail::FileKind kKind{"field file", "a .hpsdf file", "build or copy it again"};
 
 struct Sizes {
   std::uint64_t nodes = 0;
@@ -29,14 +31,58 @@ struct Sizes {
   std::uint64_t bounds = 0;
 };
 
-void stepsItem(CheckedWriter& writer, const std::optional<std::uint64_t>& steps) {
+void stepsItem(detail::CheckedWriter& writer, const std::optional<std::uint64_t>& steps) {
   writer.item(steps.value_or(kUnknownSteps));
 }
 
-void stepsItem(CheckedReader& reader, std::optional<std::uint64_t>& steps) {
+void stepsItem(detail::CheckedReader& reader, std::optional<std::uint64_t>& steps) {
   std::uint64_t stored = 0;
   reader.item(stored);
   if (stored != kUnknownSteps) steps = stored;
+}
+
+/// A setting is stored as f64 if it is a number, u32 if whole, u8 if it is a word's index or a flag.
+double storedNumber(const BuildSetting& setting, const BuildOptions& settings) {
+  const std::vector<double> numbers = setting.get(settings);
+  return numbers.empty() ? 0 : numbers[0];
+}
+
+void settingItem(detail::CheckedWriter& writer, const BuildSetting& setting, const BuildOptions& settings) {
+  const double number = storedNumber(setting, settings);
+  if (setting.type == BuildSetting::Type::number)
+    writer.item(number);
+  else if (setting.type == BuildSetting::Type::wholeNumber)
+    writer.item(static_cast<std::uint32_t>(static_cast<std::int64_t>(number)));
+  else
+    writer.item(static_cast<std::uint8_t>(number));
+}
+
+void settingItem(detail::CheckedReader& reader, const BuildSetting& setting, BuildOptions& settings) {
+  double number = 0;
+  if (setting.type == BuildSetting::Type::number) {
+    reader.item(number);
+  } else if (setting.type == BuildSetting::Type::wholeNumber) {
+    std::uint32_t whole = 0;
+    reader.item(whole);
+    number = whole;
+  } else {
+    std::uint8_t index = 0;
+    reader.item(index);
+    if (index >= std::max<std::size_t>(setting.words.size(), 2))
+      reader.damaged("its " + std::string(setting.name) + " is unknown");
+    number = index;
+  }
+  if (number == 0 && setting.get(BuildOptions{}).empty())
+    setting.set(settings, {});
+  else
+    setting.set(settings, std::array{number});
+}
+
+/// The settings whose positions in the file run from `first` to `last`.
+template <typename Stream, typename Settings>
+void settingItems(Stream& stream, Settings& settings, int first, int last) {
+  for (int position = first; position <= last; ++position)
+    settingItem(stream, *std::ranges::find(buildSettings(), position, &BuildSetting::storedAt), settings);
 }
 
 /// Every scalar of the file after magic and version, in order. `Data` is const when writing.
@@ -60,26 +106,17 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   corner(m.source.box.max());
   corner(m.source.normalization.center);
   stream.item(m.source.normalization.scale);
-  stream.item(m.targetError);
+  settingItems(stream, m.settings, 1, 1);
   stream.item(m.totalError);
   stream.item(m.referenceLength);
-  stream.item(m.nearness);
-  stream.item(m.maxDegree);
-  stream.item(m.maxDepth);
-  stream.item(m.quadrature);
-  stream.item(m.strategy);
-  stream.item(m.band);
+  settingItems(stream, m.settings, 2, 7);
   stream.item(m.exactEvaluations);
   stream.item(m.roundingRms);
   if (version >= 2) stepsItem(stream, m.steps);
   if (version < 3) return;
-  stream.item(m.estimator);
-  stream.item(m.criterion);
-  stream.item(m.nearnessKind);
-  stream.item(m.maxError);
+  settingItems(stream, m.settings, 8, 11);
   stream.item(m.measuredError);
-  stream.flag(m.enriched);
-  stream.item(m.continuityWeight);
+  settingItems(stream, m.settings, 12, 13);
   stream.item(data.blend);
   stream.item(sizes.bounds);
   if (version < 4) return;
@@ -91,7 +128,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
 
 void save(const Field& field, const std::filesystem::path& file) {
   const FieldData& data = field.data();
-  CheckedWriter writer(file);
+  detail::CheckedWriter writer(file);
   for (const char c : kMagic) writer.item(c);
   writer.item(kVersion);
   std::visit(
@@ -107,7 +144,7 @@ void save(const Field& field, const std::filesystem::path& file) {
 }
 
 Field load(const std::filesystem::path& file) {
-  CheckedReader reader(file, kKind);
+  detail::CheckedReader reader(file, kKind);
   std::array<char, 8> magic{};
   try {
     for (char& c : magic) reader.item(c);
@@ -125,13 +162,9 @@ Field load(const std::filesystem::path& file) {
   header(reader, data, sizes, version);
   if (sizes.coefficientBytes != 4 && sizes.coefficientBytes != 8)
     reader.damaged("its coefficients have an unknown type");
-  const FieldMetadata& made = data.metadata;
-  if (made.strategy > Strategy::h2 || made.estimator > Estimator::residual || made.criterion > Criterion::optimal ||
-      made.nearnessKind > NearnessKind::exponential)
-    reader.damaged("it was made by an unknown strategy, estimator, criterion or kind of nearness");
-  if (made.source.insideTest > InsideTest::outerHull) reader.damaged("its sign is of an unknown kind");
-  if (version < 4 && made.source.faces > 0)
-    data.metadata.source.insideTest = InsideTest::pseudonormal;  // there was no other
+  Source& source = data.metadata.source;
+  if (source.insideTest > InsideTest::outerHull) reader.damaged("its inside test is unknown");
+  if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // the only one of these versions
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);

@@ -8,92 +8,99 @@
 
 #include "field/query/leaves.h"
 
-namespace hpsdf {
+namespace hpsdf::query {
 namespace {
 
-using Place = std::array<std::int64_t, 3>;  ///< as that of a `Leaf`
-
-/// The six sides of one leaf, and the deepest leaf that touches each.
-class Sides {
+/// Finds the deepest leaf that touches each face of one leaf.
+class FaceNeighbourhood {
  public:
-  Sides(const FieldData& field, const Leaf& leaf) : field_(field), depth_(leaf.depth), place_(leaf.place) {
+  FaceNeighbourhood(const FieldData& field, const OctreeNode& leaf)
+      : field_(field), depth_(leaf.depth), cellIndex_(leaf.cellIndex) {
     for (int axis = 0; axis < 3; ++axis) {
       last_[axis] = (std::int64_t{field.grid[axis]} << depth_) - 1;
       deepest_[axis] = {depth_, depth_};
     }
   }
 
-  std::uint32_t reach() {
-    Place step;
+  /// Returns the leaf's blend extents as `namespace blend_extent` packs them.
+  std::uint32_t packedExtents() {
+    CellIndex step;
     for (step[2] = -1; step[2] <= 1; ++step[2])
       for (step[1] = -1; step[1] <= 1; ++step[1])
         for (step[0] = -1; step[0] <= 1; ++step[0])
-          if (step != Place{0, 0, 0}) look(step);
+          if (step != CellIndex{0, 0, 0}) visitNeighbour(step);
+    using namespace blend_extent;
     std::uint32_t bits = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      bits |= blend_extent::packed(axis, false, place_[axis] == 0 ? blend_extent::kWall : deepest_[axis][0]);
-      bits |= blend_extent::packed(axis, true, place_[axis] == last_[axis] ? blend_extent::kWall : deepest_[axis][1]);
+      bits |= packed(axis, false, cellIndex_[axis] == 0 ? kDomainFace : deepest_[axis][0]);
+      bits |= packed(axis, true, cellIndex_[axis] == last_[axis] ? kDomainFace : deepest_[axis][1]);
     }
     return bits;
   }
 
  private:
-  /// Which of the leaf's two sides along each axis a node touches that touches the leaf.
+  /// The faces of the leaf, by axis and side, that a neighbouring node touches.
   using Touches = std::array<std::array<bool, 2>, 3>;
 
-  /// At the cell of the same size so many steps away: larger leaves there change nothing.
-  void look(const Place& step) {
-    Place there;
+  /// Visits the cell of the leaf's size that is `step` cells away. Larger leaves there do not change the extents.
+  void visitNeighbour(const CellIndex& step) {
+    CellIndex neighbour;
     Touches touches;
     for (int axis = 0; axis < 3; ++axis) {
-      there[axis] = place_[axis] + step[axis];
-      if (there[axis] < 0 || there[axis] > last_[axis]) return;
+      neighbour[axis] = cellIndex_[axis] + step[axis];
+      if (neighbour[axis] < 0 || neighbour[axis] > last_[axis]) return;
       touches[axis] = {step[axis] <= 0, step[axis] >= 0};
     }
-    const std::uint32_t found = nodeAt(field_, there, depth_).node;
+    const std::uint32_t found = nodeAt(field_, neighbour, depth_).node;
     if (!node::isLeaf(field_.nodes[found])) descend(found, depth_, step, touches);
   }
 
-  /// Through the children of an internal node that touch the leaf.
-  void descend(std::uint32_t node, int depth, const Place& step, const Touches& touches) {
+  /// Visits the leaves below an internal node that touch the leaf.
+  void descend(std::uint32_t node, int depth, const CellIndex& step, const Touches& touches) {
     for (std::uint32_t child = 0; child < 8; ++child) {
-      Touches ofChild = touches;
-      bool beside = true;
-      for (int axis = 0; axis < 3; ++axis) {
-        const bool upper = (child >> axis & 1) != 0;
-        if (step[axis] == 0)
-          ofChild[axis][upper ? 0 : 1] = false;
-        else
-          beside &= upper == (step[axis] < 0);
-      }
-      if (!beside) continue;
+      Touches childTouches = touches;
+      if (!restrictToChild(child, step, childTouches)) continue;
       const std::uint32_t found = node::firstChild(field_.nodes[node]) + child;
       if (!node::isLeaf(field_.nodes[found])) {
-        descend(found, depth + 1, step, ofChild);
+        descend(found, depth + 1, step, childTouches);
         continue;
       }
       for (int axis = 0; axis < 3; ++axis)
         for (int side = 0; side < 2; ++side)
-          if (ofChild[axis][side]) deepest_[axis][side] = std::max(deepest_[axis][side], depth + 1);
+          if (childTouches[axis][side]) deepest_[axis][side] = std::max(deepest_[axis][side], depth + 1);
     }
+  }
+
+  /// Removes the faces that only the child's siblings touch. Returns whether the child touches the leaf at all.
+  static bool restrictToChild(std::uint32_t child, const CellIndex& step, Touches& touches) {
+    bool touching = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool upper = (child >> axis & 1) != 0;
+      if (step[axis] == 0)
+        touches[axis][upper ? 0 : 1] = false;
+      else
+        touching &= upper == (step[axis] < 0);
+    }
+    return touching;
   }
 
   const FieldData& field_;
   int depth_;
-  Place place_, last_;
-  std::array<std::array<int, 2>, 3> deepest_;  ///< by axis and side
+  CellIndex cellIndex_;
+  CellIndex last_;                             ///< greatest cell index in the grid at the leaf's depth
+  std::array<std::array<int, 2>, 3> deepest_;  ///< depth of the deepest touching leaf by axis and side
 };
 
 }  // namespace
 
 std::vector<std::uint32_t> findBlendExtents(const FieldData& field) {
-  const std::vector<Leaf> leaves = leavesOf(field);
-  std::vector<std::uint32_t> blendExtents(field.nodes.size(), 0);
+  const std::vector<OctreeNode> leaves = allLeaves(field);
+  std::vector<std::uint32_t> extents(field.nodes.size(), 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
     for (std::size_t n = range.begin(); n < range.end(); ++n)
-      blendExtents[leaves[n].node] = Sides(field, leaves[n]).reach();
+      extents[leaves[n].node] = FaceNeighbourhood(field, leaves[n]).packedExtents();
   });
-  return blendExtents;
+  return extents;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

@@ -4,9 +4,9 @@
 
 #include "hpsdf/detail/field_data.h"
 
-namespace hpsdf {
+namespace hpsdf::query {
 
-/// Of every leaf (`namespace reach`), by node; 0 for internal nodes.
+/// Returns the blend extents of every leaf (`namespace blend_extent`), by node; 0 for internal nodes.
 std::vector<std::uint32_t> findBlendExtents(const FieldData& field);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

@@ -1,5 +1,5 @@
 #pragma once
-// Descent to a leaf and evaluation of its polynomial: what every query shares.
+// Descent of the octree to the leaf that holds a point, and evaluation of the leaf's polynomial.
 
 #include <algorithm>
 #include <array>
@@ -9,22 +9,29 @@
 #include <utility>
 
 #include "basis/legendre.h"
+#include "field/query/leaves.h"
 #include "hpsdf/detail/field_data.h"
 #include "hpsdf/detail/lookup_grid.h"
 
-namespace hpsdf {
+namespace hpsdf::query {
 
-/// A point of the domain in units of base cells.
+/// 1 in the fixed-point numbers of `GridPoint`.
+constexpr std::int64_t kFixedPointOne = std::int64_t{1} << kMaxDepth;
+
+/// A point of the domain in grid coordinates.
 struct GridPoint {
   std::array<double, 3> coordinates;
-  std::array<std::int64_t, 3> fixed;  ///< the same with kMaxDepth binary digits after the point
-  std::uint64_t path;                 ///< those digits, 21 bits an axis: they name the children on its way down
+  std::array<std::int64_t, 3> fixedPoint;  ///< the coordinates, rounded down to kMaxDepth binary digits
+  std::uint64_t path;                      ///< octree path: the digits after the point, 21 bits an axis
 
-  /// The cell of a depth that holds it, in units of such cells.
-  std::int64_t cell(int axis, int depth) const { return fixed[axis] >> (kMaxDepth - depth); }
+  /// Returns the cell of a depth that holds the point.
+  CellIndex cellIndex(int depth) const {
+    const int shift = kMaxDepth - depth;
+    return {fixedPoint[0] >> shift, fixedPoint[1] >> shift, fixedPoint[2] >> shift};
+  }
 };
 
-/// The number of the cell of a depth on a point's way, among its parent's children.
+/// Returns which of its parent's children the cell of a depth on an octree path is.
 inline std::uint32_t childOnPath(std::uint64_t path, int depth) {
   const std::uint64_t bits = (path >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
@@ -37,31 +44,48 @@ inline GridFrame gridFrame(const FieldData& field) {
     frame.upper[axis] = field.domain.max()[axis];
     frame.size[axis] = field.domain.max()[axis] - field.domain.min()[axis];
     frame.cells[axis] = field.grid[axis];
-    frame.last[axis] = (std::int64_t{field.grid[axis]} << kMaxDepth) - 1;
+    frame.last[axis] = field.grid[axis] * kFixedPointOne - 1;
   }
   return frame;
 }
 
-/// `GridPoint::path` of these numbers along one axis.
-inline std::uint64_t pathAlong(int axis, std::int64_t fixed) {
-  return static_cast<std::uint64_t>(fixed & ((std::int64_t{1} << kMaxDepth) - 1)) << (21 * axis);
+/// Returns the bits that one axis adds to the octree path of a point.
+inline std::uint64_t pathBits(int axis, std::int64_t fixedPoint) {
+  return static_cast<std::uint64_t>(fixedPoint & (kFixedPointOne - 1)) << (21 * axis);
 }
 
-/// Coordinates are ((x - lo) / size) · grid in this very order, because a plane through the middle of the domain then
-/// lands exactly on the face between two base cells.
+/// Maps a world coordinate to a grid coordinate. The order of the operations matters: a plane through the middle of the
+/// domain lands exactly on the face between two base cells.
+inline double gridCoordinate(const GridFrame& frame, int axis, double x) {
+  return ((x - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
+}
+
+/// Sets the fixed-point number and the path along one axis. The domain's upper faces belong to the cells below them.
+inline void setFixedPoint(const GridFrame& frame, int axis, GridPoint& point) {
+  point.fixedPoint[axis] =
+      std::min(static_cast<std::int64_t>(point.coordinates[axis] * kFixedPointOne), frame.last[axis]);
+  point.path |= pathBits(axis, point.fixedPoint[axis]);
+}
+
+/// Locates a point that is given in grid coordinates.
+inline GridPoint gridPoint(const GridFrame& frame, const std::array<double, 3>& coordinates) {
+  GridPoint point{coordinates, {}, 0};
+  for (int axis = 0; axis < 3; ++axis) setFixedPoint(frame, axis, point);
+  return point;
+}
+
+/// Locates a point of the domain that is given in world coordinates.
 inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
-  constexpr auto kOne = std::int64_t{1} << kMaxDepth;
-  GridPoint at;
-  at.path = 0;
+  GridPoint point;
+  point.path = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    at.coordinates[axis] = ((x[axis] - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
-    at.fixed[axis] = std::min(static_cast<std::int64_t>(at.coordinates[axis] * kOne), frame.last[axis]);
-    at.path |= pathAlong(axis, at.fixed[axis]);
+    point.coordinates[axis] = gridCoordinate(frame, axis, x[axis]);
+    setFixedPoint(frame, axis, point);
   }
-  return at;
+  return point;
 }
 
-/// The way back from grid coordinates.
+/// Maps grid coordinates to world coordinates.
 inline Vector3 worldPoint(const GridFrame& frame, const std::array<double, 3>& coordinates) {
   Vector3 x;
   for (int axis = 0; axis < 3; ++axis)
@@ -69,73 +93,68 @@ inline Vector3 worldPoint(const GridFrame& frame, const std::array<double, 3>& c
   return x;
 }
 
-/// Of a cell of a depth, by its place in such cells.
-inline Box boxOf(const GridFrame& frame, int depth, const std::array<std::int64_t, 3>& place) {
+/// Returns the box of a cell in world coordinates.
+inline Box cellBox(const GridFrame& frame, int depth, const CellIndex& cellIndex) {
   std::array<double, 3> lower, upper;
   for (int axis = 0; axis < 3; ++axis) {
-    lower[axis] = std::ldexp(static_cast<double>(place[axis]), -depth);
-    upper[axis] = std::ldexp(static_cast<double>(place[axis] + 1), -depth);
+    lower[axis] = std::ldexp(static_cast<double>(cellIndex[axis]), -depth);
+    upper[axis] = std::ldexp(static_cast<double>(cellIndex[axis] + 1), -depth);
   }
   return Box(worldPoint(frame, lower), worldPoint(frame, upper));
 }
 
-/// The leaf that holds a point.
-struct Location {
-  std::uint32_t node;
-  int depth;
-};
-
-inline Location locate(const FieldData& field, const GridPoint& x) {
-  Location at{static_cast<std::uint32_t>((x.cell(2, 0) * field.grid[1] + x.cell(1, 0)) * field.grid[0] + x.cell(0, 0)),
-              0};
-  while (!node::isLeaf(field.nodes[at.node]))
-    at.node = node::firstChild(field.nodes[at.node]) + childOnPath(x.path, ++at.depth);
-  return at;
+/// Finds the leaf that holds a point, from its base cell down.
+inline OctreeNode findLeafNode(const FieldData& field, const GridPoint& point) {
+  const CellIndex base = point.cellIndex(0);
+  auto node = static_cast<std::uint32_t>((base[2] * field.grid[1] + base[1]) * field.grid[0] + base[0]);
+  int depth = 0;
+  while (!node::isLeaf(field.nodes[node]))
+    node = node::firstChild(field.nodes[node]) + childOnPath(point.path, ++depth);
+  return {node, depth, point.cellIndex(depth)};
 }
 
-/// A leaf as queries need it.
-struct FoundLeaf {
-  std::uint64_t bits;  ///< of its node
+/// A point in the local coordinates of a leaf.
+struct LeafPoint {
+  std::uint64_t bits;  ///< the leaf's node
   int depth;
-  std::array<double, 3> local;        ///< in [-1, 1]
-  std::array<std::int64_t, 3> place;  ///< in cells of its depth, counted from the domain's lower corner
-  std::size_t number;  ///< its node's or, where the lookup grid names it, that of all nodes + its entry's
+  std::array<double, 3> local;    ///< in [−1, 1] within the leaf; outside where a neighbour's polynomial is continued
+  CellIndex cellIndex;            ///< of the leaf
+  std::size_t blendExtentsIndex;  ///< index into `LookupGrid::blendExtents`
 };
 
-/// A leaf for a point in grid coordinates.
-inline FoundLeaf leafWithin(std::uint64_t bits, int depth, std::size_t number, const std::array<std::int64_t, 3>& place,
-                            const std::array<double, 3>& coordinates) {
-  FoundLeaf leaf{bits, depth, {}, place, number};
-  // scaling by a power of two and taking off the whole part are exact
+inline LeafPoint leafPoint(std::uint64_t bits, int depth, std::size_t blendExtentsIndex, const CellIndex& cellIndex,
+                           const std::array<double, 3>& gridCoordinates) {
+  LeafPoint leaf{bits, depth, {}, cellIndex, blendExtentsIndex};
+  // Scaling by a power of two and subtracting the integer part are exact.
   const double scale = std::uint32_t{1} << depth;
   for (int axis = 0; axis < 3; ++axis)
-    leaf.local[axis] = 2 * (coordinates[axis] * scale - static_cast<double>(place[axis])) - 1;
+    leaf.local[axis] = 2 * (gridCoordinates[axis] * scale - static_cast<double>(cellIndex[axis])) - 1;
   return leaf;
 }
 
-/// The same leaf as `locate` finds, by the lookup grid.
-inline FoundLeaf find(const FieldData& field, const LookupGrid& lookupGrid, const GridPoint& at) {
-  const int top = lookupGrid.depth;
-  const std::int64_t entry = at.cell(2, top) * lookupGrid.slab + at.cell(1, top) * lookupGrid.row + at.cell(0, top);
+/// Finds the leaf that holds a point as `findLeafNode` does, but starts in the lookup grid.
+inline LeafPoint findLeaf(const FieldData& field, const LookupGrid& lookupGrid, const GridPoint& point) {
+  const CellIndex top = point.cellIndex(lookupGrid.depth);
+  const std::int64_t entry = top[2] * lookupGrid.slab + top[1] * lookupGrid.row + top[0];
   std::uint64_t bits = lookupGrid.entries[entry];
   int depth = LookupGrid::depthOf(bits);
-  std::size_t number = field.nodes.size() + entry;
+  std::size_t index = field.nodes.size() + entry;
   while (!node::isLeaf(bits)) {
-    number = node::firstChild(bits) + childOnPath(at.path, ++depth);
-    bits = field.nodes[number];
+    index = node::firstChild(bits) + childOnPath(point.path, ++depth);
+    bits = field.nodes[index];
   }
-  return leafWithin(bits, depth, number, {at.cell(0, depth), at.cell(1, depth), at.cell(2, depth)}, at.coordinates);
+  return leafPoint(bits, depth, index, point.cellIndex(depth), point.coordinates);
 }
 
-/// Edge lengths of a cell of the given depth.
+/// Returns the edge lengths of a cell of a depth in world units.
 inline Vector3 cellSize(const FieldData& field, int depth) {
   const Vector3 size = field.domain.max() - field.domain.min();
   const double scale = std::ldexp(1.0, -depth);
   return {size.x() / field.grid[0] * scale, size.y() / field.grid[1] * scale, size.z() / field.grid[2] * scale};
 }
 
-// A degree that is known when compiling is a type, `Constant<P>`, with which the loops below become straight code; one
-// that is not is an int.
+/// A degree that is known at compile time, for which the compiler unrolls the loops over coefficients. A degree that is
+/// known only at run time is an int.
 template <int P>
 using Constant = std::integral_constant<int, P>;
 
@@ -145,15 +164,17 @@ constexpr Constant<A - B> minus(Constant<A>, Constant<B>) {
   return {};
 }
 
-/// Room for a number a degree up to this one.
+/// Size of an array that holds one number for each degree from 0 up to `Degree`.
 template <typename Degree>
-constexpr int kRoom = kMaxDegree + 1;
+constexpr int kDegreeCount = kMaxDegree + 1;
 template <int P>
-constexpr int kRoom<Constant<P>> = P + 1;
+constexpr int kDegreeCount<Constant<P>> = P + 1;
 
+using basis::legendreValues;
+using basis::legendreValuesAndDerivatives;
 #include "field/query/polynomial-inl.h"
 
-/// f(degree), the common degrees as constants.
+/// Calls f(degree) with a `Constant` for the degrees that most leaves have.
 template <typename F>
 auto withDegree(int degree, const F& f) {
   switch (degree) {
@@ -168,60 +189,62 @@ auto withDegree(int degree, const F& f) {
   }
 }
 
-/// The polynomial at local coordinates in [-1, 1]³.
+/// Evaluates a polynomial at local coordinates in [−1, 1]³.
 template <typename T>
-double evaluate(const T* c, int degree, const std::array<double, 3>& local) {
-  return withDegree(degree, [&](auto known) { return evaluateAt(c, known, local); });
+double evaluate(const T* coefficients, int degree, const std::array<double, 3>& local) {
+  return withDegree(degree, [&](auto known) { return evaluatePolynomial(coefficients, known, local); });
 }
 
-/// Also the gradient with respect to the local coordinates.
+/// Evaluates a polynomial and its gradient with respect to the local coordinates.
 template <typename T>
-ValueAndGradient evaluateWithGradient(const T* c, int degree, const std::array<double, 3>& local) {
-  const auto [value, x, y, z] = withDegree(degree, [&](auto known) { return evaluateWithGradientAt(c, known, local); });
+ValueAndGradient evaluateWithGradient(const T* coefficients, int degree, const std::array<double, 3>& local) {
+  const auto [value, x, y, z] =
+      withDegree(degree, [&](auto known) { return evaluatePolynomialWithGradient(coefficients, known, local); });
   return {value, {x, y, z}};
 }
 
-/// As one condition: six branches would cost more than the comparisons. NaN is not within.
-inline bool contains(const GridFrame& domain, const Vector3& x) {
-  bool within = true;
-  for (int axis = 0; axis < 3; ++axis)
-    within &= static_cast<int>(x[axis] >= domain.lower[axis]) & static_cast<int>(x[axis] <= domain.upper[axis]);
-  return within;
+/// Evaluates the leaf's polynomial in world units.
+template <typename T>
+void evaluateLeaf(const T* coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
+  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
 }
 
-/// The closest point of the domain; for NaN some point.
-inline Vector3 closestWithin(const GridFrame& domain, const Vector3& x) {
+template <typename T>
+void evaluateLeaf(const T* coefficients, const GridFrame& frame, const LeafPoint& leaf, ValueAndGradient& result) {
+  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
+  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
+}
+
+/// Tells whether a point lies in the domain; NaN does not. One combined condition is cheaper than six branches.
+inline bool contains(const GridFrame& domain, const Vector3& x) {
+  bool inside = true;
+  for (int axis = 0; axis < 3; ++axis)
+    inside &= static_cast<int>(x[axis] >= domain.lower[axis]) & static_cast<int>(x[axis] <= domain.upper[axis]);
+  return inside;
+}
+
+/// Returns the domain's point closest to x; for NaN some point of the domain.
+inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
   Vector3 closest;
   for (int axis = 0; axis < 3; ++axis)
     closest[axis] = x[axis] > domain.lower[axis] ? std::min(x[axis], domain.upper[axis]) : domain.lower[axis];
   return closest;
 }
 
-/// Without squares, which overflow or vanish far from the domain or very close to it. (The hypot of three arguments
-/// of GCC 12 loses NaN and infinity.)
+/// Returns |v| without squares, which overflow far from the domain and vanish close to it. The three-argument hypot of
+/// GCC 12 loses NaN and infinity.
 inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
-/// From f(q) at the closest point q of the domain to f(q) + |x - q|; `beyond` is x - q.
-inline void extend(const Vector3& beyond, double& value) { value += length(beyond); }
+/// Continues the field from f(q) at the domain's closest point q to f(q) + |x − q|; `offset` is x − q.
+inline void continueOutside(const Vector3& offset, double& value) { value += length(offset); }
 
-inline void extend(const Vector3& beyond, ValueAndGradient& result) {
-  const double distance = length(beyond);
+inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
+  const double distance = length(offset);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
-    if (beyond[axis] != 0) result.gradient[axis] = 0;  // along an axis on which x is clamped, f(q) does not change
-  result.gradient += beyond / distance;
+    if (offset[axis] != 0) result.gradient[axis] = 0;  // q, and with it f(q), does not depend on a clamped coordinate
+  result.gradient += offset / distance;
 }
 
-template <typename T>
-void answer(const T* coefficients, const GridFrame&, const FoundLeaf& leaf, double& value) {
-  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-}
-
-template <typename T>
-void answer(const T* coefficients, const GridFrame& frame, const FoundLeaf& leaf, ValueAndGradient& result) {
-  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
-  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
-}
-
-}  // namespace hpsdf
+}  // namespace hpsdf::query

@@ -16,11 +16,11 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "field/query/evaluate_batch.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// Highway requires this include to follow foreach_target.h.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace hpsdf {
+namespace hpsdf::query {
 namespace HWY_NAMESPACE {
 namespace {
 
@@ -31,7 +31,7 @@ using Unsigned = hn::RebindToUnsigned<Tag>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kLanes = hn::MaxLanes(Tag());
 
-/// A number for each of some points.
+/// One double for each of a few points, with the arithmetic that the polynomial code expects of a `Number`.
 struct Lanes {
   Vec v;
   Lanes() = default;
@@ -46,58 +46,59 @@ struct Lanes {
 #include "basis/legendre-inl.h"
 #include "field/query/polynomial-inl.h"
 
-/// Enough that the loops below wait for memory together, few enough for the nearest cache.
+/// Points of one batch: enough that the loops below overlap their waits for memory, few enough for the L1 cache.
 constexpr std::size_t kBatch = 128;
 static_assert(kBatch % kLanes == 0);
 
-/// The degrees for which there is code in vectors, as in `withDegree`.
-constexpr int kLeastCommon = 2, kMostCommon = 4;
-constexpr std::size_t kLists = kMostCommon - kLeastCommon + 2;
+/// The degrees for which there is vector code; `withDegree` has constants for the same ones.
+constexpr int kMinVectorDegree = 2, kMaxVectorDegree = 4;
 
-constexpr double kOne = std::uint64_t{1} << kMaxDepth;
+/// One list of points for each degree with vector code, and one for all other degrees.
+constexpr std::size_t kLists = kMaxVectorDegree - kMinVectorDegree + 2;
 
-/// A point in its leaf.
-struct Place {
+/// A point in local coordinates and its leaf's node with the depth as `LookupGrid::entry` packs it. The node's bits are
+/// stored as a double so that four numbers are loaded at once.
+struct PackedLeafPoint {
   double local[3];
-  double bits;  ///< of the leaf's node, with its depth as the lookup grid has it: not a number, but as wide as one
+  double bits;
 };
 
-/// Points on their way to their leaves. There is room for whole vectors: the last point fills the last one.
+/// Points during their descent. Every array has room for whole vectors; the last point fills up the last vector.
 struct Batch {
   const Vector3* points;
   std::size_t count;
-  bool within;                                 ///< whether all lie in the domain
-  HWY_ALIGN double coordinates[3][kBatch];     ///< as in GridPoint
-  HWY_ALIGN double fixed[3][kBatch];           ///< as in GridPoint; whole numbers
-  HWY_ALIGN std::uint64_t path[kBatch];        ///< as in GridPoint
-  HWY_ALIGN std::uint64_t entry[kBatch];       ///< of the lookup grid
-  std::uint64_t numbers[kBatch];               ///< of the leaves, as in FoundLeaf; without blending unknown
-  HWY_ALIGN std::uint64_t bits[kBatch];        ///< of the nodes, with their depth as the lookup grid has it
-  HWY_ALIGN Place places[kBatch];              ///< when the leaves are found
-  std::uint8_t list[kLists][kBatch + kLanes];  ///< points in leaves of each common degree, then all others
-  std::size_t listed[kLists];
+  bool allInDomain;
+  HWY_ALIGN double coordinates[3][kBatch];       ///< as in `GridPoint`
+  HWY_ALIGN double fixedPoint[3][kBatch];        ///< as in `GridPoint`; integers that double holds exactly
+  HWY_ALIGN std::uint64_t path[kBatch];          ///< as in `GridPoint`
+  HWY_ALIGN std::uint64_t entry[kBatch];         ///< index into `LookupGrid::entries`
+  std::uint64_t blendExtentsIndex[kBatch];       ///< as in `LeafPoint`; not set in fields without blending
+  HWY_ALIGN std::uint64_t bits[kBatch];          ///< nodes with their depth as `LookupGrid::entry` packs it
+  HWY_ALIGN PackedLeafPoint leafPoints[kBatch];  ///< set when all leaves are found
+  std::uint8_t listed[kLists][kBatch + kLanes];  ///< the points of each list
+  std::size_t listedCount[kLists];
 };
 
-/// The bits of whole numbers below 2^52.
-HWY_INLINE hn::Vec<Unsigned> integers(Vec whole) {
+/// Converts non-negative integers below 2^52 from double to unsigned.
+HWY_INLINE hn::Vec<Unsigned> toUnsigned(Vec integers) {
   constexpr auto kImplicit = std::uint64_t{1} << 52;
-  return hn::And(hn::BitCast(Unsigned(), whole + hn::Set(Tag(), double(kImplicit))),
+  return hn::And(hn::BitCast(Unsigned(), integers + hn::Set(Tag(), double(kImplicit))),
                  hn::Set(Unsigned(), kImplicit - 1));
 }
 
-/// 2^depth.
-HWY_INLINE Vec scaleOf(hn::Vec<Unsigned> bits) {
+/// Returns 2^depth of nodes with their depth.
+HWY_INLINE Vec depthScale(hn::Vec<Unsigned> bits) {
   const auto depth = hn::And(hn::ShiftRight<40>(bits), hn::Set(Unsigned(), 0xff));
   return hn::BitCast(Tag(), hn::ShiftLeft<52>(depth + hn::Set(Unsigned(), 1023)));
 }
 
-/// `closestWithin` and `gridPoint` in vectors, and whole numbers kept as double, which is exact.
+/// Maps the points to grid coordinates, as `closestInDomain` and `gridPoint` do.
 void enterGrid(const LookupGrid& lookupGrid, Batch& batch) {
   const Tag d;
   const auto number = [&](auto value) HWY_ATTR { return hn::Set(d, static_cast<double>(value)); };
   const GridFrame& frame = lookupGrid.frame;
-  const auto one = number(kOne), fromFixed = number(std::ldexp(1.0, lookupGrid.depth - kMaxDepth));
-  auto within = hn::FirstN(d, kLanes);
+  const auto one = number(kFixedPointOne), fromFixedPoint = number(std::ldexp(1.0, lookupGrid.depth - kMaxDepth));
+  auto inDomain = hn::FirstN(d, kLanes);
   for (std::size_t i = 0; i < batch.count; i += kLanes) {
     const Vector3* from = batch.points + i;
     std::array<Vector3, kLanes> last;
@@ -111,87 +112,88 @@ void enterGrid(const LookupGrid& lookupGrid, Batch& batch) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto lower = number(frame.lower[axis]);
       const auto closest = hn::IfThenElse(x[axis] > lower, hn::Min(x[axis], number(frame.upper[axis])), lower);
-      within = hn::And(within, closest == x[axis]);
+      inDomain = hn::And(inDomain, closest == x[axis]);
       const auto coordinate = ((closest - lower) / number(frame.size[axis])) * number(frame.cells[axis]);
-      const auto fixed = hn::Min(hn::Floor(coordinate * one), number(frame.last[axis]));
+      const auto fixedPoint = hn::Min(hn::Floor(coordinate * one), number(frame.last[axis]));
       hn::Store(coordinate, d, batch.coordinates[axis] + i);
-      hn::Store(fixed, d, batch.fixed[axis] + i);
-      const auto digits = hn::And(integers(fixed), hn::Set(Unsigned(), (std::uint64_t{1} << kMaxDepth) - 1));
+      hn::Store(fixedPoint, d, batch.fixedPoint[axis] + i);
+      const auto digits = hn::And(toUnsigned(fixedPoint), hn::Set(Unsigned(), kFixedPointOne - 1));
       path = hn::Or(path, hn::ShiftLeftSame(digits, 21 * axis));
-      cell[axis] = hn::Floor(fixed * fromFixed);
+      cell[axis] = hn::Floor(fixedPoint * fromFixedPoint);
     }
     hn::Store(path, Unsigned(), batch.path + i);
-    hn::Store(integers(cell[2] * number(lookupGrid.slab) + cell[1] * number(lookupGrid.row) + cell[0]), Unsigned(),
+    hn::Store(toUnsigned(cell[2] * number(lookupGrid.slab) + cell[1] * number(lookupGrid.row) + cell[0]), Unsigned(),
               batch.entry + i);
   }
-  batch.within = hn::AllTrue(d, within);
+  batch.allInDomain = hn::AllTrue(d, inDomain);
 }
 
-/// Level by level, so that the points' nodes are fetched all at once. A point is put on the list of those that go on
-/// whether it does or not, and then counted or not: a branch would be mispredicted.
-template <bool WithNumbers>
+/// Descends to the leaves depth by depth, so that the nodes of all points are fetched at once. Every point is written
+/// to the list of those that descend further, and the list grows only for internal nodes: a branch would be
+/// mispredicted.
+template <bool WithBlendExtents>
 void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch) {
-  std::uint8_t waiting[kBatch];
+  std::uint8_t descending[kBatch];
   std::size_t count = 0;
-  const auto reach = [&](std::size_t i, std::size_t number, std::uint64_t bits) {
-    if constexpr (WithNumbers) batch.numbers[i] = number;
+  const auto enterNode = [&](std::size_t i, std::size_t index, std::uint64_t bits) {
+    if constexpr (WithBlendExtents) batch.blendExtentsIndex[i] = index;
     batch.bits[i] = bits;
-    waiting[count] = static_cast<std::uint8_t>(i);
+    descending[count] = static_cast<std::uint8_t>(i);
     count += !node::isLeaf(bits);
   };
   for (std::size_t i = 0; i < batch.count; ++i)
-    reach(i, field.nodes.size() + batch.entry[i], lookupGrid.entries[batch.entry[i]]);
+    enterNode(i, field.nodes.size() + batch.entry[i], lookupGrid.entries[batch.entry[i]]);
   for (int depth = lookupGrid.depth + 1; count > 0; ++depth) {
     const std::size_t before = std::exchange(count, 0);
     for (std::size_t n = 0; n < before; ++n) {
-      const std::size_t i = waiting[n];
+      const std::size_t i = descending[n];
       const std::uint32_t child = node::firstChild(batch.bits[i]) + childOnPath(batch.path[i], depth);
-      reach(i, child, LookupGrid::entry(field.nodes[child], depth));
+      enterNode(i, child, LookupGrid::entry(field.nodes[child], depth));
     }
   }
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
-/// Lists the points by degree, in the manner of `descend`, and has their coefficients fetched.
+/// Lists the points by degree, without branches as `descend` does, and prefetches their coefficients.
 template <typename T>
-void sortByDegree(const T* coefficients, Batch& batch) {
-  std::array<std::size_t, kLists> listed{};
+void listByDegree(const T* coefficients, Batch& batch) {
+  std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; ++i) {
     const int degree = node::degree(batch.bits[i]);
     const T* first = coefficients + node::offset(batch.bits[i]);
     const std::size_t last = coefficientCount(degree) - 1;
-    // for all leaves what the common ones take at most: as many as each takes would be mispredicted
-    for (std::size_t at = 0; at < coefficientCount(kMostCommon); at += 64 / sizeof(T))
+    // The same number of cache lines for all leaves, because a loop end that varies would be mispredicted.
+    for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
       __builtin_prefetch(first + std::min(at, last));
-    for (std::size_t k = 0; k < kLists; ++k) batch.list[k][listed[k]] = static_cast<std::uint8_t>(i);
-    for (std::size_t k = 0; k + 1 < kLists; ++k) listed[k] += degree == kLeastCommon + int(k);
-    listed[kLists - 1] += degree < kLeastCommon || degree > kMostCommon;
+    for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
+    for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += degree == kMinVectorDegree + int(k);
+    counts[kLists - 1] += degree < kMinVectorDegree || degree > kMaxVectorDegree;
   }
   for (std::size_t k = 0; k < kLists; ++k) {
-    if (listed[k] > 0) std::fill_n(batch.list[k] + listed[k], kLanes - 1, batch.list[k][listed[k] - 1]);
-    batch.listed[k] = listed[k];
+    if (counts[k] > 0) std::fill_n(batch.listed[k] + counts[k], kLanes - 1, batch.listed[k][counts[k] - 1]);
+    batch.listedCount[k] = counts[k];
   }
 }
 
-/// Local coordinates, as in `find`.
+/// Computes local coordinates as `leafPoint` does.
 void enterLeaves(Batch& batch) {
   const Tag d;
   for (std::size_t i = 0; i < batch.count; i += kLanes) {
     const auto bits = hn::Load(Unsigned(), batch.bits + i);
-    const auto scale = scaleOf(bits), fromFixed = scale * hn::Set(d, 1 / kOne);
+    const auto scale = depthScale(bits), fromFixedPoint = scale * hn::Set(d, 1 / double(kFixedPointOne));
     Vec local[3];
     for (int axis = 0; axis < 3; ++axis) {
-      const auto cell = hn::Floor(hn::Load(d, batch.fixed[axis] + i) * fromFixed);
+      const auto cell = hn::Floor(hn::Load(d, batch.fixedPoint[axis] + i) * fromFixedPoint);
       local[axis] = hn::Set(d, 2.0) * (hn::Load(d, batch.coordinates[axis] + i) * scale - cell) - hn::Set(d, 1.0);
     }
-    hn::StoreInterleaved4(local[0], local[1], local[2], hn::BitCast(d, bits), d, batch.places[i].local);
+    hn::StoreInterleaved4(local[0], local[1], local[2], hn::BitCast(d, bits), d, batch.leafPoints[i].local);
   }
 }
 
 HWY_INLINE Vec load(const double* from) { return hn::LoadU(Tag(), from); }
 HWY_INLINE Vec load(const float* from) { return hn::PromoteTo(Tag(), hn::LoadU(hn::Rebind<float, Tag>(), from)); }
 
-/// Lane l of out[i] becomes from[l][i], for as many i as there are lanes.
+/// Sets lane l of out[i] to from[l][offset + i] for i below the number of lanes.
 template <typename T>
 HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::size_t offset, Lanes* out) {
 #if HWY_TARGET == HWY_SCALAR
@@ -220,36 +222,36 @@ HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::si
 template <typename T, std::size_t Count>
 HWY_INLINE void loadAllTransposed(const std::array<const T*, kLanes>& from, std::array<Lanes, Count>& out) {
   for (std::size_t i = 0; i < Count; i += kLanes) {
-    const std::size_t at = std::min(i, Count - kLanes);  // never beyond the end
+    const std::size_t at = std::min(i, Count - kLanes);  // The last step overlaps the one before, not the end.
     loadTransposed(from, at, out.data() + at);
   }
 }
 
-/// `answer` at the points of a common degree's list, a vector of them at a time. At the list's end the last one stands
-/// in for those that are missing, and is answered repeatedly.
-template <int P, typename T, typename Answer>
-void answerList(const T* coefficients, const GridFrame& frame, const Batch& batch, Answer* out) {
+/// Evaluates the polynomials at the listed points of degree P, one vector of points at a time. The last point of the
+/// list is repeated in unused lanes.
+template <int P, typename T, typename Result>
+void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   const Tag d;
-  for (std::size_t n = 0; n < batch.listed[P - kLeastCommon]; n += kLanes) {
-    const std::uint8_t* points = batch.list[P - kLeastCommon] + n;
-    std::array<const double*, kLanes> places;
+  for (std::size_t n = 0; n < batch.listedCount[P - kMinVectorDegree]; n += kLanes) {
+    const std::uint8_t* points = batch.listed[P - kMinVectorDegree] + n;
+    std::array<const double*, kLanes> leafPoints;
     std::array<const T*, kLanes> leaves;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      places[lane] = batch.places[points[lane]].local;
+      leafPoints[lane] = batch.leafPoints[points[lane]].local;
       leaves[lane] = coefficients + node::offset(batch.bits[points[lane]]);
     }
-    std::array<Lanes, 4> place;
+    std::array<Lanes, 4> leafPoint;
     std::array<Lanes, coefficientCount(P)> c;
-    loadAllTransposed(places, place);
+    loadAllTransposed(leafPoints, leafPoint);
     loadAllTransposed(leaves, c);
-    const std::array<Lanes, 3> local = {place[0], place[1], place[2]};
-    if constexpr (std::is_same_v<Answer, double>) {
+    const std::array<Lanes, 3> local = {leafPoint[0], leafPoint[1], leafPoint[2]};
+    if constexpr (std::is_same_v<Result, double>) {
       HWY_ALIGN double value[kLanes];
-      hn::Store(evaluateAt(c.data(), Constant<P>(), local).v, d, value);
+      hn::Store(evaluatePolynomial(c.data(), Constant<P>(), local).v, d, value);
       for (std::size_t lane = 0; lane < kLanes; ++lane) out[points[lane]] = value[lane];
     } else {
-      const auto result = evaluateWithGradientAt(c.data(), Constant<P>(), local);
-      const auto scale = hn::Set(d, 2.0) * scaleOf(hn::BitCast(Unsigned(), place[3].v));
+      const auto result = evaluatePolynomialWithGradient(c.data(), Constant<P>(), local);
+      const auto scale = hn::Set(d, 2.0) * depthScale(hn::BitCast(Unsigned(), leafPoint[3].v));
       HWY_ALIGN double number[4][kLanes];
       hn::Store(result[0].v, d, number[0]);
       for (int axis = 0; axis < 3; ++axis) {
@@ -262,111 +264,133 @@ void answerList(const T* coefficients, const GridFrame& frame, const Batch& batc
   }
 }
 
-template <typename T, typename Answer>
-void answerLeaves(const T* coefficients, const GridFrame& frame, const Batch& batch, Answer* out) {
-  upTo(Constant<kMostCommon - kLeastCommon>(),
-       [&](auto k) { answerList<kLeastCommon + k>(coefficients, frame, batch, out); });
-  for (std::size_t n = 0; n < batch.listed[kLists - 1]; ++n) {
-    const std::size_t i = batch.list[kLists - 1][n];
-    const auto& local = batch.places[i].local;
-    const FoundLeaf leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {local[0], local[1], local[2]}, {}, 0};
-    answer(coefficients, frame, leaf, out[i]);
+/// Evaluates every point's own leaf.
+template <typename T, typename Result>
+void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
+  forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
+              [&](auto k) { evaluateListed<kMinVectorDegree + k>(coefficients, frame, batch, out); });
+  for (std::size_t n = 0; n < batch.listedCount[kLists - 1]; ++n) {
+    const std::size_t i = batch.listed[kLists - 1][n];
+    const auto& local = batch.leafPoints[i].local;
+    const LeafPoint leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {local[0], local[1], local[2]}, {}, 0};
+    evaluateLeaf(coefficients, frame, leaf, out[i]);
   }
 }
 
-HWY_INLINE FoundLeaf leafOf(const Batch& batch, std::size_t i) {
-  const auto& local = batch.places[i].local;
-  const int depth = LookupGrid::depthOf(batch.bits[i]);
-  FoundLeaf leaf{batch.bits[i], depth, {local[0], local[1], local[2]}, {}, batch.numbers[i]};
-  for (int axis = 0; axis < 3; ++axis)
-    leaf.place[axis] = static_cast<std::int64_t>(batch.fixed[axis][i]) >> (kMaxDepth - depth);
-  return leaf;
+/// Returns the i-th point of a field with blending in its leaf, without the cell index.
+HWY_INLINE LeafPoint leafPointOf(const Batch& batch, std::size_t i) {
+  const auto& local = batch.leafPoints[i].local;
+  return {batch.bits[i],
+          LookupGrid::depthOf(batch.bits[i]),
+          {local[0], local[1], local[2]},
+          {},
+          batch.blendExtentsIndex[i]};
 }
 
-/// The points near one face of their leaves, each on the way to the leaf across.
-struct Across {
-  Batch batch;
+/// Blends all leaves that have a weight at the i-th point.
+template <typename Result>
+Result blendAllAt(const FieldData& field, const LookupGrid& lookupGrid, const Batch& batch, std::size_t i) {
+  return blendAll<Result>(field, lookupGrid,
+                          {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]},
+                          LookupGrid::depthOf(batch.bits[i]));
+}
+
+/// The points of a batch that lie in blend zones, without branches as in `descend`.
+struct BlendZonePoints {
   std::uint8_t point[kBatch];
-  std::uint8_t axis[kBatch];
+  std::uint8_t axes[kBatch];  ///< as `blendZoneAxes` returns them
+  std::size_t count = 0;
+
+  BlendZonePoints(const FieldData& field, const Batch& batch) {
+    for (std::size_t i = 0; i < batch.count; ++i) {
+      const double* local = batch.leafPoints[i].local;
+      point[count] = static_cast<std::uint8_t>(i);
+      axes[count] = static_cast<std::uint8_t>(blendZoneAxes(field, {local[0], local[1], local[2]}));
+      count += axes[count] != 0;
+    }
+  }
 };
 
-/// As `blendedWithin`, for all points that others' leaves may reach, whose own leaves have answered already.
-template <typename T, typename Answer>
-void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coefficients, const Batch& batch,
-           Answer* out) {
-  const GridFrame& frame = lookupGrid.frame;
-  const auto mixAt = [&](std::size_t i) {
-    out[i] =
-        mixed<Answer>(field, lookupGrid, {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]},
-                      LookupGrid::depthOf(batch.bits[i]));
-  };
-  std::uint8_t points[kBatch], near[kBatch];
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < batch.count; ++i) {
-    const double* local = batch.places[i].local;
-    points[count] = static_cast<std::uint8_t>(i);
-    near[count] = static_cast<std::uint8_t>(nearAxes(field, {local[0], local[1], local[2]}));
-    count += near[count] != 0;
+/// Points near one face of their leaves, with the descent to the leaf across that face.
+struct AcrossFaces {
+  Batch batch;
+  std::uint8_t point[kBatch];  ///< index into the batch of the points themselves
+  std::uint8_t axis[kBatch];   ///< across the face
+};
+
+/// Adds a point that is near the face across `axis` alone, unless the domain ends at that face.
+HWY_INLINE void addAcrossFace(const LookupGrid& lookupGrid, const Batch& batch, std::size_t i, int axis,
+                              AcrossFaces& across) {
+  const int depth = LookupGrid::depthOf(batch.bits[i]);
+  const auto before = static_cast<std::int64_t>(batch.fixedPoint[axis][i]);
+  const std::int64_t after =
+      fixedPointAcross(before >> (kMaxDepth - depth), depth, batch.leafPoints[i].local[axis] > 0);
+  if (after < 0 || after > lookupGrid.frame.last[axis]) return;
+  Batch& others = across.batch;
+  const std::size_t other = others.count++;
+  across.point[other] = static_cast<std::uint8_t>(i);
+  across.axis[other] = static_cast<std::uint8_t>(axis);
+  for (int a = 0; a < 3; ++a) {
+    others.coordinates[a][other] = batch.coordinates[a][i];
+    others.fixedPoint[a][other] = batch.fixedPoint[a][i];
   }
-  Across across;
+  others.fixedPoint[axis][other] = static_cast<double>(after);
+  others.path[other] = batch.path[i] ^ pathBits(axis, before) ^ pathBits(axis, after);
+  const int shift = kMaxDepth - lookupGrid.depth;
+  const std::int64_t stride = axis == 0 ? 1 : axis == 1 ? lookupGrid.row : lookupGrid.slab;
+  others.entry[other] = batch.entry[i] + ((after >> shift) - (before >> shift)) * stride;
+}
+
+/// Blends as `blendInZone` does at all points in blend zones. `out` holds the results of the points' own leaves.
+template <typename T, typename Result>
+void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coefficients, const Batch& batch,
+           Result* out) {
+  // Blend points near several faces one by one, and collect those near a single face.
+  const BlendZonePoints points(field, batch);
+  AcrossFaces across;
   Batch& others = across.batch;
   others.count = 0;
-  for (std::size_t n = 0; n < count; ++n) {
-    const std::size_t i = points[n];
-    if (!std::has_single_bit(near[n])) {
-      mixAt(i);
-      continue;
-    }
-    const int axis = std::countr_zero(near[n]);
-    const int depth = LookupGrid::depthOf(batch.bits[i]);
-    const auto place = static_cast<std::int64_t>(batch.fixed[axis][i]) >> (kMaxDepth - depth);
-    const std::int64_t fixed = fixedAcross(place, depth, batch.places[i].local[axis] > 0);
-    if (fixed < 0 || fixed > frame.last[axis]) continue;
-    const std::size_t other = others.count++;
-    across.point[other] = points[n];
-    across.axis[other] = static_cast<std::uint8_t>(axis);
-    const int shift = kMaxDepth - lookupGrid.depth;
-    const std::int64_t step = axis == 0 ? 1 : axis == 1 ? lookupGrid.row : lookupGrid.slab;
-    const auto before = static_cast<std::int64_t>(batch.fixed[axis][i]);
-    for (int a = 0; a < 3; ++a) {
-      others.coordinates[a][other] = batch.coordinates[a][i];
-      others.fixed[a][other] = batch.fixed[a][i];
-    }
-    others.fixed[axis][other] = static_cast<double>(fixed);
-    others.path[other] = batch.path[i] ^ pathAlong(axis, before) ^ pathAlong(axis, fixed);
-    others.entry[other] = batch.entry[i] + ((fixed >> shift) - (before >> shift)) * step;
+  for (std::size_t n = 0; n < points.count; ++n) {
+    const std::size_t i = points.point[n];
+    if (std::has_single_bit(points.axes[n]))
+      addAcrossFace(lookupGrid, batch, i, std::countr_zero(points.axes[n]), across);
+    else
+      out[i] = blendAllAt<Result>(field, lookupGrid, batch, i);
   }
   if (others.count == 0) return;
+
+  // Evaluate the leaves across the faces.
   descend<true>(field, lookupGrid, others);
-  sortByDegree(coefficients, others);
+  listByDegree(coefficients, others);
   enterLeaves(others);
-  Answer answers[kBatch];
-  answerLeaves(coefficients, frame, others, answers);
+  Result acrossResults[kBatch];
+  evaluateLeaves(coefficients, lookupGrid.frame, others, acrossResults);
+
+  // Blend both leaves unless a third one has a weight too.
   for (std::size_t other = 0; other < others.count; ++other) {
     const std::size_t i = across.point[other];
     const int axis = across.axis[other];
-    const FoundLeaf one = leafOf(batch, i), two = leafOf(others, other);
-    if (!noThird(field, two.local, axis)) {
-      mixAt(i);
+    const LeafPoint a = leafPointOf(batch, i), b = leafPointOf(others, other);
+    if (!onlyTwoOverlap(field, b.local, axis)) {
+      out[i] = blendAllAt<Result>(field, lookupGrid, batch, i);
       continue;
     }
-    const auto ramp = [&](const FoundLeaf& of) {
-      return rampAlong(frame, of, axis, lookupGrid.blendExtents[of.number], field.blend);
-    };
-    out[i] = between(out[i], ramp(one), answers[other], ramp(two), axis);
+    out[i] = blendTwo(out[i], rampAlong(field, lookupGrid, a, axis), acrossResults[other],
+                      rampAlong(field, lookupGrid, b, axis), axis);
   }
 }
 
-template <typename Answer>
-void continueOutside(const GridFrame& frame, const Batch& batch, Answer* out) {
-  if (batch.within) return;
+template <typename Result>
+void continueAllOutside(const GridFrame& frame, const Batch& batch, Result* out) {
+  if (batch.allInDomain) return;
   for (std::size_t i = 0; i < batch.count; ++i)
-    if (!contains(frame, batch.points[i])) extend(batch.points[i] - closestWithin(frame, batch.points[i]), out[i]);
+    if (!contains(frame, batch.points[i]))
+      continueOutside(batch.points[i] - closestInDomain(frame, batch.points[i]), out[i]);
 }
 
-template <typename Answer>
-void answerAll(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
-               std::span<Answer> out) {
+template <typename Result>
+void evaluateAll(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
+                 std::span<Result> out) {
   Batch batch;
   for (std::size_t first = 0; first < points.size(); first += kBatch) {
     batch.points = points.data() + first;
@@ -378,11 +402,11 @@ void answerAll(const FieldData& field, const LookupGrid& lookupGrid, std::span<c
       descend<false>(field, lookupGrid, batch);
     std::visit(
         [&](const auto& c) {
-          sortByDegree(c.data(), batch);
+          listByDegree(c.data(), batch);
           enterLeaves(batch);
-          answerLeaves(c.data(), lookupGrid.frame, batch, out.data() + first);
+          evaluateLeaves(c.data(), lookupGrid.frame, batch, out.data() + first);
           if (field.blend > 0) blend(field, lookupGrid, c.data(), batch, out.data() + first);
-          continueOutside(lookupGrid.frame, batch, out.data() + first);
+          continueAllOutside(lookupGrid.frame, batch, out.data() + first);
         },
         field.coefficients);
   }
@@ -390,34 +414,34 @@ void answerAll(const FieldData& field, const LookupGrid& lookupGrid, std::span<c
 
 void values(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
             std::span<double> out) {
-  answerAll(field, lookupGrid, points, out);
+  evaluateAll(field, lookupGrid, points, out);
 }
 
 void valuesAndGradients(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
                         std::span<ValueAndGradient> out) {
-  answerAll(field, lookupGrid, points, out);
+  evaluateAll(field, lookupGrid, points, out);
 }
 
 }  // namespace
 }  // namespace HWY_NAMESPACE
-}  // namespace hpsdf
+}  // namespace hpsdf::query
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace hpsdf {
+namespace hpsdf::query {
 
 HWY_EXPORT(values);
 HWY_EXPORT(valuesAndGradients);
 
-void answerBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
-                 std::span<double> out) {
+void evaluateBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
+                   std::span<double> out) {
   HWY_DYNAMIC_DISPATCH(values)(field, lookupGrid, points, out);
 }
 
-void answerBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
-                 std::span<ValueAndGradient> out) {
+void evaluateBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
+                   std::span<ValueAndGradient> out) {
   HWY_DYNAMIC_DISPATCH(valuesAndGradients)(field, lookupGrid, points, out);
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query
 #endif

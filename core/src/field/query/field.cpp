@@ -11,10 +11,12 @@
 #include "field/query/blend_extent.h"
 #include "field/query/evaluate.h"
 #include "field/query/evaluate_batch.h"
-#include "field/query/visit_nodes.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
+
+using namespace query;
+
 namespace {
 
 [[noreturn]] void notAField(const std::string& what) { throw Error("not a valid field: " + what); }
@@ -25,7 +27,7 @@ void checkDomain(const FieldData& data) {
     notAField("its domain is empty or not finite");
 }
 
-/// Number of base cells; the nodes must at least hold them.
+/// Returns the number of base cells. Throws unless the nodes hold at least these.
 std::size_t checkGrid(const FieldData& data) {
   std::size_t cells = 1;
   for (const std::uint32_t n : data.grid) {
@@ -36,14 +38,15 @@ std::size_t checkGrid(const FieldData& data) {
   return cells;
 }
 
-/// Every group of children belongs to exactly one node that comes before it, so that the nodes form trees.
+/// Throws unless every group of children belongs to exactly one node before it, so that the nodes form trees.
 void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
   const auto& nodes = data.nodes;
+  constexpr std::uint8_t kUnreached = 0xff;
   if ((nodes.size() - baseCells) % 8 != 0) notAField("its nodes do not come in groups of eight");
-  std::vector<std::uint8_t> depth(nodes.size(), 0xff);
+  std::vector<std::uint8_t> depth(nodes.size(), kUnreached);
   std::fill_n(depth.begin(), baseCells, std::uint8_t{0});
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (depth[n] == 0xff) notAField("node " + std::to_string(n) + " is nobody's child");
+    if (depth[n] == kUnreached) notAField("node " + std::to_string(n) + " is no other node's child");
     if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isLeaf(nodes[n])) {
       const int degree = node::degree(nodes[n]);
@@ -54,7 +57,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     }
     const std::size_t first = node::firstChild(nodes[n]);
     if (first <= n || first < baseCells || (first - baseCells) % 8 != 0 || first + 8 > nodes.size() ||
-        depth[first] != 0xff)
+        depth[first] != kUnreached)
       notAField("node " + std::to_string(n) + " has bad children");
     if (depth[n] == kMaxDepth) notAField("it is deeper than " + std::to_string(kMaxDepth) + " levels");
     std::fill_n(depth.begin() + first, 8, std::uint8_t(depth[n] + 1));
@@ -68,26 +71,44 @@ void checkBlendAndBounds(const FieldData& data) {
     if (!(bound.error >= 0) || !(bound.slope >= 0)) notAField("a bound is not a number above 0");
 }
 
-template <typename Answer>
-Answer answerOne(const FieldData& field, const LookupGrid& lookupGrid, const Vector3& x) {
+template <typename Result>
+Result evaluateAt(const FieldData& field, const LookupGrid& lookupGrid, const Vector3& x) {
   if (!contains(lookupGrid.frame, x)) [[unlikely]] {
-    const Vector3 closest = closestWithin(lookupGrid.frame, x);
-    Answer result = answerOne<Answer>(field, lookupGrid, closest);
-    extend(x - closest, result);
+    const Vector3 closest = closestInDomain(lookupGrid.frame, x);
+    Result result = evaluateAt<Result>(field, lookupGrid, closest);
+    continueOutside(x - closest, result);
     return result;
   }
-  const GridPoint at = gridPoint(lookupGrid.frame, x);
-  return answerWithin<Answer>(field, lookupGrid, at.coordinates, find(field, lookupGrid, at));
+  const GridPoint point = gridPoint(lookupGrid.frame, x);
+  return evaluateInLeaf<Result>(field, lookupGrid, point.coordinates, findLeaf(field, lookupGrid, point));
 }
 
-/// As deep as a sixteenth of the field's own size allows.
+/// Fills the entries, and with blending their extents, from the nodes of the lookup grid's depth and the leaves above.
+void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
+  visitNodes(field, [&](const OctreeNode& at) {
+    if (!node::isLeaf(field.nodes[at.node]) && at.depth < lookupGrid.depth) return true;
+    const std::int64_t width = std::int64_t{1} << (lookupGrid.depth - at.depth);
+    CellIndex first;  // index of the first entry that the node covers
+    for (int axis = 0; axis < 3; ++axis) first[axis] = at.cellIndex[axis] * width;
+    for (std::int64_t z = first[2]; z < first[2] + width; ++z)
+      for (std::int64_t y = first[1]; y < first[1] + width; ++y) {
+        const std::int64_t row = z * lookupGrid.slab + y * lookupGrid.row + first[0];
+        std::fill_n(&lookupGrid.entries[row], width, LookupGrid::entry(field.nodes[at.node], at.depth));
+        if (field.blend > 0)
+          std::fill_n(&lookupGrid.blendExtents[field.nodes.size() + row], width, lookupGrid.blendExtents[at.node]);
+      }
+    return false;
+  });
+}
+
+/// Makes the deepest lookup grid that takes no more than a sixteenth of the field's own bytes.
 LookupGrid makeLookupGrid(const FieldData& field) {
   LookupGrid lookupGrid;
   const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
   const std::size_t bytes = std::visit([](const auto& c) { return c.size() * sizeof(c[0]); }, field.coefficients) +
                             field.nodes.size() * sizeof(field.nodes[0]);
-  const std::size_t most = bytes / 16 / sizeof(lookupGrid.entries[0]);
-  while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= most) ++lookupGrid.depth;
+  const std::size_t maxEntries = bytes / 16 / sizeof(lookupGrid.entries[0]);
+  while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= maxEntries) ++lookupGrid.depth;
   lookupGrid.entries.resize(base << (3 * lookupGrid.depth));
   if (field.blend > 0) {
     lookupGrid.blendExtents = findBlendExtents(field);
@@ -96,34 +117,21 @@ LookupGrid makeLookupGrid(const FieldData& field) {
   lookupGrid.frame = gridFrame(field);
   lookupGrid.row = std::int64_t{field.grid[0]} << lookupGrid.depth;
   lookupGrid.slab = lookupGrid.row * (std::int64_t{field.grid[1]} << lookupGrid.depth);
-  visitNodes(field, [&](const Visited& at) {
-    if (!node::isLeaf(field.nodes[at.node]) && at.depth < lookupGrid.depth) return true;
-    const std::size_t width = std::size_t{1} << (lookupGrid.depth - at.depth);
-    std::array<std::size_t, 3> first;  // of the entries that the node covers
-    for (int axis = 0; axis < 3; ++axis) first[axis] = ((at.base[axis] << at.depth) + at.path[axis]) * width;
-    for (std::size_t z = first[2]; z < first[2] + width; ++z)
-      for (std::size_t y = first[1]; y < first[1] + width; ++y) {
-        const std::size_t row = z * lookupGrid.slab + y * lookupGrid.row + first[0];
-        std::fill_n(&lookupGrid.entries[row], width, LookupGrid::entry(field.nodes[at.node], at.depth));
-        if (field.blend > 0)
-          std::fill_n(&lookupGrid.blendExtents[field.nodes.size() + row], width, lookupGrid.blendExtents[at.node]);
-      }
-    return false;
-  });
+  fillLookupGrid(field, lookupGrid);
   return lookupGrid;
 }
 
-Cell makeCell(const FieldData& field, const GridFrame& frame, std::uint32_t id, int depth,
-              const std::array<std::int64_t, 3>& place) {
-  Cell cell;
-  cell.id = id;
-  cell.depth = depth;
-  cell.degree = node::degree(field.nodes[id]);
-  cell.box = boxOf(frame, depth, place);
-  const double volume = cellSize(field, depth).prod();
-  cell.error = std::visit(
-      [&](const auto& c) { return topDegreeError(c.data() + node::offset(field.nodes[id]), cell.degree, volume); },
-      field.coefficients);
+Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& leaf) {
+  const std::uint64_t bits = field.nodes[leaf.node];
+  Cell cell{.id = leaf.node,
+            .box = cellBox(frame, leaf.depth, leaf.cellIndex),
+            .degree = node::degree(bits),
+            .depth = leaf.depth,
+            .error = 0};
+  const double volume = cellSize(field, leaf.depth).prod();
+  cell.error =
+      std::visit([&](const auto& c) { return basis::topDegreeError(c.data() + node::offset(bits), cell.degree, volume); },
+                 field.coefficients);
   return cell;
 }
 
@@ -154,32 +162,30 @@ std::size_t Field::bytes() const {
          std::visit(sizeOf, data_.coefficients);
 }
 
-double Field::value(const Vector3& x) const { return answerOne<double>(data_, lookupGrid_, x); }
+double Field::value(const Vector3& x) const { return evaluateAt<double>(data_, lookupGrid_, x); }
 
 ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
-  return answerOne<ValueAndGradient>(data_, lookupGrid_, x);
+  return evaluateAt<ValueAndGradient>(data_, lookupGrid_, x);
 }
 
 void Field::values(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  answerBatch(data_, lookupGrid_, points, out);
+  evaluateBatch(data_, lookupGrid_, points, out);
 }
 
 void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const {
   assert(points.size() == out.size());
-  answerBatch(data_, lookupGrid_, points, out);
+  evaluateBatch(data_, lookupGrid_, points, out);
 }
 
 Cell Field::cellAt(const Vector3& x) const {
-  const GridPoint point = gridPoint(lookupGrid_.frame, closestWithin(lookupGrid_.frame, x));
-  const Location at = locate(data_, point);
-  return makeCell(data_, lookupGrid_.frame, at.node, at.depth,
-                  {point.cell(0, at.depth), point.cell(1, at.depth), point.cell(2, at.depth)});
+  const GridFrame& frame = lookupGrid_.frame;
+  return makeCell(data_, frame, findLeafNode(data_, gridPoint(frame, closestInDomain(frame, x))));
 }
 
 void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
-  visitNodes(data_, [&](const Visited& at) {
-    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, lookupGrid_.frame, at.node, at.depth, placeOf(at)));
+  visitNodes(data_, [&](const OctreeNode& at) {
+    if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, lookupGrid_.frame, at));
     return true;
   });
 }

@@ -5,9 +5,8 @@
 
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
-#include "field/query/visit_nodes.h"
 
-namespace hpsdf {
+namespace hpsdf::query {
 namespace {
 
 template <typename To, typename From>
@@ -15,28 +14,28 @@ void convert(FieldData& field) {
   const auto* from = std::get_if<std::vector<From>>(&field.coefficients);
   if (from == nullptr) return;
   std::vector<To> to(from->size());
-  for (std::size_t i = 0; i < to.size(); ++i) to[i] = static_cast<To>((*from)[i]);
+  std::ranges::transform(*from, to.begin(), [](From c) { return static_cast<To>(c); });
   field.coefficients = std::move(to);
 }
 
 }  // namespace
 
-Rounding roundingOf(const FieldData& field) {
+Rounding floatRounding(const FieldData& field) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Rounding rounding;
   double sum = 0;
-  visitNodes(field, [&](const Visited& at) {
+  visitNodes(field, [&](const OctreeNode& at) {
     const std::uint64_t bits = field.nodes[at.node];
     if (!node::isLeaf(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
-    double ofCell = 0, most = 0;
-    forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
+    double squares = 0, max = 0;
+    basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
       const double change = c[index] - double(float(c[index]));
-      ofCell += change * change * squaredNorm(i, j, k);
-      most += std::abs(change);
+      squares += change * change * basis::squaredNorm(i, j, k);
+      max += std::abs(change);
     });
-    rounding.most = std::max(rounding.most, most);
-    sum += ofCell * cellSize(field, at.depth).prod();
+    rounding.max = std::max(rounding.max, max);
+    sum += squares * cellSize(field, at.depth).prod();
     return true;
   });
   rounding.rms = std::sqrt(sum / field.domain.sizes().prod());
@@ -46,4 +45,4 @@ Rounding roundingOf(const FieldData& field) {
 void toFloat(FieldData& field) { convert<float, double>(field); }
 void toDouble(FieldData& field) { convert<double, float>(field); }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

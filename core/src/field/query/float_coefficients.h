@@ -1,19 +1,21 @@
 #pragma once
-// Coefficients in double, in which they are computed, and in float, in which they are kept.
+// Conversion of coefficients between double, in which they are computed, and float, in which they are stored.
 
 #include "hpsdf/detail/field_data.h"
 
-namespace hpsdf {
+namespace hpsdf::query {
 
-/// The field's change by keeping its coefficients, which are in double, as float.
+/// How much a field changes when its coefficients are rounded to float, in units of length.
 struct Rounding {
   double rms = 0;
-  double most = 0;  ///< nowhere more
+  double max = 0;  ///< bound of the change anywhere
 };
-Rounding roundingOf(const FieldData& field);
 
-/// Without effect on coefficients that are of that type already.
+/// Computes the rounding of a field whose coefficients are double.
+Rounding floatRounding(const FieldData& field);
+
+/// Converts the coefficients; leaves coefficients of the wanted type as they are.
 void toFloat(FieldData& field);
 void toDouble(FieldData& field);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

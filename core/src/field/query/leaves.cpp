@@ -1,46 +1,45 @@
 #include "field/query/leaves.h"
 
-#include "field/query/visit_nodes.h"
+namespace hpsdf::query {
 
-namespace hpsdf {
-
-std::vector<Leaf> leavesOf(const FieldData& field) {
-  std::vector<Leaf> leaves;
-  visitNodes(field, [&](const Visited& at) {
-    if (!node::isLeaf(field.nodes[at.node])) return true;
-    leaves.push_back({at.node, at.depth, placeOf(at)});
+std::vector<OctreeNode> allLeaves(const FieldData& field) {
+  std::vector<OctreeNode> leaves;
+  visitNodes(field, [&](const OctreeNode& at) {
+    if (node::isLeaf(field.nodes[at.node])) leaves.push_back(at);
     return true;
   });
   return leaves;
 }
 
-Leaf nodeAt(const FieldData& field, const std::array<std::int64_t, 3>& place, int depth) {
-  const auto base = [&](int a) { return place[a] >> depth; };
-  Leaf at{static_cast<std::uint32_t>((base(2) * field.grid[1] + base(1)) * field.grid[0] + base(0)), 0, {}};
+OctreeNode nodeAt(const FieldData& field, const CellIndex& cellIndex, int depth) {
+  const auto base = [&](int axis) { return cellIndex[axis] >> depth; };
+  OctreeNode at{static_cast<std::uint32_t>((base(2) * field.grid[1] + base(1)) * field.grid[0] + base(0)), 0, {}};
   while (at.depth < depth && !node::isLeaf(field.nodes[at.node])) {
     ++at.depth;
-    const auto half = [&](int a) { return static_cast<std::uint32_t>(place[a] >> (depth - at.depth)) & 1; };
+    const auto half = [&](int axis) { return static_cast<std::uint32_t>(cellIndex[axis] >> (depth - at.depth)) & 1; };
     at.node = node::firstChild(field.nodes[at.node]) + half(0) + 2 * half(1) + 4 * half(2);
   }
-  for (int a = 0; a < 3; ++a) at.place[a] = place[a] >> (depth - at.depth);
+  for (int axis = 0; axis < 3; ++axis) at.cellIndex[axis] = cellIndex[axis] >> (depth - at.depth);
   return at;
 }
 
-std::optional<Leaf> notSmallerAt(const FieldData& field, const Leaf& leaf, const std::array<int, 3>& steps) {
-  auto place = leaf.place;
+std::optional<OctreeNode> equalOrLargerNeighbour(const FieldData& field, const OctreeNode& leaf,
+                                                 const std::array<int, 3>& steps) {
+  CellIndex cellIndex = leaf.cellIndex;
   for (int axis = 0; axis < 3; ++axis) {
-    place[axis] += steps[axis];
-    if (place[axis] < 0 || place[axis] >= std::int64_t{field.grid[axis]} << leaf.depth) return {};
+    cellIndex[axis] += steps[axis];
+    if (cellIndex[axis] < 0 || cellIndex[axis] >= std::int64_t{field.grid[axis]} << leaf.depth) return {};
   }
-  const Leaf beside = nodeAt(field, place, leaf.depth);
-  if (!node::isLeaf(field.nodes[beside.node])) return {};
-  return beside;
+  const OctreeNode neighbour = nodeAt(field, cellIndex, leaf.depth);
+  if (!node::isLeaf(field.nodes[neighbour.node])) return {};
+  return neighbour;
 }
 
-std::optional<Leaf> notSmallerBeside(const FieldData& field, const Leaf& leaf, int axis, int step) {
+std::optional<OctreeNode> equalOrLargerFaceNeighbour(const FieldData& field, const OctreeNode& leaf, int axis,
+                                                     int step) {
   std::array<int, 3> steps{};
   steps[axis] = step;
-  return notSmallerAt(field, leaf, steps);
+  return equalOrLargerNeighbour(field, leaf, steps);
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

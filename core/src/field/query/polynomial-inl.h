@@ -1,31 +1,31 @@
-// Part of evaluate.h that works on a point or on a vector of points, `Number` being double or a vector of them:
-// included within a namespace, as legendre-inl.h is. Coefficients may also be float.
+// The part of evaluate.h that is generic in `Number`, which is double or a SIMD vector of doubles. It is included inside
+// a namespace, as legendre-inl.h is, once for each instruction set. Coefficients may also be float.
 
 /// Calls f(0) to f(last).
 template <typename F>
-[[gnu::always_inline]] inline void upTo(int last, F&& f) {
+[[gnu::always_inline]] inline void forEachUpTo(int last, F&& f) {
   for (int i = 0; i <= last; ++i) f(i);
 }
 template <int Last, typename F>
-[[gnu::always_inline]] inline void upTo(Constant<Last>, F&& f) {
+[[gnu::always_inline]] inline void forEachUpTo(Constant<Last>, F&& f) {
   [&]<int... I>(std::integer_sequence<int, I...>) __attribute__((always_inline)) { (f(Constant<I>()), ...); }
   (std::make_integer_sequence<int, Last + 1>());
 }
 
 template <typename Number, typename T, typename Degree>
-Number evaluateAt(const T* c, Degree degree, const std::array<Number, 3>& local) {
-  Number x[kRoom<Degree>], y[kRoom<Degree>], z[kRoom<Degree>];
+Number evaluatePolynomial(const T* c, Degree degree, const std::array<Number, 3>& local) {
+  Number x[kDegreeCount<Degree>], y[kDegreeCount<Degree>], z[kDegreeCount<Degree>];
   legendreValues(local[0], degree, x);
   legendreValues(local[1], degree, y);
   legendreValues(local[2], degree, z);
   Number value(0);
-  upTo(
+  forEachUpTo(
       degree, [&](auto i) __attribute__((always_inline)) {
         Number plane(0);
-        upTo(
+        forEachUpTo(
             minus(degree, i), [&](auto j) __attribute__((always_inline)) {
               Number line(0);
-              upTo(
+              forEachUpTo(
                   minus(minus(degree, i), j), [&](auto k)
                                                   __attribute__((always_inline)) { line += Number(*c++) * z[k]; });
               plane += line * y[j];
@@ -35,22 +35,22 @@ Number evaluateAt(const T* c, Degree degree, const std::array<Number, 3>& local)
   return value;
 }
 
-/// The value and the three components of the gradient.
+/// Returns the value and the three components of the gradient.
 template <typename Number, typename T, typename Degree>
-std::array<Number, 4> evaluateWithGradientAt(const T* c, Degree degree, const std::array<Number, 3>& local) {
-  Number x[kRoom<Degree>], y[kRoom<Degree>], z[kRoom<Degree>];
-  Number dx[kRoom<Degree>], dy[kRoom<Degree>], dz[kRoom<Degree>];
+std::array<Number, 4> evaluatePolynomialWithGradient(const T* c, Degree degree, const std::array<Number, 3>& local) {
+  Number x[kDegreeCount<Degree>], y[kDegreeCount<Degree>], z[kDegreeCount<Degree>];
+  Number dx[kDegreeCount<Degree>], dy[kDegreeCount<Degree>], dz[kDegreeCount<Degree>];
   legendreValuesAndDerivatives(local[0], degree, x, dx);
   legendreValuesAndDerivatives(local[1], degree, y, dy);
   legendreValuesAndDerivatives(local[2], degree, z, dz);
   Number value(0), gx(0), gy(0), gz(0);
-  upTo(
+  forEachUpTo(
       degree, [&](auto i) __attribute__((always_inline)) {
         Number plane(0), planeDy(0), planeDz(0);
-        upTo(
+        forEachUpTo(
             minus(degree, i), [&](auto j) __attribute__((always_inline)) {
               Number line(0), lineDz(0);
-              upTo(
+              forEachUpTo(
                   minus(minus(degree, i), j), [&](auto k) __attribute__((always_inline)) {
                     const Number coefficient(*c++);
                     line += coefficient * z[k];

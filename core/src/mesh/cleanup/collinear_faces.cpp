@@ -7,18 +7,18 @@
 #include <unordered_map>
 #include <vector>
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Which face runs along an edge in a given direction.
-class Sides {
+/// Maps each directed edge to the triangle that it belongs to.
+class EdgeMap {
  public:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::uint32_t kSeveral = kNone - 1;
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();  ///< no triangle
+  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< more than one triangle
 
-  explicit Sides(const std::vector<Triangle>& triangles) {
+  explicit EdgeMap(const std::vector<Triangle>& triangles) {
     faceOf_.reserve(3 * triangles.size());
     for (std::size_t f = 0; f < triangles.size(); ++f)
       for (int i = 0; i < 3; ++i) {
@@ -45,7 +45,8 @@ class Sides {
   std::unordered_map<std::uint64_t, std::uint32_t> faceOf_;
 };
 
-/// The triangle rotated so that its longest edge comes first: the corner in the middle is the last.
+/// The triangle rotated so that its longest edge comes first. The last corner of a collinear triangle is then the
+/// middle one.
 Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   const auto squared = [&](int i) { return (mesh.vertices[t[i]] - mesh.vertices[t[(i + 1) % 3]]).squaredNorm(); };
   const std::array<double, 3> lengths = {squared(0), squared(1), squared(2)};
@@ -53,22 +54,23 @@ Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   return t;
 }
 
-bool flip(TriangleMesh& mesh, Sides& sides, std::uint32_t face) {
+/// Flips the longest edge of a triangle where that yields two triangles with areas and no edge of more than two.
+bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   const auto [a, b, middle] = longestEdgeFirst(mesh, mesh.triangles[face]);
-  const std::uint32_t neighbour = sides.face(b, a);
-  if (sides.face(a, b) != face || neighbour >= Sides::kSeveral) return false;
+  const std::uint32_t neighbour = edges.face(b, a);
+  if (edges.face(a, b) != face || neighbour >= EdgeMap::kSeveral) return false;
   const Triangle& other = mesh.triangles[neighbour];
   const auto opposite = *std::find_if(other.begin(), other.end(), [a = a, b = b](auto v) { return v != a && v != b; });
-  if (opposite == middle || sides.face(middle, opposite) != Sides::kNone ||
-      sides.face(opposite, middle) != Sides::kNone)
-    return false;  // the new edge exists already: it would become non-manifold
+  if (opposite == middle || edges.face(middle, opposite) != EdgeMap::kNone ||
+      edges.face(opposite, middle) != EdgeMap::kNone)
+    return false;  // The new edge exists already and would become non-manifold.
   const Triangle first = {middle, a, opposite};
   const Triangle second = {middle, opposite, b};
   if (hasNoArea(mesh, first) || hasNoArea(mesh, second)) return false;
-  sides.erase(a, b);
-  sides.erase(b, a);
-  sides.set(first, face);
-  sides.set(second, neighbour);
+  edges.erase(a, b);
+  edges.erase(b, a);
+  edges.set(first, face);
+  edges.set(second, neighbour);
   mesh.triangles[face] = first;
   mesh.triangles[neighbour] = second;
   return true;
@@ -84,7 +86,7 @@ bool hasNoArea(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& tri
   double scale = 0;
   for (const Vector3& edge : edges) scale = std::max(scale, edge.cwiseAbs().maxCoeff());
   if (scale == 0) return true;
-  for (Vector3& edge : edges) edge /= scale;  // so that products neither vanish nor overflow
+  for (Vector3& edge : edges) edge /= scale;  // Products of scaled edges neither underflow nor overflow.
   std::sort(edges.begin(), edges.end(),
             [](const Vector3& u, const Vector3& v) { return u.squaredNorm() < v.squaredNorm(); });
   // The cross product of the two shorter edges carries the least cancellation.
@@ -98,15 +100,16 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
     if (hasNoArea(mesh, mesh.triangles[f])) pending.push_back(static_cast<std::uint32_t>(f));
   if (pending.empty()) return 0;
 
-  Sides sides(mesh.triangles);
+  EdgeMap edges(mesh.triangles);
   std::size_t flips = 0;
-  // A neighbour without area must be flipped before; every round but the last flips one at least, so that this ends.
+  // A flip may be possible only after that of a neighbour without area, hence the rounds. Every round but the last
+  // flips a triangle.
   for (bool changed = true; changed;) {
-    const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, sides, face); });
+    const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
     flips += flipped;
     changed = flipped > 0;
   }
   return flips;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

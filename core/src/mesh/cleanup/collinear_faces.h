@@ -1,5 +1,5 @@
 #pragma once
-// Faces whose three corners lie on one line.
+// Triangles whose three corners lie on one line.
 
 #include <array>
 #include <cstddef>
@@ -7,16 +7,17 @@
 
 #include "hpsdf/triangle_mesh.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// Whether a triangle's corners lie on one line, up to the rounding of this very test. The bound is relative to the
-/// edges, so that the size of the mesh does not matter and a thin sliver with an area is kept.
+/// Returns true if a triangle's corners lie on one line up to the rounding of this test. The tolerance is relative to
+/// the edges, so that it does not depend on the size of the mesh and keeps thin slivers with an area.
 bool hasNoArea(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle);
 
-/// A face on one line whose middle corner touches the edge of just one neighbour is needed to keep the mesh closed:
-/// n-gons and CAD facets with corners along a straight side bring such faces. Flips the edge that the two share, which
-/// splits the neighbour at the middle corner: the same surface, the same count of faces, all with an area.
-/// Returns the number of flips. Faces where that is impossible are left as they are.
+/// Flips the longest edge of collinear triangles and returns the number of flips.
+///
+/// Polygons and CAD facets with corners along a straight side yield such triangles, and dropping them would open the
+/// mesh. A flip splits the neighbour across the longest edge at the middle corner: surface and number of triangles
+/// stay, and both triangles have an area. Where that is impossible the triangle stays as it is.
 std::size_t flipCollinearFaces(TriangleMesh& mesh);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -3,9 +3,9 @@
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/triangle_mesh.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
 /// `cleaned` of mesh_file.h.
 ImportedMesh cleanMesh(TriangleMesh mesh);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -16,85 +16,96 @@
 #include <utility>
 #include <vector>
 
+#include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
-#include "mesh/file/file_extension.h"
 #include "mesh/file/triangulate.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 7> kExtensions = {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"};
+constexpr std::array<std::string_view, 7> kExtensions = {".obj", ".ply", ".stl", ".off", ".3ds", ".gltf", ".glb"};
 
-/// What can be said of a file before assimp opens it, whose own messages are of little help here.
+/// Throws `Error` for a file that is known to be unusable before assimp opens it: assimp's own messages do not help.
 void requireReadable(const fs::path& file) {
   const std::string name = file.string();
-  if (name.empty()) throw Error("the mesh file's name is empty; give a file name");
+  const auto refuse = [&](const std::string& problem) { throw Error(ErrorKind::file, name, problem); };
+  if (name.empty()) refuse("the mesh file's name is empty; give a file name");
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) throw Error(name + ": no such file; check the path");
-  if (!fs::exists(status)) throw Error(name + ": cannot be read (" + error.message() + "); check the path");
-  if (fs::is_directory(status)) throw Error(name + ": a directory, not a file; name a mesh file in it");
-  if (!fs::is_regular_file(status)) throw Error(name + ": not a regular file; name a mesh file");
+  if (status.type() == fs::file_type::not_found) refuse("no such file; check the path");
+  if (!fs::exists(status)) refuse("cannot be read (" + error.message() + "); check the path");
+  if (fs::is_directory(status)) refuse("a directory, not a file; name a mesh file in it");
+  if (!fs::is_regular_file(status)) refuse("not a regular file; name a mesh file");
 
-  const std::string extension = extensionOf(file);
-  if (std::find(kExtensions.begin(), kExtensions.end(), extension) == kExtensions.end()) {
+  const std::string extension = lowerExtension(file);
+  if (std::ranges::find(kExtensions, extension) == kExtensions.end()) {
     std::string known;
-    for (const std::string_view e : kExtensions) known += (known.empty() ? "." : ", .") + std::string(e);
-    throw Error(name + ": " + (extension.empty() ? "no extension" : "unknown format ." + extension) +
-                "; a mesh file ends in one of " + known);
+    for (const std::string_view e : kExtensions) known += (known.empty() ? "" : ", ") + std::string(e);
+    refuse((extension.empty() ? "no extension" : "unknown format " + extension) + "; a mesh file ends in one of " +
+           known);
   }
 
   const std::uintmax_t size = fs::file_size(file, error);
-  if (!error && size == 0) throw Error(name + ": the file is empty; export the mesh again");
+  if (!error && size == 0) refuse("the file is empty; export the mesh again");
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || stream.peek() == std::ifstream::traits_type::eof())
-    throw Error(name + ": cannot be read; check its permissions");
+  if (!stream || stream.peek() == std::ifstream::traits_type::eof()) refuse("cannot be read; check its permissions");
 }
 
-/// The largest count that the header of a PLY or an OFF file promises, 0 where there is none. OFF's third one, of
-/// edges, promises nothing: many programs make it up, and no reader asks.
-double promisedElements(const fs::path& file) {
-  const std::string extension = extensionOf(file);
-  double most = 0;
+constexpr std::size_t kMostHeaderLines = 1000;
+
+/// The lines of a PLY file's header.
+std::vector<std::string> plyHeader(const fs::path& file) {
+  std::vector<std::string> lines;
   std::ifstream stream(file, std::ios::binary);
-  std::string line;
-  if (extension == "ply") {
-    for (int i = 0; i < 1000 && std::getline(stream, line) && !line.starts_with("end_header"); ++i) {
-      std::istringstream words(line);
-      std::string keyword, name;
-      double count = 0;
-      if (words >> keyword >> name >> count && keyword == "element") most = std::max(most, count);
-    }
-  } else if (extension == "off") {
-    for (int i = 0; i < 1000 && most == 0 && std::getline(stream, line); ++i) {
-      line = line.substr(0, line.find('#'));
-      if (const std::size_t keyword = line.find("OFF"); keyword != std::string::npos) line.erase(0, keyword + 3);
-      std::istringstream words(line);
-      double count = 0;
-      for (int verticesThenFaces = 0; verticesThenFaces < 2 && words >> count; ++verticesThenFaces)
-        most = std::max(most, count);
-    }
+  for (std::string line; lines.size() < kMostHeaderLines && std::getline(stream, line);) {
+    if (line.starts_with("end_header")) break;
+    lines.push_back(line);
   }
-  return most;
+  return lines;
 }
 
-/// Whether coordinates stand there as text, or as doubles.
-bool plySaysMoreThanFloat(const fs::path& file) {
+double largestPlyCount(const fs::path& file) {
+  double largest = 0;
+  for (const std::string& line : plyHeader(file)) {
+    std::istringstream words(line);
+    std::string keyword, name;
+    double count = 0;
+    if (words >> keyword >> name >> count && keyword == "element") largest = std::max(largest, count);
+  }
+  return largest;
+}
+
+/// The larger one of the numbers of vertices and of faces. The number of edges that follows them is often wrong, and no
+/// reader uses it.
+double largestOffCount(const fs::path& file) {
+  double largest = 0;
   std::ifstream stream(file, std::ios::binary);
   std::string line;
-  for (int i = 0; i < 1000 && std::getline(stream, line) && !line.starts_with("end_header"); ++i) {
+  for (std::size_t i = 0; i < kMostHeaderLines && largest == 0 && std::getline(stream, line); ++i) {
+    line = line.substr(0, line.find('#'));
+    if (const std::size_t keyword = line.find("OFF"); keyword != std::string::npos) line.erase(0, keyword + 3);
+    std::istringstream words(line);
+    double vertices = 0, faces = 0;
+    words >> vertices >> faces;
+    largest = std::max(vertices, faces);
+  }
+  return largest;
+}
+
+/// Returns true for a PLY file that holds coordinates as text or as doubles.
+bool plyMayExceedFloat(const fs::path& file) {
+  return std::ranges::any_of(plyHeader(file), [](const std::string& line) {
     std::istringstream words(line);
     std::string keyword, kind, name;
     words >> keyword >> kind >> name;
-    if (keyword == "format" && kind == "ascii") return true;
-    if (keyword == "property" && name == "x" && kind != "float" && kind != "float32") return true;
-  }
-  return false;
+    return (keyword == "format" && kind == "ascii") ||
+           (keyword == "property" && name == "x" && kind != "float" && kind != "float32");
+  });
 }
 
-/// By the size that the count of its faces asks for, as assimp tells them apart.
+/// Returns true for an STL file of exactly the size that binary data with its number of faces has, as assimp does.
 bool isBinaryStl(const fs::path& file) {
   constexpr std::uintmax_t kHeader = 80, kFace = 50;
   std::uint32_t faces = 0;
@@ -105,7 +116,7 @@ bool isBinaryStl(const fs::path& file) {
          fs::file_size(file, error) == kHeader + sizeof faces + kFace * faces;
 }
 
-/// Whether a line of the text, whatever ends its lines, says no more than that.
+/// Returns true if the text has a line that consists of `line` and blanks, whatever characters end the lines.
 bool hasLine(std::string_view text, std::string_view line) {
   constexpr std::string_view kBlank = " \t", kLineEnd = "\r\n";
   for (std::size_t at = 0; (at = text.find(line, at)) != std::string_view::npos; at += line.size()) {
@@ -117,49 +128,52 @@ bool hasLine(std::string_view text, std::string_view line) {
   return false;
 }
 
-/// assimp looks for the end of a PLY file's header until it finds one, which may be never.
-void requireHeaderEnds(const fs::path& file) {
-  constexpr std::size_t kLongestHeader = 1 << 20;
-  if (extensionOf(file) != "ply") return;
-  std::string beginning(kLongestHeader, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
-  beginning.resize(static_cast<std::size_t>(stream.gcount()));
-  if (!hasLine(beginning, "end_header"))
-    throw Error(file.string() + ": its header does not end; check or export the file again");
-}
-
-/// assimp takes memory for what a header promises before it reads on: a few wrong bytes could ask for all there is.
-void requirePromisesKept(const fs::path& file) {
+/// Throws `Error` for a header on which assimp would run out of time or memory.
+void requireSoundHeader(const fs::path& file) {
+  const std::string extension = lowerExtension(file), name = file.string();
+  if (extension == ".ply") {
+    // assimp reads on until it finds the end of the header.
+    constexpr std::size_t kLongestHeader = 1 << 20;
+    std::string beginning(kLongestHeader, '\0');
+    std::ifstream stream(file, std::ios::binary);
+    stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+    beginning.resize(static_cast<std::size_t>(stream.gcount()));
+    if (!hasLine(beginning, "end_header"))
+      throw Error(ErrorKind::file, name, "its header does not end; check or export the file again");
+  }
+  // assimp allocates memory for the numbers in the header before it reads on, so that a few wrong bytes could exhaust
+  // the memory.
+  const double count = extension == ".ply" ? largestPlyCount(file) : extension == ".off" ? largestOffCount(file) : 0;
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
-  if (!error && promisedElements(file) > static_cast<double>(size))
-    throw Error(file.string() +
-                ": its header promises more vertices or faces than the file has bytes; export it again");
+  if (!error && count > static_cast<double>(size))
+    throw Error(ErrorKind::file, name,
+                "its header promises more vertices or faces than the file has bytes; export it again");
 }
 
-/// A message of assimp's as part of one line.
+/// A message of assimp as a part of one line.
 std::string oneLine(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c); }, ' ');
-  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return std::iscntrl(c); }, ' ');
+  text.erase(text.find_last_not_of(" .") + 1);
   return text.empty() ? "unknown reason" : text;
 }
 
 Error unreadable(const std::string& name, const std::string& reason) {
-  return Error(name + ": cannot be read as a mesh (" + oneLine(reason) + "); check or export the file again");
+  return {ErrorKind::file, name, "cannot be read as a mesh (" + oneLine(reason) + "); check or export the file again"};
 }
 
-/// assimp's readers check the indices of some formats only.
+/// Throws `Error` for indices out of range, which assimp's readers check for some formats only.
 void requireValidIndices(const aiScene& scene, const std::string& name) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     const aiMesh& part = *scene.mMeshes[m];
     for (unsigned f = 0; f < part.mNumFaces; ++f)
       for (unsigned i = 0; i < part.mFaces[f].mNumIndices; ++i)
         if (part.mFaces[f].mIndices[i] >= part.mNumVertices)
-          throw Error(name + ": face " + std::to_string(f + 1) + " of part " + std::to_string(m + 1) +
-                      " refers to vertex " + std::to_string(std::uint64_t{part.mFaces[f].mIndices[i]} + 1) +
-                      ", but there are only " + std::to_string(part.mNumVertices) + "; repair or export it again");
+          throw Error(ErrorKind::mesh, name,
+                      "face " + std::to_string(f + 1) + " of part " + std::to_string(m + 1) + " refers to vertex " +
+                          std::to_string(std::uint64_t{part.mFaces[f].mIndices[i]} + 1) + ", but there are only " +
+                          std::to_string(part.mNumVertices) + "; repair or export it again");
   }
 }
 
@@ -183,7 +197,7 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// The face's triangles as indices of the part's vertices; none of a point or a line, which bound nothing.
+/// The triangles of a polygon as indices of the part's vertices; empty for points and lines.
 std::vector<std::array<std::uint32_t, 3>> trianglesOf(const aiFace& face, const aiMesh& part) {
   if (face.mNumIndices < 3) return {};
   std::vector<Vector3> corners;
@@ -199,18 +213,19 @@ std::vector<std::array<std::uint32_t, 3>> trianglesOf(const aiFace& face, const 
 
 void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& worldFromPart) {
   if (mesh.vertices.size() + part.mNumVertices > std::numeric_limits<std::uint32_t>::max())
-    throw Error(mesh.name + ": more than 4294967295 vertices; simplify the mesh first");
+    throw Error(ErrorKind::limit, mesh.name, "more than 4294967295 vertices; simplify the mesh first");
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (unsigned v = 0; v < part.mNumVertices; ++v) {
     const aiVector3D& p = part.mVertices[v];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
       throw Error(
-          mesh.name + ": vertex " + std::to_string(std::size_t{first} + v + 1) +
-          " has a coordinate that is not a finite number (or beyond 3.4e38, where float ends); repair the mesh, "
-          "or scale it down, before it is exported again");
+          ErrorKind::mesh, mesh.name,
+          "vertex " + std::to_string(std::size_t{first} + v + 1) +
+              " has a coordinate that is not a finite number (or beyond 3.4e38, where float ends); repair the mesh, "
+              "or scale it down, before it is exported again");
     mesh.vertices.push_back(worldFromPart * Vector3(p.x, p.y, p.z));
   }
-  const bool mirrored = worldFromPart.linear().determinant() < 0;  // would turn the faces inside out
+  const bool mirrored = worldFromPart.linear().determinant() < 0;  // A reflection reverses all triangles.
   for (unsigned f = 0; f < part.mNumFaces; ++f)
     for (auto [a, b, c] : trianglesOf(part.mFaces[f], part)) {
       if (mirrored) std::swap(b, c);
@@ -218,13 +233,13 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& world
     }
 }
 
-/// All meshes of the scene, as often as nodes show them, in world coordinates.
+/// All meshes of the scene in world coordinates, each once for every node that refers to it.
 TriangleMesh joined(const aiScene& scene, const fs::path& file) {
   TriangleMesh mesh;
   mesh.name = file.string();
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
-  // assimp puts a rotation from z up to y up above every 3DS scene; undone, coordinates are those of the file.
-  if (extensionOf(file) == "3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  // assimp rotates every 3DS scene from z up to y up; the inverse rotation restores the coordinates of the file.
+  if (lowerExtension(file) == ".3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
 
   std::vector<std::pair<const aiNode*, Eigen::Affine3d>> pending = {{scene.mRootNode, worldFromRoot}};
   while (!pending.empty()) {
@@ -241,16 +256,15 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
 
 TriangleMesh readByAssimp(const fs::path& file) {
   requireReadable(file);
-  requireHeaderEnds(file);
-  requirePromisesKept(file);
+  requireSoundHeader(file);
   Assimp::Importer importer;
   return joined(readScene(importer, file), file);
 }
 
-bool saysMoreThanFloat(const fs::path& file) {
-  const std::string extension = extensionOf(file);
-  if (extension == "stl") return !isBinaryStl(file);
-  return extension == "obj" || extension == "off" || (extension == "ply" && plySaysMoreThanFloat(file));
+bool mayExceedFloat(const fs::path& file) {
+  const std::string extension = lowerExtension(file);
+  if (extension == ".stl") return !isBinaryStl(file);
+  return extension == ".obj" || extension == ".off" || (extension == ".ply" && plyMayExceedFloat(file));
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -1,16 +1,16 @@
 #pragma once
-// Mesh files as assimp reads them.
 
 #include <filesystem>
 
 #include "hpsdf/triangle_mesh.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// All meshes of the file's scene joined under their node transforms, n-gons triangulated, nothing cleaned. Throws
-/// `Error` as `importMesh` does.
+/// All meshes of the file's scene joined under their node transforms, with polygons triangulated and nothing cleaned.
+/// Throws `Error` as `importMesh` does.
 TriangleMesh readByAssimp(const std::filesystem::path& file);
 
-bool saysMoreThanFloat(const std::filesystem::path& file);
+/// Returns true for a file that can hold coordinates with more digits than the `float` of assimp's readers.
+bool mayExceedFloat(const std::filesystem::path& file);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -12,26 +12,25 @@
 
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
-#include "mesh/file/file_extension.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "a PLY file is written as numbers lie in memory");
+static_assert(std::endian::native == std::endian::little, "a PLY file is written as its numbers are in memory");
 
-constexpr std::size_t kPiece = 1 << 16;  // bytes written at a time
+constexpr std::size_t kPiece = 1 << 16;  ///< bytes of text written at a time
 
-/// The shortest text that reads as the same number.
+/// Appends the shortest text that reads as the same number.
 void append(std::string& text, double number) {
   std::array<char, 32> digits;
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   text.append(digits.data(), end);
 }
 
-/// How a format writes a mesh as text.
+/// The syntax of a format for meshes as text.
 struct TextForm {
   std::string_view beforeVertex, beforeFace;
-  std::uint64_t firstVertex;  ///< its number
+  std::uint64_t firstVertex;  ///< number of the first vertex
 };
 
 void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) {
@@ -58,9 +57,6 @@ void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) 
   writeIf(!text.empty());
 }
 
-/// assimp takes a line feed there for part of the header, and all numbers a byte too late.
-bool beginsWithLineFeed(std::span<const std::byte> data) { return !data.empty() && data.front() == std::byte{'\n'}; }
-
 }  // namespace
 
 void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
@@ -68,7 +64,8 @@ void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v "
 void writePly(const TriangleMesh& mesh, OutputFile& out) {
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
   const auto vertices = std::as_bytes(std::span(mesh.vertices));
-  const bool asText = beginsWithLineFeed(vertices);
+  // assimp takes a line feed at the beginning of the data for a part of the header, and shifts all numbers by a byte.
+  const bool asText = !vertices.empty() && vertices.front() == std::byte{'\n'};
   out.write(std::string("ply\nformat ") + (asText ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
             std::to_string(mesh.vertices.size()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
@@ -84,4 +81,4 @@ void writePly(const TriangleMesh& mesh, OutputFile& out) {
   out.write(faces);
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -1,14 +1,14 @@
 #pragma once
-// Meshes as text (OBJ) and as binary data (PLY).
 
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/triangle_mesh.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
 void writeObj(const TriangleMesh& mesh, OutputFile& out);
 
-/// Writes text where binary data would begin with the byte of a line feed, which readers would take for the header's.
+/// Writes binary data, or text where binary data would begin with the byte of a line feed: readers would take it for a
+/// part of the header.
 void writePly(const TriangleMesh& mesh, OutputFile& out);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

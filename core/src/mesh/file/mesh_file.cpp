@@ -6,11 +6,11 @@
 #include <sstream>
 #include <utility>
 
+#include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
 #include "mesh/cleanup/mesh_cleanup.h"
 #include "mesh/file/assimp_import.h"
-#include "mesh/file/file_extension.h"
 #include "mesh/file/mesh_export.h"
 
 namespace hpsdf {
@@ -20,17 +20,18 @@ namespace fs = std::filesystem;
 
 double largestCoordinate(const Box& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff(); }
 
+/// The distance between adjacent floats near a coordinate.
 double floatSpacing(double coordinate) {
   constexpr int kBits = std::numeric_limits<float>::digits, kSmallest = std::numeric_limits<float>::min_exponent;
   const int exponent = coordinate > 0 ? std::ilogb(coordinate) + 1 : kSmallest;
   return std::ldexp(1.0, std::max(exponent, kSmallest) - kBits);
 }
 
-/// What is wrong with faces of which rounding has left nothing is not said by their having no area.
+/// The end of a message about a mesh without area, where the rounding to float is the probable cause; else empty.
 std::string spacingHint(const fs::path& file, const Box& box) {
   constexpr double kFew = 16;
   const double largest = largestCoordinate(box), spacing = floatSpacing(largest);
-  if (!saysMoreThanFloat(file) || box.sizes().maxCoeff() > kFew * spacing) return "";
+  if (!mesh::mayExceedFloat(file) || box.sizes().maxCoeff() > kFew * spacing) return "";
   std::ostringstream hint;
   hint.precision(2);
   hint << "; coordinates reach " << largest << ", where the reader keeps them " << spacing
@@ -38,40 +39,41 @@ std::string spacingHint(const fs::path& file, const Box& box) {
   return hint.str();
 }
 
-/// Whether a face names three vertices: rounding may have left nothing of one, but not of a face that names fewer.
-bool namesThreeCorners(const TriangleMesh& mesh) {
+/// Returns true if any face has three different vertices. Only such a face can have lost its area by rounding.
+bool hasThreeCorners(const TriangleMesh& mesh) {
   return std::ranges::any_of(mesh.triangles,
                              [](const auto& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; });
 }
 
 ImportedMesh cleaned(TriangleMesh mesh, const fs::path& file) {
   const Box box = boundingBox(mesh);
-  const bool mayBeRounded = namesThreeCorners(mesh);
+  const bool mayBeRounded = hasThreeCorners(mesh);
   try {
-    return hpsdf::cleaned(std::move(mesh));  // its messages name the file as it was given
+    return hpsdf::cleaned(std::move(mesh));
   } catch (const Error& error) {
-    throw Error(error.what() + (mayBeRounded ? spacingHint(file, box) : ""));
+    throw Error(error.kind(), error.subject(), error.problem() + (mayBeRounded ? spacingHint(file, box) : ""));
   }
 }
 
+/// Returns true for a PLY file and false for an OBJ file; throws `Error` for other extensions.
 bool isPly(const std::filesystem::path& file) {
-  const std::string extension = extensionOf(file);
-  if (extension != "obj" && extension != "ply")
-    throw Error(file.string() + ": meshes are written as .obj or .ply; give a name that ends so");
-  return extension == "ply";
+  const std::string extension = lowerExtension(file);
+  if (extension != ".obj" && extension != ".ply")
+    throw Error(ErrorKind::file, file.string(), "meshes are written as .obj or .ply; give a name that ends so");
+  return extension == ".ply";
 }
 
 }  // namespace
 
-ImportedMesh cleaned(TriangleMesh mesh) { return cleanMesh(std::move(mesh)); }
+ImportedMesh cleaned(TriangleMesh mesh) { return mesh::cleanMesh(std::move(mesh)); }
 
 double coordinateSpacing(const fs::path& file, const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
-  return box.isEmpty() || !saysMoreThanFloat(file) ? 0 : floatSpacing(largestCoordinate(box));
+  return box.isEmpty() || !mesh::mayExceedFloat(file) ? 0 : floatSpacing(largestCoordinate(box));
 }
 
 ImportedMesh importMesh(const fs::path& file) {
-  ImportedMesh result = cleaned(readByAssimp(file), file);
+  ImportedMesh result = cleaned(mesh::readByAssimp(file), file);
   result.mesh.name = file.filename().string();
   return result;
 }
@@ -79,7 +81,8 @@ ImportedMesh importMesh(const fs::path& file) {
 TriangleMesh loadMesh(const std::string& fileOrShape) {
   if (fileOrShape.starts_with("builtin:")) return shapes::mesh(fileOrShape);
   if (fileOrShape.starts_with("analytic:"))
-    throw Error(fileOrShape + ": a mesh is expected here; use builtin:" + fileOrShape.substr(9) + " or a mesh file");
+    throw Error(ErrorKind::option, fileOrShape,
+                "a mesh is expected here; use builtin:" + fileOrShape.substr(9) + " or a mesh file");
   return importMesh(fileOrShape).mesh;
 }
 
@@ -91,7 +94,7 @@ void checkMeshWritable(const std::filesystem::path& file) {
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   const bool ply = isPly(file);
   OutputFile out(file);
-  ply ? writePly(mesh, out) : writeObj(mesh, out);
+  ply ? mesh::writePly(mesh, out) : mesh::writeObj(mesh, out);
   out.commit();
 }
 

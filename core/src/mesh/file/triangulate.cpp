@@ -8,14 +8,14 @@
 #include <limits>
 #include <optional>
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 namespace {
 
 using Vector2 = Eigen::Vector2d;
 
 double cross(const Vector2& u, const Vector2& v) { return u.x() * v.y() - u.y() * v.x(); }
 
-/// The polygon as seen along the coordinate axis nearest to its normal, anticlockwise.
+/// The polygon projected along the coordinate axis nearest to its normal, counter-clockwise.
 std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
   Vector3 normal = Vector3::Zero();
   for (std::size_t i = 2; i < polygon.size(); ++i)
@@ -31,10 +31,10 @@ std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
   return points;
 }
 
-/// Some of the corners, in the order of the polygon.
+/// A set of corners of a polygon, as bits.
 class CornerSet {
  public:
-  /// All of them.
+  /// The set of all corners.
   explicit CornerSet(std::size_t corners) : words_((corners + 63) / 64, ~std::uint64_t{0}) {
     if (corners % 64 != 0) words_.back() = (std::uint64_t{1} << corners % 64) - 1;
   }
@@ -42,7 +42,7 @@ class CornerSet {
   void add(std::uint32_t corner) { words_[corner / 64] |= bit(corner); }
   void remove(std::uint32_t corner) { words_[corner / 64] &= ~bit(corner); }
 
-  /// The first of them that is met from `start` on, once around.
+  /// The first corner of the set from `start` on in cyclic order; empty for an empty set.
   std::optional<std::uint32_t> next(std::uint32_t start) const {
     std::uint64_t bits = words_[start / 64] & ~(bit(start) - 1);
     for (std::size_t i = 0, word = start / 64; i <= words_.size(); ++i, bits = words_[word]) {
@@ -58,7 +58,7 @@ class CornerSet {
   std::vector<std::uint64_t> words_;
 };
 
-/// Which corners lie where: a grid of about as many cells.
+/// A grid of about a quarter as many cells as corners, for searches of the corners in a box.
 class CornerGrid {
  public:
   explicit CornerGrid(const std::vector<Vector2>& points)
@@ -71,7 +71,7 @@ class CornerGrid {
     for (std::uint32_t i = 0; i < points.size(); ++i) corners_[ends[cellOf(points[i])]++] = i;
   }
 
-  /// One that `is` finds right, of the corners in the box and some around.
+  /// A corner for which `is` returns true, among the corners in the box and others near it.
   template <typename Predicate>
   std::optional<std::uint32_t> find(const Eigen::AlignedBox2d& box, const Predicate& is) const {
     const std::size_t lastX = column(0, box.max().x()), lastY = column(1, box.max().y());
@@ -92,12 +92,13 @@ class CornerGrid {
 
   std::size_t side_;
   Eigen::AlignedBox2d box_;
-  std::vector<std::uint32_t> starts_;   ///< of each cell, row by row, in `corners_`
-  std::vector<std::uint32_t> corners_;  ///< cell by cell
+  std::vector<std::uint32_t> starts_;   ///< index of each cell's first corner in `corners_`, row by row
+  std::vector<std::uint32_t> corners_;  ///< the corners, sorted by cell
 };
 
-/// Ear clipping: cuts off one convex corner after another that has no other corner in its triangle. Corners that were
-/// found not to be ears are passed over until a neighbour goes, or the corner that was in the way.
+/// Ear clipping (Meisters 1975): cuts off one ear after another, that is, a convex corner whose triangle contains no
+/// other corner. A corner that is not an ear is tested again once a neighbour or the corner within its triangle is cut
+/// off.
 class EarClipper {
  public:
   explicit EarClipper(std::span<const Vector3> polygon)
@@ -116,9 +117,9 @@ class EarClipper {
   }
 
   std::vector<std::array<std::uint32_t, 3>> clip() {
-    // Positions come from float, where a corner on a straight side is off it by rounding: ears as thin as that, and
-    // ears whose cut runs past a corner as closely as that, would leave slivers with normals of noise. They come
-    // second.
+    // Positions come from float, which rounds corners away from a straight side. Ears as thin as that rounding, and
+    // ears whose cut passes a corner that closely, would yield slivers with normals of noise. They are the second
+    // choice.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
@@ -136,7 +137,8 @@ class EarClipper {
     return corner;
   }
 
-  /// `tolerance`: how far from straight the corner is, and other corners from the triangle, relative to its sides.
+  /// Returns true if the corner is an ear. `tolerance`, relative to the triangle's sides, is how far the corner must be
+  /// from straight and how far all other corners must be from the triangle.
   bool isEar(std::uint32_t corner, double tolerance) {
     const std::uint32_t before = previous_[corner], after = next_[corner];
     const std::array<Vector2, 3> ear = {points_[before], points_[corner], points_[after]};
@@ -150,7 +152,7 @@ class EarClipper {
     return !other;
   }
 
-  /// Around all places that `isNear`: a triangle, too, with every side moved outwards.
+  /// The box of all points that `isNear` accepts: those of the triangle with every side moved outwards.
   static Eigen::AlignedBox2d boxAround(const std::array<Vector2, 3>& ear, double tolerance) {
     Eigen::AlignedBox2d box;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -160,7 +162,8 @@ class EarClipper {
     return box;
   }
 
-  /// Inside or on the border, but not at a corner: polygons with a slit pass through a point twice.
+  /// Returns true for points in or near the triangle but not at its corners, because a polygon with a slit passes
+  /// through the same point twice.
   static bool isNear(const Vector2& p, const std::array<Vector2, 3>& ear, double tolerance) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Vector2 side = ear[(i + 1) % 3] - ear[i];
@@ -169,7 +172,7 @@ class EarClipper {
     return true;
   }
 
-  /// For what is left of a polygon that is flat to a line or crosses itself.
+  /// The corner to cut off where no ear is left: the polygon is flat or intersects itself.
   std::uint32_t flattestCorner() const {
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();
@@ -190,17 +193,17 @@ class EarClipper {
     triangles_.push_back({before, corner, after});
     next_[before] = after;
     previous_[after] = before;
-    start_ = next_[after];  // not the neighbour: it would soon be the tip of a fan
+    start_ = next_[after];  // Starting at the neighbour would yield a fan of slivers.
     --left_;
     isLeft_[corner] = false;
     maybeClear_.remove(corner);
     maybe_.remove(corner);
-    lookAgain(before);
-    lookAgain(after);
-    for (const std::uint32_t other : blocked_[corner]) lookAgain(other);
+    testAgain(before);
+    testAgain(after);
+    for (const std::uint32_t other : blocked_[corner]) testAgain(other);
   }
 
-  void lookAgain(std::uint32_t corner) {
+  void testAgain(std::uint32_t corner) {
     if (!isLeft_[corner]) return;
     maybeClear_.add(corner);
     maybe_.add(corner);
@@ -208,8 +211,8 @@ class EarClipper {
 
   std::vector<Vector2> points_;
   CornerGrid grid_;
-  CornerSet maybeClear_, maybe_;                     ///< what may be an ear, with tolerance and without
-  std::vector<std::vector<std::uint32_t>> blocked_;  ///< by each corner: those that are no ears for its sake
+  CornerSet maybeClear_, maybe_;                     ///< corners to test as ears, with tolerance and without
+  std::vector<std::vector<std::uint32_t>> blocked_;  ///< for each corner, those whose triangle contains it
   std::vector<bool> isLeft_;
   std::vector<std::uint32_t> next_;
   std::vector<std::uint32_t> previous_;
@@ -225,4 +228,4 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vector3> p
   return EarClipper(polygon).clip();
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

@@ -7,11 +7,12 @@
 
 #include "hpsdf/types.h"
 
-namespace hpsdf {
+namespace hpsdf::mesh {
 
-/// Triangles over the corners of a simple, nearly flat polygon, as indices into `polygon` and with its orientation:
-/// always two fewer than corners. Corners along a straight side get triangles with an area where the polygon allows
-/// it. (Ours, because assimp 5.2 lets triangles reach outside of concave polygons, and Debian packages no library.)
+/// Triangulates a simple, nearly flat polygon of n corners into n - 2 triangles, as indices into `polygon` and with its
+/// orientation. Corners along a straight side get triangles with an area where the polygon allows it.
+///
+/// assimp 5.2 has a triangulation of its own, whose triangles extend beyond concave polygons.
 std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vector3> polygon);
 
-}  // namespace hpsdf
+}  // namespace hpsdf::mesh

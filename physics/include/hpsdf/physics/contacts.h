@@ -1,5 +1,5 @@
 #pragma once
-// The samples of one body that lie in another: where, how deep, which way out.
+// The surface samples of one body that lie in another body: position, depth, and direction out of that body.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,23 +13,22 @@
 namespace hpsdf::physics {
 
 struct ContactOptions {
-  double margin = 0;  ///< samples that are outside by no more count too; in world units, not below 0
-  /// No more than so many, the deepest ones, the deepest first and of equal ones that of the lower index. Nothing: all,
-  /// in the samples' order.
+  double margin = 0;  ///< samples up to this distance outside are contacts too; world units, 0 or more
+  /// The number of contacts to keep, the deepest first, of equal depths the lower sample index first. Without it all
+  /// contacts are returned, in the order of the samples.
   std::optional<std::size_t> deepest = {};
 };
 
 struct Contact {
-  std::uint32_t sample;  ///< its index
-  double depth;          ///< the field's value there, negative: above 0 inside
+  std::uint32_t sample;  ///< index of the sample
+  double depth;          ///< −f at the sample: above 0 inside
   Vector3 position;      ///< of the sample, in the world
-  /// Unit length, in the world: the field's gradient there, out of the field's body. Where that vanishes, against the
-  /// sample's own normal.
+  /// Unit vector in the world out of the field's body: the field's direction of steepest ascent. Where the gradient
+  /// vanishes, the opposite of the sample's normal.
   Vector3 normal;
 };
 
-/// Samples of one body against the field of another, each in its body's own units, which are the world's. Transforms
-/// are rotations and shifts.
+/// Samples of one body and the field of another. All lengths have one unit; transforms are rotations with translations.
 struct BodyPair {
   const SurfaceSamples* samples;
   Eigen::Isometry3d worldFromSamples;
@@ -37,24 +36,25 @@ struct BodyPair {
   Eigen::Isometry3d worldFromField;
 };
 
-/// What queries had to look at.
+/// The work of queries.
 struct QueryCost {
-  std::size_t spheres = 0;      ///< looked up in the collider's table
-  std::size_t samples = 0;      ///< the same
-  std::size_t evaluations = 0;  ///< of the field
+  std::size_t spheres = 0;      ///< spheres tested against the collider's table
+  std::size_t samples = 0;      ///< samples tested against the collider's table
+  std::size_t evaluations = 0;  ///< evaluations of the field
 
   QueryCost& operator+=(const QueryCost& other);
 };
 
-/// Queries one after another: keeps the room for the contacts, so that none takes memory once there is enough.
+/// Runs queries one after another. It reuses its memory, so that a query allocates only if it has more contacts than
+/// all before.
 class ContactQuery {
  public:
-  /// The contacts are valid until the next query. The very samples that evaluating the field at each would find. Throws
-  /// `Error` for a transform that is not finite or not rigid (by more than 1e-6), for a margin that is not finite or
-  /// below 0, for no contacts to be found.
+  /// Finds exactly the samples that evaluating the field at each sample would find. The result is valid until the next
+  /// query. Throws `Error` for a transform that is not finite or not rigid (within 1e-6), for a margin that is not
+  /// finite or below 0, and for `deepest` = 0.
   std::span<const Contact> find(const BodyPair& pair, const ContactOptions& options = {});
 
-  /// Of the last query.
+  /// The cost of the last query.
   const QueryCost& cost() const { return cost_; }
 
  private:
@@ -62,18 +62,18 @@ class ContactQuery {
   QueryCost cost_;
 };
 
-/// The contacts of many pairs, and room that is used again.
+/// The contacts of many pairs, in memory that the next search reuses.
 class PairContacts {
  public:
   std::size_t pairs() const { return pairs_; }
   std::span<const Contact> of(std::size_t pair) const;
-  std::span<const Contact> all() const { return contacts_; }  ///< one pair's after another's
-  const QueryCost& cost() const { return cost_; }             ///< in all
+  std::span<const Contact> all() const { return contacts_; }  ///< contacts of all pairs, in the order of the pairs
+  const QueryCost& cost() const { return cost_; }             ///< total cost
 
  private:
   friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
-  /// Pairs that one thread asks for.
+  /// The results of pairs that one task handles.
   struct Block {
     std::vector<Contact> contacts;
     QueryCost cost;
@@ -81,13 +81,14 @@ class PairContacts {
 
   std::size_t pairs_ = 0;
   std::vector<Block> blocks_;
-  std::vector<std::size_t> ends_;  ///< of each pair's contacts
+  std::vector<std::size_t> ends_;  ///< index in contacts_ after each pair's last contact
   std::vector<Contact> contacts_;
   QueryCost cost_;
 };
 
-/// As `ContactQuery`, by the threads of the caller's TBB arena, on which the result does not depend. Throws `Error` as
-/// it does, naming the first pair that is at fault, before any is asked for.
+/// Finds the contacts of all pairs, as `ContactQuery` does, with the threads of the caller's TBB arena. The result does
+/// not depend on their number. Throws `Error` as `ContactQuery` does, with the number of the first invalid pair, before
+/// any query starts.
 void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
 }  // namespace hpsdf::physics

@@ -1,4 +1,5 @@
 #pragma once
+// A table of lower bounds of a field, with which collision queries skip most evaluations.
 
 #include <array>
 #include <cstddef>
@@ -9,13 +10,13 @@
 
 namespace hpsdf::physics {
 
-/// A field with what tells, for the price of one look at a table, where it cannot be low.
+/// A field with a table of certain lower bounds of it. A lookup costs a third of an evaluation.
 ///
-/// A field is only nearly a distance: it may change by more than the way between two points, and it jumps. So what a
-/// sphere's centre says of the sphere is certain only with a slack, which is large where the field is coarse. The
-/// collider keeps the greatest function below the field that is a distance in that sense, |g(x) - g(y)| ≤ |x - y|, as
-/// nearly as a grid of cells can tell it: bounds of the leaves' polynomials, of all that are blended there, and what
-/// lower ones elsewhere take from them. It is certain for every field, with stored bounds or without.
+/// A field only approximates a distance: between two points it may change by more than their distance, and it jumps.
+/// Therefore its value at a sphere's centre bounds it within the sphere only with a slack, which is large where the
+/// field is coarse. The collider stores, as precisely as a grid of cells allows, the greatest function g below the
+/// field with |g(x) − g(y)| ≤ |x − y|. It follows from bounds of the polynomials of all leaves, blended neighbours
+/// included, and is valid for every field, with stored bounds or without.
 class FieldCollider {
  public:
   /// Refers to the field, which must outlive it.
@@ -24,28 +25,29 @@ class FieldCollider {
 
   const Field& field() const { return *field_; }
 
-  /// 0 or more; the field at x is no less, or negative where this is 0. x may be infinite, not NaN; so below.
+  /// A lower bound of the field at x, or 0 where the field may be negative; never below 0. Here and below x may be
+  /// infinite, but not NaN.
   double lowerBound(const Vector3& x) const;
 
-  /// 0 or more; at any distance r of x at which this less r is above 0 the field is no less than that.
+  /// A bound b ≥ 0 of the field around x: at every distance r < b of x the field is at least b − r.
   double lowerBoundAround(const Vector3& x) const;
 
   std::size_t bytes() const { return cells_.size() * sizeof(cells_[0]); }
 
  private:
-  /// In `unit_`, rounded down.
+  /// Bounds in `unit_`, rounded down.
   struct Cell {
-    std::uint16_t within;  ///< at most the field, within the cell
-    std::uint16_t around;  ///< at most the field at any point, and the way there from any of the cell's
+    std::uint16_t within;  ///< of the field in the cell
+    std::uint16_t around;  ///< of the field at any point plus its distance from any point of the cell
   };
 
   const Cell& cellAt(const Vector3& inDomain) const;
 
   const Field* field_;
-  int depth_;                         ///< of the octree's cells that are the grid's
-  std::array<std::int64_t, 3> size_;  ///< cells
+  int depth_;                         ///< depth of octree cells that have the size of a grid cell
+  std::array<std::int64_t, 3> size_;  ///< grid cells along each axis
   double unit_;
-  double wall_;              ///< the least of the field at the domain's sides or, if that is above 0, of `around` there
+  double wall_;              ///< least field value at the domain's sides or, if that is above 0, least `around` there
   std::vector<Cell> cells_;  ///< x fastest
 };
 

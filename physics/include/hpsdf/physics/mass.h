@@ -1,5 +1,5 @@
 #pragma once
-// What a rigid body of a closed surface weighs, and how it turns.
+// Mass, centre of mass and moments of inertia of a closed mesh.
 
 #include <Eigen/Geometry>
 
@@ -8,17 +8,18 @@
 
 namespace hpsdf::physics {
 
-/// Of a body of even density, in its mesh's units.
+/// Properties of a body of uniform density, in its mesh's units.
 struct MassProperties {
-  double volume;                      ///< above 0
-  Eigen::Isometry3d meshFromInertia;  ///< from the frame whose origin is the centre of mass, along the principal axes
-  Vector3 inertia;                    ///< about these axes, of a body of mass 1: squared mesh units
-  Box box;                            ///< of the mesh, in that frame
+  double volume;  ///< above 0
+  /// From the frame of inertia, whose origin is the centre of mass and whose axes are the principal axes.
+  Eigen::Isometry3d meshFromInertia;
+  Vector3 inertia;  ///< moments about the principal axes of a body of mass 1, in squared units
+  Box box;          ///< bounding box of the mesh in the frame of inertia
 };
 
-/// By the divergence theorem, over the tetrahedra of the faces and the origin (Tonon 2004 gives their moments). Throws
-/// `Error` for a mesh without volume, with indices out of range or coordinates that are not finite; one that is open
-/// gives the figures of some closed one.
+/// Integrates over the tetrahedra of the faces and one point (divergence theorem; Tonon 2004 gives their moments).
+/// Throws `Error` for a mesh without volume, with indices out of range or coordinates that are not finite. The
+/// properties of an open mesh are those of some closed one.
 MassProperties massProperties(const TriangleMesh& mesh);
 
 }  // namespace hpsdf::physics

@@ -1,5 +1,6 @@
 #pragma once
-// Triangle meshes beside a field's surface: rigid bodies, many of few meshes, and meshes whose vertices move, as cloth.
+// Pictures of triangle meshes: rigid bodies, many of which may share a mesh, and meshes whose vertices move, as cloth
+// does.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,64 +16,67 @@
 
 namespace hpsdf::render {
 
-/// A colour for the body of this index: neighbours differ, and none is near the clay of a field's surface.
+/// The colour of the body with this index. Colours of consecutive indices differ, and none is near `surfaceColor`.
 Color bodyColor(std::size_t index);
 
-/// The clay of a field's surface where colours mean nothing, for bodies that are to look like one.
+/// The clay colour of a field's surface in pictures without a colour scale.
 Color surfaceColor();
 
-/// A mesh somewhere in the world.
+/// A mesh with a position and an orientation in the world.
 struct Body {
-  std::uint32_t mesh = 0;  ///< index among those of the renderer
+  std::uint32_t mesh = 0;  ///< index of the mesh among those of the renderer
   Eigen::Isometry3d worldFromBody = Eigen::Isometry3d::Identity();
   Color color = bodyColor(0);
 };
 
-/// What the pixels of a view see of bodies, rows top to bottom, in the conventions of `ViewBuffers`: along a pixel's
-/// ray the nearer of the two is what the pixel shows. Where there is no body, `body` is kNoBody and the rest 0.
+/// The bodies that the pixels of a view see, rows top to bottom. Distances compare with those of `ViewBuffers`, so that
+/// the nearer of a body and the surface hides the other. A pixel without a body has `body` kNoBody and 0 in the other
+/// buffers.
 struct BodyBuffers {
   int width = 0;
   int height = 0;
-  std::vector<std::uint32_t> body;      ///< index among those drawn
-  std::vector<std::uint32_t> triangle;  ///< index in its mesh
-  /// Unit, of the side that one sees: meshes may be open, or closed and turned inside out. Interpolated where the mesh
-  /// is smooth, so that at a silhouette it may turn a little away from the eye.
+  std::vector<std::uint32_t> body;      ///< index of the body among those drawn
+  std::vector<std::uint32_t> triangle;  ///< index of the triangle in the body's mesh
+  /// The unit normal of the side of the triangle that faces the eye: meshes may be open or have the wrong orientation.
+  /// The normal is interpolated where the mesh is smooth, so that it may point slightly away from the eye at a
+  /// silhouette.
   std::vector<Eigen::Vector3f> normal;
-  std::vector<float> distance;  ///< from where the ray starts, world units
+  std::vector<float> distance;  ///< distance along the ray from its start to the body, world units
 
   bool hit(std::size_t pixel) const { return body[pixel] != kNoBody; }
 };
 
-/// Fills the buffers of bodies of some meshes. Not thread-safe; one renderer a thread.
+/// Fills the buffers of bodies of a fixed list of meshes. Not thread-safe: use one renderer for each thread.
 class BodyRenderer {
  public:
-  virtual ~BodyRenderer() = default;
+  virtual ~BodyRenderer();
 
-  /// In perspective what is nearer to the plane of the eye than 1e-5 of the farthest body is not seen; of parallel
-  /// rays, what lies before the plane where they start. The camera's forward, right and up are at right angles. Throws
-  /// `Error` for a view of more than 64 Mi pixels, before memory is taken, and for bodies as `bounds` does.
+  /// Renders bodies. In perspective nothing is seen at depths below 1e-5 of the farthest body's; with parallel rays,
+  /// nothing before the plane in which they start. Requires that the camera's forward, right and up vectors are at
+  /// right angles. Throws `Error` for a view of more than 64 Mi pixels, before memory is taken, and for bodies as
+  /// `bounds` does.
   virtual BodyBuffers view(const Camera& camera, std::span<const Body> bodies, int width, int height) = 0;
 
-  /// Gives a mesh other vertices; as many as it has, its triangles stay. Throws `Error` for another number, for
-  /// coordinates that are not finite or for a mesh that is not there; the mesh then is what it was.
+  /// Moves the vertices of a mesh, world units; its triangles stay. Throws `Error`, and leaves the mesh as it is, for
+  /// another number of vertices, for coordinates that are not finite or for an index of no mesh.
   virtual void moveVertices(std::size_t mesh, std::span<const Vector3> vertices) = 0;
 
-  /// A box that holds these bodies, world units; empty without any. Throws `Error` for more than 2^24 bodies, for one
-  /// whose mesh is not there, and for a transform that is not finite or not rigid, naming it.
+  /// A box that holds the bodies, world units; empty for no bodies. Throws `Error` for more than 2^24 bodies, and for a
+  /// body whose mesh does not exist or whose transform is not finite or not rigid, naming the body.
   virtual Box bounds(std::span<const Body> bodies) const = 0;
 
-  /// What does the work, as of a `Renderer`.
+  /// The name of the device, as in `Renderer::description`.
   virtual std::string description() const = 0;
 };
 
-/// The oracle: each pixel's ray against the triangles in double precision, without OpenGL. Throws `Error` for a mesh
-/// without triangles, with coordinates that are not finite (or beyond 1e15) or with a triangle of vertices that are not
-/// there, and for more than 2^26 triangles in all, naming the mesh.
+/// The oracle: intersects the ray of each pixel with the triangles in double precision, without OpenGL. Throws `Error`,
+/// naming the mesh, for a mesh without triangles, with coordinates that are not finite or beyond 1e15, or with indices
+/// of no vertex; throws `Error` for more than 2^26 triangles in all.
 std::unique_ptr<BodyRenderer> makeCpuBodyRenderer(std::vector<TriangleMesh> meshes);
 
-/// OpenGL, as of a field: each mesh is uploaded once, and each body is an instance. Which triangle a pixel sees is
-/// OpenGL's, with corners rounded to some 1/256 of a pixel; distance and normal follow from it in double precision.
-/// Throws as above, and when no device serves.
+/// Renders with OpenGL: each mesh is uploaded once, and each body is an instance of its mesh. OpenGL decides which
+/// triangle a pixel sees, with corners rounded to about 1/256 of a pixel; distance and normal are computed from that
+/// triangle in double precision. Throws as `makeCpuBodyRenderer` does, and when no device offers OpenGL 4.5.
 std::unique_ptr<BodyRenderer> makeGlBodyRenderer(std::vector<TriangleMesh> meshes,
                                                  GlChoice choice = GlChoice::automatic);
 

@@ -1,5 +1,5 @@
 #pragma once
-// A picture against its baseline.
+// Comparison of a picture with its baseline.
 
 #include <array>
 #include <cstddef>
@@ -10,38 +10,39 @@
 
 namespace hpsdf::render {
 
-/// A channel may differ by so much of 255 for free: low bits of another processor, rounded.
+/// The tolerated difference of a channel, of 255: another processor rounds the low bits differently.
 constexpr int kFreeDifference = 3;
-/// Share of the pixels that may differ more, at cell edges and silhouettes, where a low bit decides between two cells.
+/// The tolerated share of pixels that differ more: at cell edges and silhouettes a low bit decides between two cells.
 constexpr double kPixelBudget = 0.002;
 
 struct Comparison {
   std::array<int, 2> baselineSize = {};  ///< width and height
-  std::array<int, 2> actualSize = {};
-  std::size_t compared = 0;   ///< pixels; none where the sizes differ
-  std::size_t differing = 0;  ///< pixels with a channel beyond what is free
-  int largest = 0;            ///< difference of a channel
+  std::array<int, 2> actualSize = {};    ///< width and height
+  std::size_t compared = 0;              ///< number of pixels compared; 0 where the sizes differ
+  std::size_t differing = 0;             ///< number of pixels with a channel that differs by more than kFreeDifference
+  int largest = 0;                       ///< largest difference of a channel
 
   bool sameSize() const { return baselineSize == actualSize; }
 };
 Comparison compare(const Image& baseline, const Image& actual);
 
-/// What is wrong, in one line; empty where the sizes are the same and at most a share of `budget` of the pixels
-/// differs.
+/// Describes in one line why the comparison fails; empty if the sizes are equal and at most a share of `budget` of the
+/// pixels differ.
 std::string problem(const Comparison& comparison, double budget);
 
-/// Where two pictures of one size differ: black where they do not, dark where it is free, from mid grey to white with
-/// the difference where it is not.
+/// Shows the differences between two pictures of one size: black where the pixels are equal, dark grey where their
+/// difference is tolerated, and from mid grey to white where it is not.
 Image differencePicture(const Image& baseline, const Image& actual);
 
 struct PixelDifference {
   int x;
-  int y;  ///< from the top
+  int y;  ///< row, counted from the top
   Color baseline;
   Color actual;
-  int difference;  ///< of the worst channel
+  int difference;  ///< of the channel that differs most
 };
-/// The worst first, at most `count` of them; of those that lie near each other only the worst. Pictures of one size.
+/// At most `count` of the pixels that differ most, the worst first; only the worst of neighbours is listed. Both
+/// pictures must have one size.
 std::vector<PixelDifference> worstPixels(const Image& baseline, const Image& actual, std::size_t count);
 
 }  // namespace hpsdf::render

@@ -1,10 +1,11 @@
 #pragma once
+// The font of all pictures.
 
 #include <span>
 
 namespace hpsdf::render {
 
-/// DejaVuSans.ttf of Debian's fonts-dejavu-core, the font of all pictures: built into the library.
+/// The bytes of DejaVuSans.ttf (Debian's fonts-dejavu-core), which is built into the library.
 std::span<const unsigned char> dejavuSans();
 
 }  // namespace hpsdf::render

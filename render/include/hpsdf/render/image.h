@@ -1,4 +1,5 @@
 #pragma once
+// Pictures in memory and as PNG files.
 
 #include <array>
 #include <cstdint>
@@ -22,12 +23,14 @@ struct Image {
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };
 
-/// Throws `hpsdf::Error` naming the file. Written under a temporary name and renamed.
+/// Writes under a temporary name and renames the file. Throws `hpsdf::Error` that names the file.
 void savePng(const Image& image, const std::filesystem::path& file);
+
+/// Throws `hpsdf::Error` that names the file.
 Image loadPng(const std::filesystem::path& file);
 
-/// Of a picture drawn from a view. Throws `Error` for a size or sample count out of range: 16 to 16384 pixels, 1 to 8,
-/// no more than 64 Mi samples in all.
+/// Throws `Error` unless a picture of a view may have this size and sample count: 16 to 16384 pixels a side, 1 to 8
+/// samples a pixel along each axis, no more than 64 Mi samples in all.
 void checkPictureSize(int width, int height, int samples);
 
 }  // namespace hpsdf::render

@@ -1,5 +1,5 @@
 #pragma once
-// A mesh as it is, before any field: which way its faces look, and where it has defects.
+// A picture of a mesh alone, without a field: the orientation of its faces and its defects.
 
 #include <functional>
 #include <memory>
@@ -14,21 +14,21 @@
 namespace hpsdf::render {
 
 struct MeshPicture {
-  OrbitCamera
-      camera;  ///< around the middle of the mesh; distances in diagonals of a cube about it, as of a field's domain
+  /// Circles the centre of the mesh; distances are in diagonals of a cube around it, as of a field's domain.
+  OrbitCamera camera;
   int width = 1280;
   int height = 720;
-  int samples = 1;     ///< an axis and pixel, 1 to 8
-  bool whole = false;  ///< from as near as shows all of the mesh, whatever the camera's distance
+  int samples = 1;     ///< samples a pixel along each axis, 1 to 8
+  bool whole = false;  ///< replaces the camera's distance by the nearest one that shows the whole mesh
 };
 
 /// Makes a renderer of some meshes, as `makeCpuBodyRenderer` does.
 using MakeBodyRenderer = std::function<std::unique_ptr<BodyRenderer>(std::vector<TriangleMesh>)>;
 
-/// Clay where faces look at the eye, blue where they are seen from behind, pale red where they meet others; edges that
-/// are open, shared by more than two faces or run against each other as lines, small defects in rings; dashed what is
-/// hidden. Coordinates may be of any size, wherever the mesh is: `make` gets it near the origin and near 1 in size.
-/// `defects`: of this mesh. Throws `Error` for a size, a camera or a mesh out of range.
+/// Draws front faces in the colour of clay, back faces blue and faces that cross others pale red. Boundary,
+/// non-manifold and inconsistent edges are lines, and a ring surrounds defects that are small in the picture; hidden
+/// parts are dashed. The mesh may lie anywhere and have any size: `make` receives it near the origin with a size
+/// near 1. `defects` are those of this mesh. Throws `Error` for a size, a camera or a mesh out of range.
 Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
                const MeshPicture& picture);
 

@@ -8,31 +8,36 @@
 
 namespace hpsdf::render {
 
-/// Which OpenGL device to take (the ladder of docs/rendering.md).
+/// The OpenGL devices to try, in the order of docs/rendering.md.
 enum class GlChoice : std::uint8_t {
-  automatic,  ///< a hardware device, then a software device, surfaceless Mesa, the default display
-  software,   ///< Mesa's llvmpipe: the reference
-  hardware,
+  automatic,  ///< hardware devices, then software devices, surfaceless Mesa, the default display
+  software,   ///< a software renderer only: Mesa's llvmpipe, the reference of the pictures
+  hardware,   ///< a hardware device only
 };
 
-/// Fills the buffers of views of one field. Not thread-safe; one renderer a thread.
+/// Fills the buffers of views of one field. Not thread-safe: use one renderer for each thread.
 class Renderer {
  public:
-  virtual ~Renderer() = default;
+  virtual ~Renderer();
+
+  /// Samples a rectangle. Throws `Error` for a view that is not finite or a size beyond 1 to 2^20 pixels a side.
   virtual ViewBuffers slice(const SliceView& view, int width, int height) = 0;
+
+  /// Traces the surface f = offset. Throws `Error` as `slice` does, and for an offset that is not finite.
   virtual ViewBuffers surface(const SurfaceView& view, int width, int height) = 0;
-  /// What does the work, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)" or "CPU, double precision".
+
+  /// The name of the device, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)" or "CPU, double precision".
   virtual std::string description() const = 0;
 };
 
-/// The oracle: the same buffers in double precision, without OpenGL. The field must outlive the renderer.
+/// The oracle: fills the buffers in double precision, without OpenGL. The field must outlive the renderer.
 std::unique_ptr<Renderer> makeCpuRenderer(const Field& field);
 
-/// OpenGL 4.5 core through EGL, without a window; the field is uploaded once, its coefficients as float.
-/// Throws `Error` when no device serves, saying what was tried, or when the field exceeds the device's buffers.
+/// Renders with OpenGL 4.5 core through EGL, without a window. The field is uploaded once, its coefficients as float.
+/// Throws `Error` when no device offers OpenGL 4.5, naming the devices tried, or when the field exceeds its buffers.
 std::unique_ptr<Renderer> makeGlRenderer(const Field& field, GlChoice choice = GlChoice::automatic);
 
-/// Renderer string of the device that `choice` would take; throws as above.
+/// The GL_RENDERER string of the device that `choice` selects. Throws as `makeGlRenderer` does.
 std::string glDescription(GlChoice choice);
 
 }  // namespace hpsdf::render

@@ -1,5 +1,5 @@
 #pragma once
-// Bullet's rigid and soft bodies with fields as colliders, a step at a time.
+// Bullet's world of rigid and soft bodies with fields as colliders.
 
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 
@@ -8,16 +8,17 @@
 #include <memory>
 #include <vector>
 
-#include "hpsdf/physics/bullet.h"
+#include "hpsdf/physics/field_dispatcher.h"
+#include "hpsdf/physics/field_shape.h"
 
 namespace hpsdf::physics {
 
 struct WorldOptions {
-  Vector3 gravity = {0, 0, -9.81};  ///< units a second²
+  Vector3 gravity = {0, 0, -9.81};  ///< units per second²
   double step = 1.0 / 240;          ///< seconds
   int solverIterations = 20;
-  /// So deep bodies may rest in each other, in units: some hundredth of their size or less. Contacts then do not come
-  /// and go from step to step, and piles are calmer.
+  /// Penetration that the solver tolerates, in units; at most about 1/100 of the bodies' size. With it contacts at rest
+  /// persist from step to step, and piles are calmer.
   double slop = 0;
 };
 
@@ -26,47 +27,49 @@ struct Material {
   double restitution = 0;
   double rollingFriction = 0;
   double linearDamping = 0, angularDamping = 0;
-  /// A body that for two seconds moves slower than this, and turns slower than this over its radius, may fall asleep,
-  /// if all do that it touches; units a second. Below 0 what Bullet has for bodies of size 1: 0.8, and 1 radian.
+  /// Speed in units per second below which a body comes to rest: after two seconds of slower motion (of its centre, and
+  /// of points at its radius) it may sleep, if all bodies that it touches may. A negative value stands for Bullet's
+  /// thresholds for bodies of size 1: 0.8 units and 1 radian per second.
   double restSpeed = -1;
 };
 
-/// Of one step.
+/// Figures of one step.
 struct StepFigures {
   DispatchFigures dispatch;
-  double seconds = 0;        ///< in all
-  double solverSeconds = 0;  ///< of the rigid bodies' constraints
+  double seconds = 0;        ///< total time
+  double solverSeconds = 0;  ///< time of the constraint solver of rigid bodies
 };
 
-/// Bullet's world for rigid and soft bodies. Deterministic: the same bodies, added in the same order, move the same,
-/// for any number of threads.
+/// Bullet's world for rigid and soft bodies. It is deterministic: the same bodies, added in the same order, move in the
+/// same way for any number of threads.
 class World {
  public:
-  /// Throws `Error` unless the step is above 0 and finite, gravity finite, there is one iteration at least, and slop is
-  /// 0 or above and finite.
+  /// Throws `Error` unless the step is above 0 and finite, gravity is finite, there is at least one iteration, and slop
+  /// is finite and not negative.
   explicit World(const WorldOptions& options = {});
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// A rigid body, static where its mass is 0. Refers to the shape, which must outlive the world. Its frame is the
-  /// shape's (of a `FieldShape` that of its inertia). Returns its number, from 0 in the order in which bodies were
-  /// added. Throws `Error` for a mass below 0 or not finite and for a transform that is not finite or not rigid.
+  /// Adds a rigid body, which is static if its mass is 0, and returns its number: 0, 1, … in the order of addition.
+  /// Refers to the shape, which must outlive the world. The body's frame is that of the shape (for a `FieldShape` the
+  /// frame of inertia). Throws `Error` for a mass that is negative or not finite and for a transform that is not finite
+  /// or not rigid.
   std::size_t add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                   const Material& material = {});
 
-  /// For `btSoftBody`'s constructors.
+  /// The argument of `btSoftBody`'s constructors.
   btSoftBodyWorldInfo& softBodyInfo();
-  /// Takes a soft body over. Returns its number, by itself from 0.
+  /// Adds a soft body and returns its number; soft bodies have their own numbers 0, 1, ….
   std::size_t add(std::unique_ptr<btSoftBody> body);
 
-  /// Throws `Error` where a body's place or speed is no longer finite, or where it would go a million units in a step
-  /// (Bullet leaves such a body where it was, without a word), naming step and body; the world is of no use then.
+  /// Throws `Error`, with the step and the body, if a position or velocity is no longer finite or a body moves a
+  /// million units in one step, which Bullet silently leaves out. The world cannot be used afterwards.
   void step();
 
   std::uint64_t steps() const { return steps_; }
-  double seconds() const { return double(steps_) * options_.step; }  ///< simulated
-  const StepFigures& figures() const { return figures_; }            ///< of the last step
+  double seconds() const { return double(steps_) * options_.step; }  ///< simulated time
+  const StepFigures& figures() const { return figures_; }            ///< figures of the last step
 
   std::size_t bodies() const { return bodies_.size(); }
   btRigidBody& body(std::size_t number) { return *bodies_[number]; }

@@ -1,0 +1,276 @@
+#include "construction/build_arguments.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hpsdf/build.h"
+#include "hpsdf/detail/build_settings.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::uint64_t kDefaultMemory = 100'000'000;  // of the construction, where nothing limits its size
+
+Parameter parameterFrom(const BuildSetting& setting) {
+  Parameter parameter{.name = std::string(setting.name),
+                      .help = std::string(setting.help),
+                      .defaultText = defaultText(setting),
+                      .unit = std::string(setting.unit),
+                      .minimumExcluded = setting.minimumExcluded,
+                      .choices = {setting.words.begin(), setting.words.end()}};
+  if (std::isfinite(setting.minimum)) parameter.minimum = setting.minimum;
+  if (std::isfinite(setting.maximum)) parameter.maximum = setting.maximum;
+  switch (setting.type) {
+    case BuildSetting::Type::number:
+      parameter.type = ParameterType::number;
+      break;
+    case BuildSetting::Type::wholeNumber:
+      parameter.type = ParameterType::wholeNumber;
+      break;
+    case BuildSetting::Type::wholeNumbers:
+      parameter.type = ParameterType::numbers;
+      parameter.valueName = "N|NX,NY,NZ";
+      parameter.whole = true;
+      parameter.counts = {1, 3};
+      break;
+    case BuildSetting::Type::choice:
+      parameter.type = ParameterType::choice;
+      break;
+    case BuildSetting::Type::flag:
+      parameter.type = ParameterType::flag;
+      break;
+  }
+  return parameter;
+}
+
+std::vector<double> valueOf(const Arguments& arguments, const BuildSetting& setting) {
+  const std::string name(setting.name);
+  if (setting.type == BuildSetting::Type::flag) return {arguments.flag(name) ? 1.0 : 0.0};
+  if (setting.type != BuildSetting::Type::choice) return arguments.numbers(name);
+  return {double(std::ranges::find(setting.words, arguments.text(name)) - setting.words.begin())};
+}
+
+std::vector<Parameter> domainParameters() {
+  return {
+      {.name = "domain",
+       .type = ParameterType::numbers,
+       .help =
+           "Where the field is defined by polynomials: the cube or the box around the mesh, enlarged by the margin, "
+           "or two corners in world units (after normalizing).",
+       .defaultText = "cube",
+       .valueName = "cube|box|x0,y0,z0,x1,y1,z1",
+       .choices = {"cube", "box"},
+       .counts = {6}},
+      {.name = "margin",
+       .type = ParameterType::number,
+       .help = "By which part the cube or box is larger than the mesh, e.g. 0.1 for half-sizes times 1.1.",
+       .defaultText = "0.1",
+       .minimum = 0},
+      {.name = "normalize",
+       .type = ParameterType::flag,
+       .help = "Scale and centre the mesh so that its longest side spans [-1, 1], as the paper does. Without it the "
+               "field stays in the mesh's own units.",
+       .defaultText = "false"},
+  };
+}
+
+std::vector<Parameter> insideParameters() {
+  return {
+      {.name = "sign",
+       .type = ParameterType::choice,
+       .help = "How inside is told from outside. pseudonormal: by the normals of the closest faces, for closed meshes "
+               "that do not intersect themselves. winding: by how often the faces surround a point, for any mesh; "
+               "holes are closed. unsigned-shell: all is outside but a wall around the faces, --thickness wide, for "
+               "sheets. auto: pseudonormal where that is certain to be right, else winding, and says why.",
+       .defaultText = "auto",
+       .choices = {"auto", "pseudonormal", "winding", "unsigned-shell"}},
+      {.name = "hull",
+       .type = ParameterType::flag,
+       .help =
+           "Leave out faces, or parts of them, that have the inside on both sides, such as walls within bodies that "
+           "overlap: they are no surface then. The sign is by winding number.",
+       .defaultText = "false"},
+      {.name = "thickness",
+       .type = ParameterType::number,
+       .help = "Thickness of the wall that --sign unsigned-shell makes.",
+       .unit = "world units",
+       .minimum = 0,
+       .minimumExcluded = true},
+  };
+}
+
+Parameter paperParameter() {
+  return {.name = "paper",
+          .type = ParameterType::flag,
+          .help =
+              "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, "
+              "max-degree 30, max-depth 10, quadrature 4 by products with samples of its own for each trial, "
+              "double. Options that are given too win.",
+          .defaultText = "false"};
+}
+
+void insertBefore(std::vector<Parameter>& parameters, const char* name, const std::vector<Parameter>& more) {
+  parameters.insert(std::ranges::find(parameters, name, &Parameter::name), more.begin(), more.end());
+}
+
+bool isAnyGiven(const Arguments& arguments, std::initializer_list<BuildSetting::Ending> endings) {
+  return std::ranges::any_of(endParameters(endings), [&](const std::string& name) { return arguments.given(name); });
+}
+
+InsideTest insideTestOf(const std::string& name) {
+  if (name == "pseudonormal") return InsideTest::pseudonormal;
+  if (name == "winding") return InsideTest::winding;
+  return name == "unsigned-shell" ? InsideTest::shell : InsideTest::automatic;
+}
+
+}  // namespace
+
+Parameter settingParameter(const char* name) { return parameterFrom(buildSetting(name)); }
+
+Parameter threadsParameter(const std::string& result) {
+  Parameter parameter = settingParameter("threads");
+  parameter.help = fmt::format("Threads to use; 0 for all. {} the same whatever their number.", result);
+  return parameter;
+}
+
+Parameter pointsParameter(std::string help, std::string count, double minimum) {
+  return {.name = "points",
+          .type = ParameterType::wholeNumber,
+          .help = std::move(help),
+          .defaultText = std::move(count),
+          .minimum = minimum,
+          .maximum = 1e8};  // about 100 bytes each
+}
+
+Parameter seedParameter() {
+  return {.name = "seed",
+          .type = ParameterType::wholeNumber,
+          .help = "Which points.",
+          .defaultText = "1",
+          .minimum = 0,
+          .maximum = 1e9};
+}
+
+std::vector<Parameter> buildParameters() {
+  std::vector<Parameter> parameters;
+  for (const BuildSetting& setting : buildSettings())
+    if (setting.isOffered) parameters.push_back(parameterFrom(setting));
+  insertBefore(parameters, "strategy", domainParameters());
+  insertBefore(parameters, "band", insideParameters());
+  parameters.push_back(paperParameter());
+  return parameters;
+}
+
+std::vector<Parameter> checkpointParameters() {
+  return {
+      {.name = "checkpoint",
+       .type = ParameterType::flag,
+       .help =
+           "Keep the state of the construction from time to time, as OUTPUT.checkpoint. Where that is there already, "
+           "because the program was killed, go on from it: the field is the same, to the byte, as in one go. "
+           "A state of another mesh, of other options but threads and memory-limit, or a damaged one is refused; "
+           "once the field is written it is removed.",
+       .defaultText = "false"},
+      {.name = "checkpoint-seconds",
+       .type = ParameterType::number,
+       .help = "Least time between two checkpoints. It is longer where writing takes long: at most 2 % of the time go "
+               "into it.",
+       .defaultText = "5",
+       .unit = "seconds",
+       .minimum = 0,
+       .maximum = 1e9},
+  };
+}
+
+std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings) {
+  std::vector<std::string> names;
+  for (const BuildSetting& setting : buildSettings())
+    if (std::ranges::find(endings, setting.ending) != endings.end()) names.emplace_back(setting.name);
+  return names;
+}
+
+BuildOptions buildOptions(const Arguments& arguments) {
+  using Ending = BuildSetting::Ending;
+  BuildOptions options = arguments.flag("paper") ? paperOptions() : BuildOptions{};
+  const bool endsOtherwise = isAnyGiven(arguments, {Ending::byDistance, Ending::otherQuantity});
+  if (endsOtherwise) options.targetError = 0;
+  for (const BuildSetting& setting : buildSettings()) {
+    if (!setting.isOffered || !arguments.given(setting.name)) continue;
+    if (!setting.exclusive.empty() && arguments.given(setting.exclusive))
+      throw Error(fmt::format("{} and {} exclude each other: give one of them", setting.exclusive, setting.name));
+    if (setting.hasOwner != nullptr)
+      requireOwner(arguments, setting.name.data(), setting.owner.data(), setting.hasOwner(options));
+    setting.set(options, valueOf(arguments, setting));
+  }
+  const bool isSizeGiven =
+      endsOtherwise || isAnyGiven(arguments, {Ending::target, Ending::steps}) || arguments.given("grid");
+  if (!options.memoryLimit && !isSizeGiven && arguments.has("target-error")) options.memoryLimit = kDefaultMemory;
+  return options;
+}
+
+DistanceOptions distanceOptions(const Arguments& arguments) {
+  DistanceOptions options{.insideTest = insideTestOf(arguments.text("sign")),
+                          .threads = int(arguments.whole("threads"))};
+  if (arguments.flag("hull")) {
+    if (options.insideTest != InsideTest::automatic && options.insideTest != InsideTest::winding)
+      throw Error(fmt::format("hull: goes by winding number: leave out sign {}", arguments.text("sign")));
+    options.insideTest = InsideTest::outerHull;
+  }
+  if (options.insideTest == InsideTest::shell && !arguments.given("thickness"))
+    throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
+  requireOwner(arguments, "thickness", "sign unsigned-shell", options.insideTest == InsideTest::shell);
+  if (options.insideTest == InsideTest::shell) options.thickness = arguments.number("thickness");
+  return options;
+}
+
+bool wantsNormalized(const Arguments& arguments) {
+  return arguments.flag(arguments.given("normalize") ? "normalize" : "paper");
+}
+
+Box domainFrom(const Arguments& arguments, const Box& surface) {
+  const std::string shape = arguments.text("domain");
+  const double margin = arguments.number("margin");
+  if (shape == "box") return domainAround(surface, DomainShape::box, margin);
+  if (shape != "cube") {
+    const auto c = arguments.numbers("domain");
+    const Box domain(Vector3(c[0], c[1], c[2]), Vector3(c[3], c[4], c[5]));
+    if (!(domain.sizes().minCoeff() > 0))
+      throw Error(fmt::format("domain {}: expected lower corner x0,y0,z0 below upper corner x1,y1,z1", shape));
+    return domain;
+  }
+  // This is exactly the paper's cube: it does not follow the rounding of the mesh's normalization.
+  if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
+  return domainAround(surface, DomainShape::cube, margin);
+}
+
+void requireConsistent(const Arguments& arguments) {
+  const Box any(Vector3::Constant(-1), Vector3::Constant(1));
+  distanceOptions(arguments);
+  checkBuild(domainFrom(arguments, any), buildOptions(arguments));
+}
+
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven) {
+  if (arguments.given(name) && !ownerIsGiven)
+    throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));
+}
+
+bool decides(const Parameter& parameter) {
+  const auto found = std::ranges::find(buildSettings(), std::string_view(parameter.name), &BuildSetting::name);
+  return found == buildSettings().end() || found->decides;
+}
+
+std::string decidingArguments(const Arguments& arguments) {
+  std::string text;
+  for (const Parameter& parameter : buildParameters()) {
+    if (!decides(parameter) || !arguments.has(parameter.name)) continue;
+    const std::vector<double> numbers = arguments.numbers(parameter.name);
+    text += fmt::format("{}={}\n", parameter.name,
+                        numbers.empty() ? arguments.text(parameter.name) : fmt::format("{}", fmt::join(numbers, ",")));
+  }
+  return text;
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,59 @@
+#pragma once
+// The options of a construction: as parameters of commands, and from the arguments of a call.
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "hpsdf/build_options.h"
+#include "hpsdf/detail/build_settings.h"
+#include "hpsdf/exact_distance.h"
+#include "language/registry.h"
+
+namespace hpsdf::app {
+
+/// The parameters of a construction, shared by `build`, `report` and others. Those that are settings of `BuildOptions`
+/// come from the table `buildSettings`.
+std::vector<Parameter> buildParameters();
+
+/// The parameters that tell whether and how often the state of a construction is kept.
+std::vector<Parameter> checkpointParameters();
+
+/// Names of the parameters that end a construction in one of these manners.
+std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
+
+/// The parameter of the table's setting `name`.
+Parameter settingParameter(const char* name);
+
+/// The number of threads. `result`, such as "The field is", begins the sentence that it does not depend on them.
+Parameter threadsParameter(const std::string& result);
+
+/// The number of random points, and the seed that selects them.
+Parameter pointsParameter(std::string help, std::string count, double minimum);
+Parameter seedParameter();
+
+/// The settings that arguments of `buildParameters` ask for. Options that are given win over --paper.
+BuildOptions buildOptions(const Arguments& arguments);
+
+/// The inside test that they ask for.
+DistanceOptions distanceOptions(const Arguments& arguments);
+
+/// Whether they ask for the mesh to be scaled and centred.
+bool wantsNormalized(const Arguments& arguments);
+
+/// The domain that they ask for around a surface's box.
+Box domainFrom(const Arguments& arguments, const Box& surface);
+
+/// Throws `Error` for arguments of `buildParameters` with which no surface could be built.
+void requireConsistent(const Arguments& arguments);
+
+/// Throws `Error` where the option `name` is given without `owner`, without which it has no effect.
+void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven);
+
+/// Tells whether the field depends on a parameter of `buildParameters`.
+bool decides(const Parameter& parameter);
+
+/// All arguments on which the field depends, one a line.
+std::string decidingArguments(const Arguments& arguments);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,103 @@
+#include "construction/build_field.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "console/console.h"
+#include "console/long_work.h"
+#include "console/progress_line.h"
+#include "construction/build_arguments.h"
+#include "construction/surface.h"
+#include "text/text.h"
+
+namespace hpsdf::app {
+namespace {
+
+void warnOfCutSurface(const Console& console, const Box& surface, const Box& domain) {
+  if (!surface.isEmpty() && !domain.contains(surface))
+    warn(console, fmt::format("the domain leaves out {}",
+                              domain.intersects(surface) ? "part of the surface" : "the whole surface"));
+}
+
+void warnOfErrorLeft(const Console& console, const FieldMetadata& built) {
+  if (built.measuredError > built.settings.maxError)
+    warn(console,
+         fmt::format("errors of {} are left, above the maximum error {}: allow a higher degree, a greater depth, "
+                     "more steps or bytes",
+                     shortNumber(built.measuredError), shortNumber(built.settings.maxError)));
+}
+
+void refuseInsideTestOfAnalytic(const std::string& surface, const Arguments& arguments) {
+  if (!surface.starts_with(kAnalytic)) return;
+  for (const char* name : {"sign", "thickness", "hull"})
+    if (arguments.given(name)) throw Error(std::string(name) + ": an analytic shape has a sign of its own");
+}
+
+Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
+  Checkpoint checkpoint{.file = file, .seconds = arguments.number("checkpoint-seconds")};
+  checkpoint.about = decidingArguments(arguments);
+  checkpoint.resumed = [&console, file](std::uint64_t steps) {
+    note(console, fmt::format("going on from {}, after {} steps", file.string(), grouped(steps)));
+  };
+  checkpoint.failed = [&console, warned = false](const Error& error) mutable {
+    if (std::exchange(warned, true)) return;
+    if (console.redrawsProgress) console.err << kEraseLine;
+    warn(console, fmt::format("{}; the construction goes on without", error.what()));
+  };
+  return checkpoint;
+}
+
+}  // namespace
+
+std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
+
+BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
+  try {
+    // Find mistakes of the arguments before long work.
+    BuildOptions options = buildOptions(arguments);
+    const DistanceOptions insideOptions = distanceOptions(arguments);
+    refuseInsideTestOfAnalytic(surface, arguments);
+
+    // Load the surface and warn about it.
+    const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
+    const Box box = prepared.box(), domain = domainFrom(arguments, box);
+    checkBuild(domain, options);
+    warnOfCutSurface(console, box, domain);
+
+    // Make its exact distance. A limit of memory that nobody gave holds for the octree alone.
+    const auto start = std::chrono::steady_clock::now();
+    auto exact = distanceTo(console, surface, prepared, insideOptions);
+    if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();
+    return {std::move(exact), prepared.report, domain, options, secondsSince(start)};
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& checkpoint) {
+  BuildInput input = buildInput(console, surface, arguments);
+  try {
+    const auto start = std::chrono::steady_clock::now();
+    Field field = withProgress(console, [&](const Progress& progress) {
+      if (checkpoint.empty()) return build(*input.exact, input.domain, input.options, progress);
+      return buildResumably(*input.exact, input.domain, input.options, checkpointAt(console, checkpoint, arguments),
+                            progress);
+    });
+    warnOfErrorLeft(console, field.metadata());
+    if (input.options.bounds) warnOfBounds(console, input.mesh);
+    return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
+  } catch (const Error& error) {
+    if (!checkpoint.empty() && std::string_view(error.what()).starts_with(checkpoint.string())) throw;
+    rethrowNaming(surface, error);
+  }
+}
+
+void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {
+  if (mesh && !mesh->closed())
+    warn(console, "bounds hold for closed surfaces alone: beside this mesh's holes they do not");
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,122 @@
+#include "construction/reference_surface.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "console/console.h"
+#include "console/long_work.h"
+#include "construction/build_arguments.h"
+#include "construction/surface.h"
+#include "hpsdf/detail/crossings.h"
+#include "hpsdf/shapes.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// The inside test with which a field was made from `source`.
+DistanceOptions distanceOptions(const Source& source) {
+  return {.insideTest = source.insideTest, .thickness = source.thickness};
+}
+
+/// ∇Φ of a shape in closed form, by central differences across two millionths of its size.
+Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
+  const double step = 1e-6 * distance.source().box.sizes().maxCoeff();
+  std::array<Vector3, 6> points;
+  for (int axis = 0; axis < 3; ++axis) {
+    points[2 * axis] = x + step * Vector3::Unit(axis);
+    points[2 * axis + 1] = x - step * Vector3::Unit(axis);
+  }
+  std::array<double, 6> values;
+  distance(points, values);
+  return Vector3(values[0] - values[1], values[2] - values[3], values[4] - values[5]) / (2 * step);
+}
+
+/// ∇Φ of a mesh; zero where it is unknown.
+Vector3 exactNormal(const ExactDistance& exact, const Vector3& x, double signedDistance) {
+  const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // nearer, rounding decides the direction
+  const Vector3 offset = x - exact.closestPoint(x).point;
+  const double distance = offset.norm(), thickness = exact.source().thickness;
+  // A surface that closes a hole is nearer than the faces, and its normal is unknown.
+  const bool isBesideHole = std::abs(std::abs(signedDistance + thickness / 2) - distance) > least;
+  if (distance < least || isBesideHole) return Vector3::Zero();
+  return offset / (thickness == 0 && signedDistance < 0 ? -distance : distance);
+}
+
+bool isMadeFrom(const Source& candidate, const Source& source) {
+  return candidate.fingerprint == source.fingerprint && (source.fingerprint != 0 || candidate.name == source.name);
+}
+
+void warnOfForeign(const Console& console, const std::string& surface, const Source& source) {
+  warn(console, fmt::format("{} is not what the field was made from ({})", surface,
+                            source.name.empty() ? "unknown" : source.name));
+}
+
+ReferenceSurface analyticReference(const DistanceFunction& analytic, const std::string& surface) {
+  ReferenceSurface reference;
+  reference.distance = std::make_shared<const DistanceFunction>(analytic);
+  reference.mesh = shapes::mesh(surface.substr(kAnalytic.size()));
+  const Normalization to = analytic.source().normalization;
+  for (Vector3& vertex : reference.mesh.vertices) vertex = to.scale * (vertex - to.center);
+  reference.normal = [distance = reference.distance](const Vector3& x, double) {
+    return differenceQuotient(*distance, x);
+  };
+  return reference;
+}
+
+ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepared, const Source& source) {
+  ReferenceSurface reference;
+  reference.report = prepared.report;
+  const auto exact = distanceTo(console, prepared.mesh, distanceOptions(source));
+  reference.distance = withNormalization(exact, prepared.normalization);
+  reference.mesh = source.insideTest == InsideTest::outerHull ? exact->surface() : std::move(prepared.mesh);
+  reference.normal = [exact](const Vector3& x, double signedDistance) {
+    return exactNormal(*exact, x, signedDistance);
+  };
+  return reference;
+}
+
+}  // namespace
+
+ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
+  try {
+    PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
+    ReferenceSurface reference = prepared.analytic ? analyticReference(*prepared.analytic, surface)
+                                                   : meshReference(console, std::move(prepared), source);
+    reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
+    return reference;
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
+                                                      const Source& source) {
+  try {
+    const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
+    auto exact = distanceTo(console, surface, prepared, distanceOptions(source));
+    if (!isMadeFrom(exact->source(), source)) warnOfForeign(console, surface, source);
+    return exact;
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
+  try {
+    const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
+    if (prepared.analytic) throw Error(surface + ": an analytic shape has no mesh, and so no defects");
+    requireDistanceMemory(prepared.mesh);
+    if (!isMadeFrom({.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source))
+      warnOfForeign(console, surface, source);
+    return findDefects(prepared.mesh, withProgress(console, [&](const Progress& progress) {
+                         return findCrossings(prepared.mesh, kMaxCrossings, progress);
+                       }));
+  } catch (const Error& error) {
+    rethrowNaming(surface, error);
+  }
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,37 @@
+#pragma once
+// Surfaces with which a finished field is compared.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "console/console.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_report.h"
+
+namespace hpsdf::app {
+
+/// A surface to measure a field against, in the units of the field. Its mesh is, for an analytic shape, that of the
+/// built-in one, from which it hardly differs.
+struct ReferenceSurface {
+  std::shared_ptr<const DistanceFunction> distance;
+  std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< see `VerifiedSurface`
+  TriangleMesh mesh;
+  std::optional<MeshReport> report;  ///< nothing for an analytic shape
+  bool fieldIsMadeFromIt = false;
+};
+
+/// A mesh file or a shape in the units of a field that was made from `source`. Throws `Error` naming `surface`.
+ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
+
+/// The exact distance of a mesh file or a shape in the units of a field that was made from `source`. Warns when the
+/// surface is another one. Throws `Error` naming `surface`.
+std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
+                                                      const Source& source);
+
+/// The defects of a mesh file or a built-in shape in the units of a field that was made from `source`. Warns when the
+/// surface is another one. Throws `Error` naming `surface`.
+MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
+
+}  // namespace hpsdf::app

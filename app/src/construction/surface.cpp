@@ -1,0 +1,143 @@
+#include "construction/surface.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "console/console.h"
+#include "console/long_work.h"
+#include "construction/mesh_process.h"
+#include "construction/mesh_summary.h"
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/shapes.h"
+#include "text/printable.h"
+#include "text/text.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// Bytes a face while a mesh's exact distance is made; for its outer hull, besides the intersected pieces, of which
+/// there are 250,000 at most.
+constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
+
+DistanceFunction normalizedFunction(const DistanceFunction& distance) {
+  const Normalization to = normalizationOf(distance.source().box);
+  Source source = distance.source();
+  source.box = Box(to.scale * (source.box.min() - to.center), to.scale * (source.box.max() - to.center));
+  source.normalization = to;
+  auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
+    std::vector<Vector3> original(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.center;
+    distance(original, out);
+    for (double& value : out) value *= to.scale;
+  };
+  return DistanceFunction(std::move(evaluate), source);  // moved, since it would keep a reference to an lvalue
+}
+
+void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
+  constexpr double kNegligible = 1e-6;  // of the mesh's size: neither scans nor fields are more exact
+  const Box box = boundingBox(mesh);
+  const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
+  if (!(spacing > kNegligible * size)) return;
+  warn(console, fmt::format("{}: coordinates reach {}, where the reader keeps them {} apart ({} of the mesh's longest "
+                            "side): move the mesh nearer to the origin before it is exported",
+                            surface, shortNumber(std::max(-box.min().minCoeff(), box.max().maxCoeff())),
+                            shortNumber(spacing), shortNumber(spacing / size)));
+}
+
+ImportedMesh readFile(const Console& console, const std::string& file) {
+  if (console.meshReader.empty()) return importMesh(file);
+  return withProgress(console, [&](const Progress& progress) {
+    return importInSubprocess(console.meshReader, file, readingLimits(file), progress);
+  });
+}
+
+struct SharedDistance {
+  std::shared_ptr<const ExactDistance> exact;
+
+  void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
+  std::size_t bytes() const { return exact->bytes(); }
+};
+
+/// Tells the inside test that was chosen unless the mesh is closed and simple, for which everybody expects it. The
+/// choice is in the units of the normalized mesh, the report in those of the file.
+void tellInsideTest(const Console& console, const std::string& surface, const MeshReport& report,
+                    InsideTestChoice choice, const Normalization& normalization) {
+  if (choice.position) choice.position = *choice.position / normalization.scale + normalization.center;
+  if (!choice.reason.empty() && choice.insideTest != InsideTest::pseudonormal)
+    note(console, fmt::format("{}: sign by winding number: {}", surface, reasonText(choice, report.box)));
+  if (choice.reason.empty() && choice.insideTest == InsideTest::pseudonormal && !report.closed())
+    warn(console, unsureSigns(surface, report));
+}
+
+}  // namespace
+
+bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
+
+ImportedMesh importSurface(const Console& console, const std::string& surface) {
+  if (surface.starts_with(kAnalytic))
+    throw Error(
+        fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
+  if (surface.starts_with(kBuiltin)) {
+    TriangleMesh mesh = shapes::mesh(surface);
+    const MeshReport report = inspect(mesh);
+    return {std::move(mesh), report};
+  }
+  ImportedMesh imported = readFile(console, surface);
+  warnOfSpacing(console, surface, imported.mesh);
+  return imported;
+}
+
+PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes) {
+  PreparedSurface prepared;
+  if (surface.starts_with(kAnalytic)) {
+    prepared.analytic = shapes::analytic(surface);
+    if (normalizes) prepared.analytic = normalizedFunction(*prepared.analytic);
+    return prepared;
+  }
+  ImportedMesh imported = importSurface(console, surface);
+  prepared.report = imported.report;
+  if (normalizes) prepared.normalization = normalizationOf(boundingBox(imported.mesh));
+  prepared.mesh = normalizes ? normalized(imported.mesh) : std::move(imported.mesh);
+  return prepared;
+}
+
+void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest) {
+  const double bytesPerFace = insideTest == InsideTest::outerHull ? kBytesPerHullFace : kBytesPerFace;
+  requireMemory("the exact distance of " + grouped(mesh.triangles.size()) + " faces",
+                bytesPerFace * double(mesh.triangles.size()), "simplify the mesh first");
+}
+
+std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
+                                                const DistanceOptions& options) {
+  requireDistanceMemory(mesh, options.insideTest);
+  return withProgress(console, [&](const Progress& progress) {
+    return std::make_shared<const ExactDistance>(mesh, options, progress);
+  });
+}
+
+std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
+                                                          const Normalization& normalization) {
+  Source source = exact->source();
+  source.normalization = normalization;
+  return std::make_shared<const DistanceFunction>(SharedDistance{exact}, std::move(source));
+}
+
+std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
+                                                   const PreparedSurface& prepared, const DistanceOptions& options) {
+  if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
+  const auto exact = distanceTo(console, prepared.mesh, options);
+  tellInsideTest(console, surface, *prepared.report, exact->insideTestChoice(), prepared.normalization);
+  return withNormalization(exact, prepared.normalization);
+}
+
+void rethrowNaming(const std::string& surface, const Error& error) {
+  const std::string message = error.what();
+  if (printable(message).find(printable(surface)) != std::string::npos) throw error;  // its name may be escaped there
+  throw Error(surface + ": " + message);
+}
+
+}  // namespace hpsdf::app

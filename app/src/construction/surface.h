@@ -1,0 +1,59 @@
+#pragma once
+// From the name of a mesh file or a shape to a surface of which a field can be made.
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "console/console.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/mesh_report.h"
+
+namespace hpsdf::app {
+
+/// Begins the names of shapes: as meshes, and in closed form.
+constexpr std::string_view kBuiltin = "builtin:";
+constexpr std::string_view kAnalytic = "analytic:";
+
+/// Tells a shape's name, builtin:… or analytic:…, from a file's.
+bool isShape(std::string_view surface);
+
+/// Reads a mesh file or makes a built-in shape; all commands come to meshes by this function. Files are read by the
+/// console's `meshReader`. Warns where the reader's floats lose digits of the coordinates. Throws `Error`, also for an
+/// analytic shape, and `Cancelled` after Ctrl-C.
+ImportedMesh importSurface(const Console& console, const std::string& surface);
+
+/// A surface in the units of the field: a mesh, or a distance in closed form.
+struct PreparedSurface {
+  std::optional<DistanceFunction> analytic;  ///< of an analytic shape; else there is a mesh
+  TriangleMesh mesh;
+  std::optional<MeshReport> report;  ///< on the mesh before normalization
+  Normalization normalization;
+
+  Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
+};
+
+/// Loads a surface and, if asked, normalizes it. Throws `Error`, and `Cancelled` after Ctrl-C.
+PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes);
+
+/// Throws `Error` where the exact distance of such a mesh does not fit in memory.
+void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);
+
+/// The exact distance of a mesh. Throws `Error`, also where it does not fit in memory, and `Cancelled` after Ctrl-C.
+std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
+                                                const DistanceOptions& options = {});
+
+/// The exact distance as the distance of a mesh that was normalized.
+std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
+                                                          const Normalization& normalization);
+
+/// The distance of a prepared surface. Tells how inside is told from outside where that is not evident.
+std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
+                                                   const PreparedSurface& prepared, const DistanceOptions& options);
+
+/// Throws the error again, with the name of the surface before its message unless that holds it.
+[[noreturn]] void rethrowNaming(const std::string& surface, const Error& error);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,395 @@
+#include "explorer/explorer_picture_commands.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "language/append_parameters.h"
+#include "pictures/picture_arguments.h"
+#include "pictures/picture_names.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// The point that `target` names; nothing for the word center.
+std::optional<Vector3> targetOf(const Arguments& arguments) {
+  if (arguments.text("target") == "center") return std::nullopt;
+  return pointOf(arguments, "target");
+}
+
+/// The text of a parameter; empty for the word none.
+std::string textOrNone(const Arguments& arguments, const char* name) {
+  return arguments.text(name) == "none" ? "" : arguments.text(name);
+}
+
+void changeShow(ViewState& view, const Arguments& arguments, Session&) {
+  if (arguments.given("kind")) view.slice = arguments.text("kind") == "slice";
+  if (arguments.given("size")) {
+    view.width = arguments.size("size")[0];
+    view.height = arguments.size("size")[1];
+  }
+  if (arguments.given("samples")) view.samples = arguments.whole("samples");
+  if (arguments.given("cpu") || arguments.given("gl")) view.backend = backend(arguments);
+}
+
+void changeCamera(ViewState& view, const Arguments& arguments, Session&) {
+  render::OrbitCamera& camera = view.camera;
+  if (arguments.given("orbit")) {
+    const auto n = arguments.numbers("orbit");
+    camera.azimuthDegrees = n[0];
+    camera.elevationDegrees = n[1];
+    camera.distance = n[2];
+  }
+  if (arguments.given("view") && arguments.text("view") != "any") turnTo(camera, arguments.text("view"));
+  if (arguments.given("target")) camera.target = targetOf(arguments);
+  if (arguments.given("up")) camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  if (arguments.given("projection"))
+    camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
+                                                                       : render::Projection::perspective;
+}
+
+void checkCamera(const Arguments& arguments) {
+  if (!arguments.given("orbit")) return;
+  if (arguments.given("view")) throw Error("view: excludes azimuth, elevation and distance; give one or the other");
+  const auto n = arguments.numbers("orbit");
+  if (!(std::abs(n[1]) <= 90)) throw Error("camera: expected an elevation from -90 to 90 degrees");
+  if (!(n[2] > 0)) throw Error("camera: expected a distance above 0, in domain diagonals");
+}
+
+void changeSurface(ViewState& view, const Arguments& arguments, Session& session) {
+  if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
+  if (arguments.given("shown")) view.surface = arguments.flag("shown");
+  if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
+  if (arguments.given("defects")) {
+    view.defects = textOrNone(arguments, "defects");
+    if (!view.defects.empty()) session.defects(view.defects);  // reports an unreadable mesh now, not at the next frame
+  }
+  if (arguments.given("clip")) {
+    const std::string axis = arguments.text("clip");
+    if (axis == "none")
+      view.clip.reset();
+    else
+      view.clip = render::ClipPlane{axis[0] - 'x', view.clip ? view.clip->offset : 0};
+  }
+  if (arguments.given("clip-offset")) {
+    if (!view.clip) throw Error("clip-offset: needs clip, the axis that it lies on");
+    view.clip->offset = arguments.number("clip-offset");
+  }
+}
+
+void changePlane(ViewState& view, const Arguments& arguments, Session&) {
+  if (arguments.given("through")) {
+    const auto n = arguments.numbers("through");
+    view.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
+  }
+  if (arguments.given("axis")) {
+    view.axis = arguments.text("axis")[0] - 'x';
+    view.plane.reset();
+  }
+  if (arguments.given("offset")) {
+    const bool automatic = arguments.text("offset") == "auto";
+    view.planeOffset = automatic ? std::nullopt : std::optional(arguments.numbers("offset")[0]);
+    view.plane.reset();
+  }
+  if (arguments.given("in-space")) view.planeInSpace = arguments.flag("in-space");
+  if (arguments.given("zoom")) view.zoom = arguments.number("zoom");
+  if (arguments.given("target")) view.sliceTarget = targetOf(arguments);
+}
+
+void checkPlane(const Arguments& arguments) {
+  if (arguments.given("through") && (arguments.given("axis") || arguments.given("offset")))
+    throw Error("through: excludes axis and offset; give one or the other");
+}
+
+void changeColor(ViewState& view, const Arguments& arguments, Session&) {
+  const bool slice = arguments.given("of") ? arguments.text("of") == "slice" : view.slice;
+  Coloring& colors = slice ? view.sliceColors : view.surfaceColors;
+  const render::ColorBy by = colorNamed(arguments.text("by"));
+  if (by == (slice ? render::ColorBy::normal : render::ColorBy::distance))
+    throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
+  if (by != colors.by) colors.scale.limits.reset();  // the limits belong to another quantity
+  colors.by = by;
+  if (arguments.given("other")) colors.other = textOrNone(arguments, "other");
+  if (arguments.given("mesh")) colors.mesh = textOrNone(arguments, "mesh");
+  if (by == render::ColorBy::difference && colors.other.empty())
+    throw Error("color difference: needs other, the file of the field to compare with");
+  if (arguments.given("range")) {
+    colors.scale.limits.reset();
+    if (arguments.text("range") != "auto") {
+      const auto n = arguments.numbers("range");
+      colors.scale.limits = {n[0], n[1]};
+    }
+  }
+  if (arguments.given("scale")) colors.scale.logarithmic = arguments.text("scale") == "log";
+  if (colors.scale.limits && !((*colors.scale.limits)[0] < (*colors.scale.limits)[1]))
+    throw Error("range: expected LOW,HIGH with LOW below HIGH");
+  if (colors.scale.limits && render::isQuantity(by) && colors.scale.logarithmic && !((*colors.scale.limits)[0] > 0))
+    throw Error("range: a logarithmic scale needs limits above 0; give others, or scale=linear");
+}
+
+void changeCells(ViewState& view, const Arguments& arguments, Session&) {
+  if (arguments.given("style")) view.cells.style = cellStyle(arguments.text("style"));
+  const auto levels = [&](const char* name, int most) {
+    return arguments.text(name) == "all" ? std::vector<int>() : levelList(arguments.text(name), name, most);
+  };
+  if (arguments.given("degrees")) view.cells.degrees = levels("degrees", kMaxDegree);
+  if (arguments.given("depths")) view.cells.depths = levels("depths", kMaxDepth);
+}
+
+void changeArrows(ViewState& view, const Arguments& arguments, Session&) { view.arrows = arguments.whole("apart"); }
+
+void changeBeside(ViewState& view, const Arguments& arguments, Session& session) {
+  view.beside = textOrNone(arguments, "field");
+  if (!view.beside.empty()) session.other(view.beside);  // reports an unreadable file now, not at the next frame
+}
+
+Command showCommand() {
+  Command command{.name = "show",
+                  .summary = "Choose what the explorer shows: the surface in space, or the flat picture of a plane.",
+                  .help =
+                      "The explorer is a picture of the current field with panels around it: 'shot' writes it, "
+                      "'hpsdf view' opens it in a window. camera and surface lead the one, plane the other.",
+                  .examples = {"show slice size=1280x720", "show surface samples=2 gl=software"},
+                  .parameters = {{.name = "kind",
+                                  .type = ParameterType::choice,
+                                  .help = "The surface, or a slice.",
+                                  .choices = {"surface", "slice"},
+                                  .positional = true},
+                                 {.name = "size",
+                                  .type = ParameterType::size,
+                                  .help = "Of the whole frame, panels included; 1280x720 at first.",
+                                  .unit = "pixels",
+                                  .minimum = 64,
+                                  .maximum = 8192,
+                                  .whole = true,
+                                  .counts = {2}},
+                                 {.name = "samples",
+                                  .type = ParameterType::wholeNumber,
+                                  .help = "Samples a pixel along each axis; 1 at first.",
+                                  .minimum = 1,
+                                  .maximum = 8}},
+                  .action = changing(changeShow)};
+  append(command.parameters, backendParameters());
+  return command;
+}
+
+Parameter targetParameter(const std::string& help) {
+  return {.name = "target",
+          .type = ParameterType::numbers,
+          .help = help,
+          .valueName = "X,Y,Z",
+          .unit = "world units",
+          .choices = {"center"},
+          .counts = {3}};
+}
+
+Command cameraCommand() {
+  std::vector<std::string> directions = viewNames();
+  directions.insert(directions.begin(), "any");
+  return {.name = "camera",
+          .summary = "Move the explorer's camera.",
+          .help =
+              "It looks at the surface in space. What is not given stays as it is; 'copy-view' tells how it stands. "
+              "With the mouse: drag to turn, drag with the right button to move the target, wheel to go nearer.",
+          .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
+          .parameters =
+              {{.name = "orbit",
+                .type = ParameterType::numbers,
+                .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
+                        "diagonals of the domain; 30,20,1.1 at first.",
+                .valueName = "AZIMUTH,ELEVATION,DISTANCE",
+                .counts = {3},
+                .positional = true},
+               {.name = "view",
+                .type = ParameterType::choice,
+                .help = "A named direction instead; any leaves it.",
+                .choices = directions},
+               targetParameter("The point in the picture's middle; center is the domain's."),
+               {.name = "up", .type = ParameterType::choice, .help = "The axis that points up.", .choices = {"y", "z"}},
+               {.name = "projection",
+                .type = ParameterType::choice,
+                .help = "How rays run: from the eye, or parallel.",
+                .choices = {"perspective", "orthographic"}}},
+          .action = changing(changeCamera),
+          .check = checkCamera};
+}
+
+Command surfaceCommand() {
+  return {.name = "surface",
+          .summary = "Choose which surface the explorer shows, and where it is cut open.",
+          .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
+          .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
+          .parameters = {{.name = "shown",
+                          .type = ParameterType::flag,
+                          .help = "Whether it is drawn: without it, planes and cells can be looked at alone."},
+                         {.name = "offset",
+                          .type = ParameterType::number,
+                          .help = "The distance whose surface is drawn; 0 at first.",
+                          .unit = "world units"},
+                         {.name = "cracks",
+                          .type = ParameterType::flag,
+                          .help = "Mark where the surface is torn at a face between two cells."},
+                         {.name = "defects",
+                          .type = ParameterType::text,
+                          .help = "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that "
+                                  "the field was made from.",
+                          .valueName = "MESH|own|none"},
+                         {.name = "clip",
+                          .type = ParameterType::choice,
+                          .help = "Cut across this axis; the half towards the camera is left out.",
+                          .choices = {"none", "x", "y", "z"}},
+                         {.name = "clip-offset",
+                          .type = ParameterType::number,
+                          .help = "Where the cut crosses that axis.",
+                          .unit = "world units"}},
+          .action = changing(changeSurface)};
+}
+
+Command planeCommand() {
+  return {.name = "plane",
+          .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
+          .help =
+              "As 'slice' has it, of the picture that 'show slice' chooses. What is not given stays as it is. With the "
+              "mouse: drag to move, wheel to zoom.",
+          .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
+          .parameters = {{.name = "axis",
+                          .type = ParameterType::choice,
+                          .help = "The plane is perpendicular to this axis; z at first.",
+                          .choices = {"x", "y", "z"}},
+                         {.name = "offset",
+                          .type = ParameterType::numbers,
+                          .help = "Where the plane crosses that axis; auto is 0, or the domain's middle where 0 lies "
+                                  "outside.",
+                          .valueName = "NUMBER",
+                          .unit = "world units",
+                          .choices = {"auto"},
+                          .counts = {1}},
+                         {.name = "through",
+                          .type = ParameterType::numbers,
+                          .help = "A point of the plane and its normal instead.",
+                          .valueName = "PX,PY,PZ,NX,NY,NZ",
+                          .unit = "world units",
+                          .counts = {6}},
+                         {.name = "in-space",
+                          .type = ParameterType::flag,
+                          .help = "Whether the plane stands in the surface's picture too."},
+                         {.name = "zoom",
+                          .type = ParameterType::number,
+                          .help = "How many times larger than with the whole section in the picture.",
+                          .minimum = 0,
+                          .minimumExcluded = true},
+                         targetParameter("The point in the picture's middle, moved into the plane; center is the "
+                                         "section's middle.")},
+          .action = changing(changePlane),
+          .check = checkPlane};
+}
+
+Command colorCommand() {
+  return {.name = "color",
+          .summary = "Choose what the explorer's colours mean.",
+          .help =
+              "As in 'slice' and 'render'; the surface and the slice have colours of their own. Another quantity than "
+              "before gets an automatic range.",
+          .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
+          .parameters = {{.name = "by",
+                          .type = ParameterType::choice,
+                          .help = "As in 'slice' and 'render'. normal is for surfaces, distance for slices.",
+                          .choices = colorNames(),
+                          .positional = true,
+                          .need = Need::always},
+                         {.name = "of",
+                          .type = ParameterType::choice,
+                          .help = "Of which picture; of the one that is shown when left out.",
+                          .choices = {"surface", "slice"}},
+                         {.name = "range",
+                          .type = ParameterType::numbers,
+                          .help = "What the ends of the scale of a jump, slope or error stand for; auto chooses.",
+                          .valueName = "LOW,HIGH",
+                          .choices = {"auto"},
+                          .counts = {2}},
+                         {.name = "scale",
+                          .type = ParameterType::choice,
+                          .help = "How such colours run between them; log at first.",
+                          .choices = {"log", "linear"}},
+                         {.name = "other",
+                          .type = ParameterType::path,
+                          .help = "For difference: the field to compare with, or none.",
+                          .valueName = "FIELD"},
+                         {.name = "mesh",
+                          .type = ParameterType::text,
+                          .help = "For error: what the field was made from, where it does not know that; or none.",
+                          .valueName = "MESH"}},
+          .action = changing(changeColor)};
+}
+
+Command cellsCommand() {
+  return {.name = "cells",
+          .summary = "Choose which of the octree's cells stand in the explorer's surface picture.",
+          .help = "As 'render' has it. What is not given stays as it is.",
+          .examples = {"cells lines depths=0-3", "cells boxes degrees=4,5 ; surface shown=false"},
+          .parameters = {{.name = "style",
+                          .type = ParameterType::choice,
+                          .help = "Lines along their edges, or boxes of 0.8 of their extent.",
+                          .choices = {"none", "lines", "boxes"},
+                          .positional = true},
+                         {.name = "degrees",
+                          .type = ParameterType::text,
+                          .help = "Only cells of these degrees: numbers and ranges, as in 2,4-6; or all.",
+                          .valueName = "LIST"},
+                         {.name = "depths",
+                          .type = ParameterType::text,
+                          .help = "Only cells of these depths; or all.",
+                          .valueName = "LIST"}},
+          .action = changing(changeCells)};
+}
+
+Command arrowsCommand() {
+  return {.name = "arrows",
+          .summary = "Draw arrows along the gradient in the explorer's picture.",
+          .help =
+              "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection "
+              "takes from it.",
+          .examples = {"arrows 40", "arrows 0"},
+          .parameters = {{.name = "apart",
+                          .type = ParameterType::wholeNumber,
+                          .help = "How far apart; 0 for none.",
+                          .unit = "pixels",
+                          .minimum = 0,
+                          .maximum = 1000,
+                          .positional = true,
+                          .need = Need::always}},
+          .action = changing(changeArrows)};
+}
+
+Command besideCommand() {
+  return {.name = "beside",
+          .summary = "Show another field beside the current one, in the same way.",
+          .help =
+              "Left is the current field, right the other one; camera, plane, colours and their scale are the "
+              "same for both. 'color difference' shows how far they are apart.",
+          .examples = {"beside coarse.hpsdf", "beside none"},
+          .parameters = {{.name = "field",
+                          .type = ParameterType::text,
+                          .help = "The other field's file; none for the current one alone.",
+                          .valueName = "FIELD",
+                          .positional = true,
+                          .need = Need::always}},
+          .action = changing(changeBeside)};
+}
+
+}  // namespace
+
+std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&)) {
+  return [change](Session& session, const Arguments& arguments) {
+    ViewState view = explorerOf(session).view();
+    change(view, arguments, session);
+    explorerOf(session).change(std::move(view));
+  };
+}
+
+std::vector<Command> explorerPictureCommands() {
+  return {showCommand(),  cameraCommand(), surfaceCommand(), planeCommand(),
+          colorCommand(), cellsCommand(),  arrowsCommand(),  besideCommand()};
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,161 @@
+#include "explorer/figure_panels.h"
+
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/field.h"
+#include "text/text.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr std::size_t kWorstRows = 8;
+
+void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const float width = widthLeft() / float(std::max<std::size_t>(levels.size(), 1)), height = 20;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const float x0 = std::round(from.x + width * float(i)), x1 = std::round(from.x + width * float(i + 1));
+    list.AddRectFilled({x0, from.y}, {x1, from.y + height}, packed(levels[i].color));
+    const std::string label = std::to_string(levels[i].level);
+    const bool dark = 2 * levels[i].color[0] + 5 * levels[i].color[1] + levels[i].color[2] < 4 * 255;
+    if (widthOf(label) + 2 <= x1 - x0)
+      textAt((x0 + x1 - widthOf(label)) / 2, from.y + 3, label, dark ? IM_COL32_WHITE : IM_COL32(20, 20, 30, 255));
+  }
+  ImGui::Dummy({widthLeft(), height});
+}
+
+void drawColorBar(const render::Legend& legend) {
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const float inset = 12, width = widthLeft() - 2 * inset, height = 16;
+  for (int x = 0; x < int(width); ++x) {
+    const auto& color = legend.bar[std::size_t(x) * (legend.bar.size() - 1) / std::size_t(width)];
+    list.AddRectFilled({from.x + inset + float(x), from.y}, {from.x + inset + float(x) + 1, from.y + height},
+                       packed(color));
+  }
+  float free = from.x;
+  for (const auto& mark : legend.marks) {
+    const float x = std::round(from.x + inset + float(mark.t) * (width - 1));
+    list.AddRectFilled({x, from.y + height}, {x + 1, from.y + height + 4}, kTick);
+    const float half = widthOf(mark.text) / 2, right = from.x + widthLeft();
+    const float left = std::clamp(x - half, from.x, right - 2 * half);
+    if (left < free) continue;
+    textAt(left, from.y + height + 4, mark.text, kInk);
+    free = left + 2 * half + 6;
+  }
+  ImGui::Dummy({widthLeft(), height + 20});
+}
+
+void drawDefectSwatches(const std::vector<render::Legend::Defects>& defects) {
+  constexpr float kRow = 18, kSide = 10;
+  for (const auto& [name, count, color] : defects) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const ImVec2 from = ImGui::GetCursorScreenPos();
+    list.AddRectFilled(from, {from.x + kSide, from.y + kSide}, kTick);
+    list.AddRectFilled({from.x + 1, from.y + 1}, {from.x + kSide - 1, from.y + kSide - 1}, packed(color));
+    textAt(from.x + kSide + 8, from.y - 2, name + ": " + count, kInk);
+    ImGui::Dummy({widthLeft(), kRow});
+  }
+}
+
+/// Draws one column of a histogram with its percentage above and its level below. `bottom` is the lower end of the
+/// column and `bar` its height, in pixels.
+void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 color, int level, double percent) {
+  ImGui::GetWindowDrawList()->AddRectFilled({std::round(x) + 2, bottom - bar}, {std::round(x + width) - 2, bottom},
+                                            color);
+  const auto centered = [&](const std::string& text, float y, ImU32 ink) {
+    if (widthOf(text) <= width) textAt(x + (width - widthOf(text)) / 2, y, text, ink);
+  };
+  const std::string share = percent < 0.1 ? "<.1" : fmt::format("{:.{}f}", percent, percent < 9.95 ? 1 : 0);
+  centered(share, bottom - bar - ImGui::GetTextLineHeight(), kSoftInk);
+  centered(std::to_string(level), bottom + 2, kInk);
+}
+
+/// Draws shares of the volume as columns, in the colours of `legend` where that is given.
+void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend) {
+  ui.text(title);
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const float height = 36, line = ImGui::GetTextLineHeight();
+  const float width = std::min(44.0F, widthLeft() / float(std::max<std::size_t>(shares.size(), 1)));
+  double greatest = 0;
+  for (const auto& [level, share] : shares) greatest = std::max(greatest, share);
+  float x = from.x;
+  for (const auto& [level, share] : shares) {
+    ImU32 color = IM_COL32(115, 148, 199, 255);
+    if (legend != nullptr)
+      for (const auto& known : legend->levels)
+        if (known.level == level) color = packed(known.color);
+    const float bar = std::max(1.0F, std::round(height * float(share / greatest)));
+    drawHistogramColumn(x, width, from.y + line + height, bar, color, level, 100 * share);
+    x += width;
+  }
+  ImGui::Dummy({widthLeft(), height + 2 * line + 2});
+}
+
+}  // namespace
+
+void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
+  if (!picture) return;
+  const render::Legend& legend = picture->legend;
+  drawDefectSwatches(legend.defects);
+  if (legend.title.empty()) {
+    if (legend.defects.empty()) ui.text("light only: choose a color", true);
+    return;
+  }
+  ui.text(legend.title);
+  if (!legend.levels.empty()) drawLevelSwatches(legend.levels);
+  if (!legend.bar.empty()) drawColorBar(legend);
+}
+
+void drawHistograms(Ui& ui, Explorer& explorer) {
+  const FieldStatistics& figures = explorer.figures();
+  const auto& picture = explorer.picture();
+  const auto legendOf = [&](render::ColorBy color) {
+    return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
+  };
+  drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
+  drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+}
+
+void drawStatistics(Ui& ui, Explorer& explorer) {
+  const FieldStatistics& figures = explorer.figures();
+  const Field& field = explorer.session().current().field;
+  std::vector<std::pair<std::string, std::string>> rows = {
+      {"cells", grouped(figures.leaves)},
+      {"coefficients", grouped(figures.coefficients)},
+      {"memory", bytesText(double(figures.bytes))},
+      {"target error", shortNumber(field.metadata().settings.targetError.weighted())},
+      {"RMS estimate", shortNumber(field.metadata().rmsEstimate(field.domain()))},
+  };
+  if (explorer.session().knowsJumps()) {
+    const Jumps& jumps = explorer.session().jumps();
+    rows.emplace_back("jump of f, RMS", shortNumber(jumps.value.rms));
+    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps.gradient.rms));
+  }
+  ui.facts(rows);
+}
+
+void drawWorst(const Controls& controls, Explorer& explorer) {
+  if (!explorer.session().knowsJumps()) return;  // the jumps are still being measured
+  const ViewState& view = explorer.view();
+  const Jumps& jumps = explorer.session().jumps();
+  controls.choice("worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
+                  "worst by=");
+  const std::size_t first = std::size_t(view.worstPage) * kWorstRows;
+  const auto& worst = explorer.worst(first + kWorstRows);
+  const std::size_t last = std::min(worst.size(), first + kWorstRows);
+  for (std::size_t rank = first; rank < last; ++rank) {
+    const Interface& face = jumps.interfaces[worst[rank]];
+    const Vector3& x = face.worst;
+    const std::array cells = {fmt::format("{}. {}", rank + 1, shortNumber(jumpOf(face, view.worstBy).max)),
+                              fmt::format("({:.2f}, {:.2f}, {:.2f})", x.x(), x.y(), x.z())};
+    if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, 90))
+      controls.commands.push_back(fmt::format("fly {}", rank + 1));
+  }
+  const auto page = [](int number) { return fmt::format("worst page={}", number); };
+  controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0);
+  ImGui::SameLine();
+  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < jumps.interfaces.size());
+}
+
+}  // namespace hpsdf::app

@@ -1,0 +1,89 @@
+#include "field/build/refiner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "field/build/limits.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::detail {
+
+bool prefersDegree(const Fit& current, const Trial& trial) {
+  double worstChild = 0;
+  for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error.weighted);
+  const int p = current.degree;
+  const double error = current.error.weighted;
+  const double mu = (error - 8 * trial.raised->error.weighted) / (coefficientCount(p + 1) - coefficientCount(p));
+  const double nu = (error - 8 * worstChild) / (7 * coefficientCount(p));
+  return mu > nu;
+}
+
+ErrorTotals sumOfErrors(const BuildTree& tree) {
+  ErrorTotals sum;
+  for (const BuildNode& node : tree.nodes)
+    if (node.firstChild == 0) sum.add(node.fit.error);
+  return sum;
+}
+
+std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
+  const BuildOptions& options = setup_.options;
+  const bool mayRaise = options.strategy == Strategy::hp && leaf.fit.degree < options.maxDegree;
+  const bool maySplit = int(leaf.depth) < options.maxDepth;
+  if (mayRaise && maySplit) return Refinement::either;
+  if (mayRaise) return Refinement::degree;
+  if (maySplit) return Refinement::octree;
+  return std::nullopt;
+}
+
+bool Refiner::mayStep() const {
+  return !state_.isFull && (!setup_.options.maxSteps || state_.steps < *setup_.options.maxSteps);
+}
+
+void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
+  constexpr std::size_t kStepsBetweenSums = 1000;  // between exact sums of the total error (paper, sec. 3.6)
+  BuildTree& tree = state_.tree;
+  if (tree.nodes.size() > 0xffffffffu - 8)
+    throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
+
+  // Refuse a refinement that would exceed the limit of bytes.
+  const ByteBudget& budget = setup_.budget;
+  const std::size_t before = budget.finalCoefficients(tree.nodes[leaf].fit.degree);
+  const std::size_t added = raises ? budget.finalCoefficients(trial.raised->degree) - before : 7 * before;
+  if (bytes() + budget.bytes(0, double(added)) + (raises ? 0 : 8 * budget.nodeBytes()) > budget.growthLimit()) {
+    state_.isFull = true;
+    return;
+  }
+
+  // Exchange the leaf's error for that of its successors.
+  state_.coefficients += added;
+  state_.totals.add(tree.nodes[leaf].fit.error, -1);
+  if (raises) {
+    tree.nodes[leaf].fit = std::move(*trial.raised);
+    state_.totals.add(tree.nodes[leaf].fit.error);
+  } else {
+    const bool keepsOwnFit = setup_.options.criterion == Criterion::optimal;
+    tree.split(leaf, std::move(*trial.children), keepsOwnFit ? std::move(*trial.raised) : Fit{});
+    const std::uint32_t first = tree.nodes[leaf].firstChild;
+    for (std::uint32_t child = first; child < first + 8; ++child) state_.totals.add(tree.nodes[child].fit.error);
+  }
+  if (++state_.steps % kStepsBetweenSums == 0) sumTotals();
+  if (observer_.afterStep) observer_.afterStep(state_.steps);
+}
+
+void Refiner::sumTotals() {
+  state_.totals = sumOfErrors(state_.tree);
+  state_.lastSum = state_.totals.weighted;
+}
+
+void Refiner::requireMemory(double factor) const {
+  // Where refinements may be pruned, cached projections and internal nodes hold about three times the leaves' own
+  // coefficients on top.
+  const bool keepsAll = setup_.options.criterion == Criterion::optimal;
+  detail::requireMemory({.nodes = state_.tree.nodes.size(),
+                         .coefficients = keepsAll ? 4 * state_.coefficients : state_.coefficients,
+                         .growthFactor = factor,
+                         .fixedBytes = setup_.distance.bytes()},
+                        setup_.options);
+}
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,107 @@
+#include "field/cells/build_tree.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "field/query/float_coefficients.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::detail {
+
+Box BuildTree::boxOf(const BuildNode& node) const {
+  const double scale = std::ldexp(1.0, -int(node.depth));
+  Vector3 lo, hi;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double origin = domain.min()[axis];
+    const double size = domain.max()[axis] - origin;
+    lo[axis] = origin + node.cellIndex[axis] * scale / grid[axis] * size;
+    hi[axis] = origin + (node.cellIndex[axis] + 1.0) * scale / grid[axis] * size;
+  }
+  return Box(lo, hi);
+}
+
+void BuildTree::addBaseCells() {
+  nodes.resize(baseCells());
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    nodes[n].cellIndex = {static_cast<std::uint32_t>(n % grid[0]), static_cast<std::uint32_t>(n / grid[0] % grid[1]),
+                          static_cast<std::uint32_t>(n / grid[0] / grid[1])};
+  }
+}
+
+void BuildTree::setChildIndices(std::uint32_t parent) {
+  const BuildNode& above = nodes[parent];
+  for (std::uint32_t child = 0; child < 8; ++child) {
+    BuildNode& node = nodes[above.firstChild + child];
+    node.depth = above.depth + 1;
+    for (int axis = 0; axis < 3; ++axis) node.cellIndex[axis] = 2 * above.cellIndex[axis] + ((child >> axis) & 1);
+  }
+}
+
+void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own) {
+  const auto first = static_cast<std::uint32_t>(nodes.size());
+  nodes[leaf].firstChild = first;
+  nodes[leaf].fit = std::move(own);
+  for (Fit& child : children) nodes.emplace_back().fit = std::move(child);
+  setChildIndices(leaf);
+}
+
+static std::size_t countCoefficients(const BuildTree& tree) {
+  std::size_t count = 0;
+  for (const BuildNode& node : tree.nodes)
+    if (node.firstChild == 0) count += node.fit.coefficients.size();
+  if (count > 0xffffffffu)
+    throw Error("the field needs " + std::to_string(count) + " coefficients, more than 2^32; raise the target error");
+  return count;
+}
+
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
+  FieldData data;
+  data.domain = tree.domain;
+  data.grid = tree.grid;
+  data.nodes.resize(tree.nodes.size());
+  std::vector<double> coefficients;
+  coefficients.reserve(countCoefficients(tree));
+
+  const std::size_t baseCells = tree.baseCells();
+  auto nextGroup = static_cast<std::uint32_t>(baseCells);
+  struct Pair {
+    std::uint32_t from, to;
+  };
+  std::vector<Pair> stack;
+  for (std::uint32_t base = 0; base < baseCells; ++base) {
+    stack.push_back({base, base});
+    while (!stack.empty()) {
+      const Pair pair = stack.back();
+      stack.pop_back();
+      BuildNode& node = tree.nodes[pair.from];
+      if (node.firstChild == 0) {
+        data.nodes[pair.to] = node::leaf(node.fit.degree, static_cast<std::uint32_t>(coefficients.size()));
+        coefficients.insert(coefficients.end(), node.fit.coefficients.begin(), node.fit.coefficients.end());
+        node.fit = Fit{};
+        continue;
+      }
+      data.nodes[pair.to] = node::internal(nextGroup);
+      for (std::uint32_t child = 8; child-- > 0;) stack.push_back({node.firstChild + child, nextGroup + child});
+      nextGroup += 8;
+    }
+  }
+
+  data.coefficients = std::move(coefficients);
+  data.metadata = std::move(metadata);
+  return data;
+}
+
+void roundCoefficients(CoefficientType type, FieldData& field) {
+  constexpr double kNegligible = 0.01;
+  const query::Rounding rounding = query::floatRounding(field);
+  FieldMetadata& metadata = field.metadata;
+  const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
+  const bool isNegligible = rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
+  if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
+  query::toFloat(field);
+  metadata.roundingRms = rounding.rms;
+  if (spoilsMaximum) metadata.measuredError += rounding.max;
+}
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,400 @@
+#include "field/cells/cell_bounds.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "basis/projection.h"
+#include "field/cells/cell_fit.h"
+#include "field/query/evaluate.h"
+#include "field/query/leaves.h"
+#include "hpsdf/detail/threads.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::detail {
+namespace {
+
+// A bound of accumulated rounding errors, relative to the size of the numbers involved.
+constexpr double kRounding = 1e-12;
+
+/// A leaf's polynomial over one of its eighths, in local coordinates of that part.
+struct Part {
+  Vector3 center, half;              ///< in the field's units
+  double value = 0;                  ///< constant coefficient: the linear polynomial's value at the centre
+  Vector3 gradient;                  ///< of the linear polynomial
+  std::array<double, 3> squares{};   ///< coefficients of L_2 along each axis
+  std::array<double, 3> products{};  ///< coefficients of the products yz, xz, xy
+  double rest = 0;                   ///< bound of the terms of degree 3 and more
+  Vector3 restGradient;              ///< bound of the derivatives of the terms of degree 2 and more
+};
+
+/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
+using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
+
+Rows legendreOfPart(double shift, double scale, int degree) {
+  Rows row;
+  row[0][0] = 1;
+  for (int i = 0; i < degree; ++i) {
+    std::array<double, kMaxDegree + 1> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
+    std::fill_n(product.begin(), i + 2, 0.0);
+    for (int a = 0; a <= i; ++a) {
+      product[a] += shift * row[i][a];
+      product[a + 1] += scale * row[i][a] * (a + 1) / (2 * a + 1);
+      if (a > 0) product[a - 1] += scale * row[i][a] * a / (2 * a + 1);
+    }
+    for (int a = 0; a <= i + 1; ++a)
+      row[i + 1][a] = ((2 * i + 1) * product[a] - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
+  }
+  return row;
+}
+
+/// Transforms a polynomial's coefficients to a part's coordinates, one axis after another. They are a cube of
+/// (degree + 1)³ numbers, which are 0 above the total degree.
+std::vector<double> partCoefficients(std::vector<double> c, int degree, const std::array<const Rows*, 3>& rows) {
+  const int n = degree + 1;
+  const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
+  for (int axis = 0; axis < 3; ++axis)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; j + k < n; ++k) {
+        double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
+        for (int a = 0; a + j + k < n; ++a) {  // upwards, since the sums need the former coefficients above a
+          double sum = 0;
+          for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * (*rows[axis])[i][a];
+          line[a * stride[axis]] = sum;
+        }
+      }
+  return c;
+}
+
+/// Transformations to the lower and the upper half of an axis.
+struct Halves {
+  Rows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
+};
+
+/// Adds a product of Legendre polynomials, for which |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
+void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
+  const int total = order[0] + order[1] + order[2];
+  if (total == 0) part.value = coefficient;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double slope = order[axis] * (order[axis] + 1) / 2.0 * coefficient / part.half[axis];
+    if (total == 1)
+      part.gradient[axis] += slope;
+    else
+      part.restGradient[axis] += std::abs(slope);
+  }
+  if (total > 2) part.rest += std::abs(coefficient);
+  if (total != 2) return;
+  const auto two = std::ranges::find(order, 2);
+  if (two != order.end())
+    part.squares[two - order.begin()] = coefficient;
+  else
+    part.products[std::ranges::find(order, 0) - order.begin()] = coefficient;
+}
+
+/// The polynomial over one eighth of a leaf (number x + 2y + 4z).
+Part partOf(const std::vector<double>& cube, int degree, const Box& box, int number, const Halves& halves) {
+  std::array<const Rows*, 3> rows;
+  Part part;
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool upper = number >> axis & 1;
+    rows[axis] = upper ? &halves.above : &halves.below;
+    const double half = box.sizes()[axis] / 2;
+    part.center[axis] = box.center()[axis] + (upper ? 0.5 : -0.5) * half;
+    part.half[axis] = 0.5 * half;
+  }
+  const std::vector<double> c = partCoefficients(cube, degree, rows);
+  part.gradient.setZero();
+  part.restGradient.setZero();
+  const int n = degree + 1;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; i + j < n; ++j)
+      for (int k = 0; i + j + k < n; ++k) addTerm(part, {i, j, k}, c[(std::size_t(i) * n + j) * n + k]);
+  return part;
+}
+
+/// Number of points at which Φ is evaluated to bound it over a part: the centre, and one point on either side of it
+/// along the polynomial's gradient, at the distance of an edge of the leaf. Seen from the part, the surface-free ball
+/// around a distant point on that line is nearly a half-space.
+constexpr std::size_t kPointsPerPart = 3;
+constexpr double kSideDistance = 1;  // in edges; with 2, 0.7, 1.4 bunny's median bound is 2.1, 1.03, 1.2 times as great
+
+std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain, double edge) {
+  std::array<Vector3, kPointsPerPart> partPoints;
+  partPoints.fill(part.center.cwiseMax(domain.min()).cwiseMin(domain.max()));
+  const double steepness = part.gradient.norm();
+  if (!(steepness > 0)) return partPoints;
+  const Vector3 step = kSideDistance * edge / steepness * part.gradient;
+  for (const int side : {1, 2}) {
+    const Vector3 point = side == 1 ? Vector3(part.center + step) : Vector3(part.center - step);
+    if (domain.contains(point)) partPoints[side] = point;
+  }
+  return partPoints;
+}
+
+/// Upper bounds of f + |x − y| and of |x − y| − f over a part.
+struct ConeBounds {
+  double over, under;
+};
+
+/// Functions that are linear in each coordinate, or convex along each axis, are greatest at corners. Where the
+/// quadratic terms are more concave than |x − y| is convex, the maximum may exceed that of the corners by the height of
+/// a parabola.
+ConeBounds coneBounds(const Part& part, const Vector3& y) {
+  // Find the greatest values at the corners.
+  double over = -std::numeric_limits<double>::infinity(), under = over, farthest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    std::array<double, 3> t;
+    for (int axis = 0; axis < 3; ++axis) t[axis] = (corner >> axis & 1) ? 1 : -1;
+    const Vector3 d = Vector3(t[0], t[1], t[2]).cwiseProduct(part.half);
+    double value = part.value + part.gradient.dot(d);
+    for (int axis = 0; axis < 3; ++axis)
+      value += part.squares[axis] + part.products[axis] * t[(axis + 1) % 3] * t[(axis + 2) % 3];
+    const double distance = (part.center + d - y).norm();
+    farthest = std::max(farthest, distance);
+    over = std::max(over, value + distance);
+    under = std::max(under, distance - value);
+  }
+
+  // Add the heights of parabolas along the axes.
+  const Vector3 offset = part.center - y;
+  const double nearest = (offset.cwiseAbs() - part.half).cwiseMax(0.0).norm();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double square = part.half[axis] * part.half[axis];
+    const double along = nearest > 0 ? std::min(1.0, (std::abs(offset[axis]) + part.half[axis]) / nearest) : 1;
+    const double bend = (1 - along * along) / farthest * square;  // least curvature of the distance
+    const double curvature = 3 * part.squares[axis];
+    over += std::max(0.0, -curvature - bend) / 2;
+    under += std::max(0.0, curvature - bend) / 2;
+  }
+  return {over, under};
+}
+
+/// An upper bound of |f − Φ| over the part: for every point y, Φ(x) lies between Φ(y) − |x − y| and Φ(y) + |x − y|.
+double errorBound(const Part& part, std::span<const Vector3> partPoints, std::span<const double> distances) {
+  double above = std::numeric_limits<double>::infinity(), below = above;  // bounds of f − Φ and of Φ − f
+  for (std::size_t p = 0; p < partPoints.size(); ++p) {
+    const ConeBounds bounds = coneBounds(part, partPoints[p]);
+    above = std::min(above, bounds.over - distances[p]);
+    below = std::min(below, bounds.under + distances[p]);
+  }
+  return std::max(above, below) + part.rest;
+}
+
+float roundedUp(double number) {
+  const auto nearest = static_cast<float>(number);
+  return double(nearest) >= number ? nearest : std::nextafter(nearest, std::numeric_limits<float>::infinity());
+}
+
+/// A leaf's coefficients as a cube of (degree + 1)³ numbers, for a degree that is at least its own.
+std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
+  const std::uint64_t bits = field.nodes[leaf];
+  const int n = degree + 1;
+  std::vector<double> cube(std::size_t(n) * n * n, 0.0);
+  std::visit(
+      [&](const auto& c) {
+        basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
+          cube[(std::size_t(i) * n + j) * n + k] = c[node::offset(bits) + index];
+        });
+      },
+      field.coefficients);
+  return cube;
+}
+
+/// Bounds single leaves by their own polynomials, without blending.
+class BoundFinder {
+ public:
+  BoundFinder(const FieldData& field, const DistanceFunction& distance)
+      : field_(field), frame_(query::gridFrame(field)), distance_(distance) {}
+
+  CellBound operator()(const query::OctreeNode& leaf) const {
+    const int degree = node::degree(field_.nodes[leaf.node]);
+    const Box box = query::cellBox(frame_, leaf.depth, leaf.cellIndex);
+    const std::vector<double> cube = cubeOf(field_, leaf.node, degree);
+    std::array<Part, 8> parts;
+    std::array<std::array<Vector3, kPointsPerPart>, 8> partPoints;
+    std::array<Vector3, 8 * kPointsPerPart> points;  // sorted by kind, since exact distances are fastest for neighbours
+    for (int number = 0; number < 8; ++number) {
+      parts[number] = partOf(cube, degree, box, number, halves_);
+      partPoints[number] = pointsOf(parts[number], field_.domain, box.sizes().maxCoeff());
+      for (std::size_t p = 0; p < kPointsPerPart; ++p) points[8 * p + number] = partPoints[number][p];
+    }
+    std::array<double, points.size()> distances;
+    distance_(points, distances);
+    CellBound bound;
+    double error = 0, slope = 0;
+    for (int number = 0; number < 8; ++number) {
+      std::array<double, kPointsPerPart> partDistances;
+      for (std::size_t p = 0; p < kPointsPerPart; ++p) partDistances[p] = distances[8 * p + number];
+      for (const double value : partDistances)
+        if (!std::isfinite(value)) throw Error("bounds: the signed distance is not finite within the domain");
+      const Part& part = parts[number];
+      error = std::max(error, errorBound(part, partPoints[number], partDistances));
+      slope = std::max(slope, (part.gradient.cwiseAbs() + part.restGradient).norm());
+    }
+    const double size = field_.domain.diagonal().norm();
+    bound.error = roundedUp(error + kRounding * size);
+    bound.slope = roundedUp(slope * (1 + kRounding));
+    return bound;
+  }
+
+  static constexpr std::uint64_t kCalls = 8 * kPointsPerPart;
+
+ private:
+  const FieldData& field_;
+  GridFrame frame_;
+  const DistanceFunction& distance_;
+  Halves halves_;
+};
+
+/// Upper bounds of the difference of two polynomials.
+struct Disagreement {
+  double value = 0, slope = 0;
+
+  void widen(const Disagreement& other) {
+    value = std::max(value, other.value);
+    slope = std::max(slope, other.slope);
+  }
+};
+
+/// Bounds the difference of the polynomials of two touching leaves where both have a weight: on either side of their
+/// interface, at most as far as the smaller leaf's edge times the blend width.
+Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small, const query::OctreeNode& large) {
+  const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
+  const int levels = small.depth - large.depth;
+  std::array<Rows, 3> smallRows, largeRows;
+  Vector3 half;
+  for (int axis = 0; axis < 3; ++axis) {  // lengths are in edges of the small cell
+    const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
+    const std::int64_t width = std::int64_t{1} << levels, wall = std::int64_t{field.grid[axis]} << small.depth;
+    // Positions are relative to the small cell's lower side, so that they stay exact far from the domain's corner.
+    const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
+    const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
+    const double from = std::max(low - field.blend, static_cast<double>(-smallAt));
+    const double to = std::min(high + field.blend, static_cast<double>(wall - smallAt));
+    half[axis] = (to - from) / 2;
+    const auto rows = [&](double start, double edge) {
+      return legendreOfPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
+    };
+    smallRows[axis] = rows(0, 1);
+    largeRows[axis] = rows(static_cast<double>(largeAt - smallAt), static_cast<double>(width));
+  }
+  const std::vector<double> one =
+      partCoefficients(cubeOf(field, small.node, degree), degree, {&smallRows[0], &smallRows[1], &smallRows[2]});
+  const std::vector<double> other =
+      partCoefficients(cubeOf(field, large.node, degree), degree, {&largeRows[0], &largeRows[1], &largeRows[2]});
+  const Vector3 toWorld = half.cwiseProduct(query::cellSize(field, small.depth)).cwiseInverse();
+  const int n = degree + 1;
+  Disagreement disagreement;
+  Vector3 slope = Vector3::Zero();
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; i + j < n; ++j)
+      for (int k = 0; i + j + k < n; ++k) {
+        const std::size_t at = (std::size_t(i) * n + j) * n + k;
+        const double difference = std::abs(one[at] - other[at]);
+        disagreement.value += difference;
+        slope += difference * Vector3(i * (i + 1) / 2.0, j * (j + 1) / 2.0, k * (k + 1) / 2.0).cwiseProduct(toWorld);
+      }
+  disagreement.slope = slope.norm();
+  return disagreement;
+}
+
+/// Calls f(neighbour) for each leaf that touches `leaf` and is larger, or of its size and later in the octree. So each
+/// pair of touching leaves is visited once, although a larger leaf may lie in several directions.
+template <typename F>
+void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F& f) {
+  std::array<std::uint32_t, 26> seen;
+  std::size_t count = 0;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const auto neighbour = query::equalOrLargerNeighbour(field, leaf, {x, y, z});
+        if (!neighbour || (neighbour->depth == leaf.depth && neighbour->node <= leaf.node)) continue;
+        if (std::ranges::find(seen.begin(), seen.begin() + count, neighbour->node) != seen.begin() + count) continue;
+        seen[count++] = neighbour->node;
+        f(*neighbour);
+      }
+}
+
+/// By node: depth of the deepest leaf among a leaf's neighbours and their neighbours.
+std::vector<int> deepestAround(const FieldData& field, const std::vector<query::OctreeNode>& leaves) {
+  std::vector<int> deepest(field.nodes.size(), 0);
+  for (const query::OctreeNode& leaf : leaves) deepest[leaf.node] = leaf.depth;
+  for (int ring = 0; ring < 2; ++ring) {
+    const std::vector<int> inner = deepest;
+    for (const query::OctreeNode& leaf : leaves)
+      forEachPair(field, leaf, [&](const query::OctreeNode& neighbour) {
+        deepest[leaf.node] = std::max(deepest[leaf.node], inner[neighbour.node]);
+        deepest[neighbour.node] = std::max(deepest[neighbour.node], inner[leaf.node]);
+      });
+  }
+  return deepest;
+}
+
+constexpr std::size_t kChunk = 4096;
+
+void report(const Progress& progress, double fraction) { progress.update("finding bounds", fraction); }
+
+/// Widens the bounds of blended leaves. In a blended leaf f = f₀ + Σ vₙ (fₙ − f₀), where f₀ is its own polynomial, fₙ
+/// are those of touching leaves, and the weights vₙ sum to at most 1. The error grows by the greatest |fₙ − f₀| in the
+/// blend zones; the slope by the greatest difference of gradients, and by |fₙ − f₀| times the slope of the weights.
+void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& leaves, const Progress& progress) {
+  std::vector<Disagreement> disagreement(field.nodes.size());
+  for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
+    report(progress, 0.5 + 0.5 * double(begin) / double(leaves.size()));
+    struct Pair {
+      std::uint32_t node;
+      Disagreement disagreement;
+    };
+    std::vector<std::vector<Pair>> found(std::min(kChunk, leaves.size() - begin));
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
+      const query::OctreeNode& leaf = leaves[begin + n];
+      forEachPair(field, leaf, [&](const query::OctreeNode& neighbour) {
+        found[n].push_back({neighbour.node, disagreementInZone(field, leaf, neighbour)});
+      });
+    });
+    for (std::size_t n = 0; n < found.size(); ++n)
+      for (const Pair& pair : found[n]) {
+        disagreement[leaves[begin + n].node].widen(pair.disagreement);
+        disagreement[pair.node].widen(pair.disagreement);
+      }
+  }
+  // The blend extent of a neighbour follows from the smallest of its own neighbours.
+  const std::vector<int> deepest = deepestAround(field, leaves);
+  // Bound the slope of the weights: Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over at most eight leaves, one of which has a weight
+  // of at least 1/8. A weight is a product of three ramps with slopes of at most 3/4 over the blend extent.
+  constexpr double kSlopes = 2 * 8 * 8 * 1.7320508075688773 * 0.75;
+  const double rounding = kRounding * field.domain.diagonal().norm();
+  for (const query::OctreeNode& leaf : leaves) {
+    CellBound& bound = field.bounds[leaf.node];
+    const Disagreement& others = disagreement[leaf.node];
+    const double extent = field.blend * query::cellSize(field, deepest[leaf.node]).minCoeff();
+    bound.error = roundedUp(double(bound.error) + others.value + rounding);
+    bound.slope = roundedUp(double(bound.slope) + others.slope + kSlopes * (others.value + rounding) / extent);
+  }
+}
+
+}  // namespace
+
+std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, const Progress& progress) {
+  field.bounds.clear();
+  std::vector<CellBound> bounds(field.nodes.size());
+  const std::vector<query::OctreeNode> leaves = query::allLeaves(field);
+  const BoundFinder find(field, distance);
+  const double share = field.blend > 0 ? 0.5 : 1;  // of the progress
+  for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
+    report(progress, share * double(begin) / double(leaves.size()));
+    tbb::parallel_for(begin, std::min(begin + kChunk, leaves.size()),
+                      [&](std::size_t n) { bounds[leaves[n].node] = find(leaves[n]); });
+  }
+  field.bounds = std::move(bounds);
+  if (field.blend > 0) widenForBlending(field, leaves, progress);
+  return BoundFinder::kCalls * leaves.size();
+}
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,232 @@
+#include "field/cells/cell_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+#include <string>
+
+#include "field/nearness.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::detail {
+namespace {
+
+/// Points of one call of Φ: enough to amortise the call, few enough to notice a cancellation soon.
+constexpr std::size_t kBatch = 512;
+
+/// The projection of cells of degree p. Its points suffice for degree p+1 as well.
+std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options) {
+  const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
+  if (options.cubature == CubatureKind::compact)
+    if (const auto cubature = basis::compactCubature(order)) return basis::matrixProjection(*cubature, degree + 1);
+  return basis::productProjection(basis::gaussLegendre(order / 2 + 1), degree + 1);
+}
+
+/// Points that the exact distance searches as one packet: it is fastest when they lie close to each other.
+constexpr std::size_t kGroup = 8;
+
+/// Orders point indices into compact groups by halving them recursively across their widest extent.
+void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& points) {
+  if (order.size() <= kGroup) return;
+  Box box;
+  for (const std::uint32_t point : order) box.extend(points[point]);
+  int widest = 0;
+  box.sizes().maxCoeff(&widest);
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t point) { return points[point][widest]; });
+  const std::size_t middle = std::max(kGroup, (order.size() / 2 + kGroup / 2) / kGroup * kGroup);
+  intoGroups(order.first(middle), points);
+  intoGroups(order.subspan(middle), points);
+}
+
+/// The order of points in compact groups. Empty, for the order as it is, where there are so many points that eight in
+/// succession lie close to each other anyway.
+std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
+  constexpr std::size_t kMost = 8 * 1000;
+  if (points.size() > kMost) return {};
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  intoGroups(order, points);
+  return order;
+}
+
+/// The box of child number x + 2y + 4z.
+Box childBox(const Box& cell, int child) {
+  const Vector3 centre = cell.center();
+  Vector3 lo = cell.min(), hi = centre;
+  for (int axis = 0; axis < 3; ++axis) {
+    if ((child >> axis) & 1) {
+      lo[axis] = centre[axis];
+      hi[axis] = cell.max()[axis];
+    }
+  }
+  return Box(lo, hi);
+}
+
+double volumeOf(const Box& box) { return (box.max() - box.min()).prod(); }
+
+void checkFinite(std::span<const Vector3> points, std::span<const double> values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (std::isfinite(values[i])) continue;
+    std::ostringstream where;
+    where << "the signed distance is not finite at (" << points[i].x() << ", " << points[i].y() << ", " << points[i].z()
+          << "); it must be defined in the whole domain";
+    throw Error(where.str());
+  }
+}
+
+}  // namespace
+
+CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
+                       double nearDistance, const Progress& progress)
+    : distance_(distance), options_(options), nearness_(nearness), nearDistance_(nearDistance), progress_(progress) {}
+
+const CellFitter::Rules& CellFitter::rules(int degree) const {
+  std::call_once(rulesMade_[degree], [&] {
+    auto projection = makeProjection(degree, options_);
+    std::vector<Vector3> childPoints;
+    childPoints.reserve(8 * projection->points().size());
+    for (int child = 0; child < 8; ++child) {
+      const Box box = childBox(Box(-Vector3::Ones(), Vector3::Ones()), child);
+      for (const Vector3& point : projection->points()) childPoints.push_back(box.center() + point / 2);
+    }
+    auto orderOfOne = groupedOrder(projection->points());
+    rules_[degree] =
+        std::make_unique<Rules>(Rules{std::move(projection), std::move(orderOfOne), groupedOrder(childPoints)});
+  });
+  return *rules_[degree];
+}
+
+std::vector<double> CellFitter::sample(std::span<const Box> cells, const basis::Projection& projection,
+                                       std::span<const std::uint32_t> order) const {
+  const std::vector<Vector3>& local = projection.points();
+  std::vector<double> samples(cells.size() * local.size());
+  std::array<Vector3, kBatch> points;
+  std::array<double, kBatch> values;
+  for (std::size_t first = 0; first < samples.size(); first += kBatch) {
+    progress_.throwIfCancelled();
+    const std::size_t count = std::min(kBatch, samples.size() - first);
+    const auto sampleAt = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
+    for (std::size_t i = 0; i < count; ++i) {
+      const Box& cell = cells[sampleAt(i) / local.size()];
+      points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[sampleAt(i) % local.size()]);
+    }
+    distance_(std::span(points).first(count), std::span(values).first(count));
+    checkFinite(std::span(points).first(count), std::span(values).first(count));
+    for (std::size_t i = 0; i < count; ++i) samples[sampleAt(i)] = values[i];
+  }
+  evaluations_ += samples.size();
+  return samples;
+}
+
+std::vector<double> CellFitter::distances(const Box& cell, std::span<const Vector3> local) const {
+  std::vector<Vector3> points(local.size());
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[i]);
+  std::vector<double> values(points.size());
+  distance_(points, values);
+  checkFinite(points, values);
+  evaluations_ += values.size();
+  return values;
+}
+
+bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const {
+  if (!(options_.band > 0)) return false;
+  double clearance = 0;  // lower bound of the cell's distance from the surface, since Φ is 1-Lipschitz
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Vector3 fromCentre = (cell.sizes() / 2).cwiseProduct(projection.points()[i]);
+    const double farthestCorner = (fromCentre.cwiseAbs() + cell.sizes() / 2).norm();
+    clearance = std::max(clearance, std::abs(samples[i]) - farthestCorner);
+  }
+  return clearance > options_.band;
+}
+
+double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
+  double represented = 0;
+  basis::forEachCoefficient(fit.degree, [&](int i, int j, int k, int index) {
+    represented += fit.coefficients[index] * fit.coefficients[index] * basis::squaredNorm(i, j, k);
+  });
+  const double residual = std::max(meanSquare - represented, 0.0);
+  if (options_.estimator == Estimator::residual) return residual;
+
+  // Where Φ is even or odd about the cell's centre, every other shell of coefficients is empty, and the embedded
+  // estimate may vanish. Then the residual ∫Φ² − Σc² replaces it, but only where it is far above the shell, so that
+  // everywhere else the paper's estimate decides.
+  const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
+  return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
+}
+
+/// Sets the fit's error from the squared error per volume.
+void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
+  const double mean = fit.coefficients[0];  // the constant coefficient is the mean
+  if (fit.outsideBand) return;
+  fit.error.volume = volumeOf(cell);
+  fit.error.near = std::abs(mean) - cell.sizes().norm() / 2 <= nearDistance_;
+  fit.error.squared = squared * fit.error.volume;
+  fit.error.weighted = nearness_.weight(mean) * fit.error.squared;
+}
+
+Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand) const {
+  Fit fit;
+  fit.degree = degree;
+  fit.outsideBand = outsideBand;
+  fit.coefficients = basis::truncated(projected.coefficients, projected.degree, degree);
+  rate(fit,
+       options_.trialSamples == TrialSamples::own ? basis::topDegreeError(fit.coefficients.data(), degree, 1.0)
+                                                  : squaredError(fit, projected.meanSquare),
+       cell);
+  if (keepsProjections()) fit.cached = std::move(projected);
+  return fit;
+}
+
+Fit CellFitter::fit(const Box& cell, int degree) const {
+  const basis::Projection& projection = *rules(degree).projection;
+  const std::vector<double> samples = sample({&cell, 1}, projection, rules(degree).orderOfOne);
+  return makeFit({projection(samples), degree + 1, projection.meanSquare(samples)}, degree, cell,
+                 outsideBand(cell, projection, samples));
+}
+
+Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
+  Fit raised = fit(cell, current.degree + 1);
+  if (options_.trialSamples == TrialSamples::own) {
+    raised.coefficients = basis::appendTopDegree(current.coefficients, raised.coefficients, raised.degree);
+    rate(raised, basis::topDegreeError(raised.coefficients.data(), raised.degree, 1.0), cell);
+  }
+  return raised;
+}
+
+Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowed) const {
+  Trial trial;
+  const bool wantsRaised = allowed != Refinement::octree || keepsProjections();
+  if (allowed == Refinement::degree) {
+    trial.raised = raisedByOwnSamples(cell, current);
+    return trial;
+  }
+  const int degree = current.degree;
+  const basis::Projection& projection = *rules(degree).projection;
+  std::array<Box, 8> boxes;
+  for (int child = 0; child < 8; ++child) boxes[child] = childBox(cell, child);
+  const std::vector<double> samples = sample(boxes, projection, rules(degree).orderOfEight);
+  std::array<std::vector<double>, 8> raised;  // projections of the children, one degree higher
+  trial.children.emplace();
+  bool allOutside = true;
+  double meanSquare = 0;
+  for (int child = 0; child < 8; ++child) {
+    const std::size_t count = projection.points().size();
+    const auto own = std::span(samples).subspan(child * count, count);
+    const bool outside = outsideBand(boxes[child], projection, own);
+    const double ownMeanSquare = projection.meanSquare(own);
+    raised[child] = projection(own);
+    (*trial.children)[child] = makeFit({raised[child], degree + 1, ownMeanSquare}, degree, boxes[child], outside);
+    allOutside = allOutside && outside;
+    meanSquare += ownMeanSquare / 8;
+  }
+  if (wantsRaised) {
+    trial.raised =
+        options_.trialSamples == TrialSamples::own
+            ? raisedByOwnSamples(cell, current)
+            : makeFit({basis::joined(raised, degree + 1), degree + 1, meanSquare}, degree + 1, cell, allOutside);
+  }
+  return trial;
+}
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,96 @@
+#pragma once
+// The fit of a polynomial to the exact distance in one cell, and the trials of its refinements.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "basis/projection.h"
+#include "field/nearness.h"
+#include "hpsdf/build_options.h"
+#include "hpsdf/distance_function.h"
+
+namespace hpsdf::detail {
+
+/// The projection of a cell's samples onto the highest degree for which they suffice.
+struct CachedProjection {
+  std::vector<double> coefficients;
+  int degree = 0;
+  double meanSquare = 0;  ///< ∫Φ² / V by the same samples
+};
+
+/// A cell's polynomial and its error.
+struct Fit {
+  std::vector<double> coefficients;
+  int degree = 0;
+  CellError error;
+  bool outsideBand = false;
+  CachedProjection cached;  ///< of at least the fit's degree; kept for pruning
+};
+
+/// The fits of a cell's two refinements.
+struct Trial {
+  std::optional<Fit> raised;                   ///< the same cell one degree higher
+  std::optional<std::array<Fit, 8>> children;  ///< its eight children at its own degree
+};
+
+enum class Refinement : std::uint8_t { degree, octree, either };
+
+/// Samples Φ and fits polynomials. Thread-safe: cells are fitted in parallel.
+class CellFitter {
+ public:
+  /// Keeps references. `nearness` may change between two fits. Cells may hold points near the surface where the mean
+  /// of their field is less than `nearDistance` and half their diagonal from it.
+  CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
+             double nearDistance, const Progress& progress);
+
+  Fit fit(const Box& cell, int degree) const;
+
+  /// Fits the allowed refinements of a cell whose fit is `current`.
+  Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
+
+  /// Φ at points given by local coordinates.
+  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
+
+  /// Number of evaluations of Φ so far.
+  std::uint64_t evaluations() const { return evaluations_; }
+  /// Sets the number of evaluations to that of a restored construction.
+  void setEvaluations(std::uint64_t evaluations) { evaluations_ = evaluations; }
+
+ private:
+  /// The quadrature of all cells of one degree p.
+  struct Rules {
+    std::unique_ptr<const basis::Projection>
+        projection;                           ///< onto degree p+1, whose lower coefficients are those of degree p
+    std::vector<std::uint32_t> orderOfOne;    ///< order in which a cell is sampled; empty: that of the points
+    std::vector<std::uint32_t> orderOfEight;  ///< order for eight children, child · points + point
+  };
+
+  const Rules& rules(int degree) const;
+  /// Returns the samples of cells one cell after another. Φ is evaluated in the given order.
+  std::vector<double> sample(std::span<const Box> cells, const basis::Projection& projection,
+                             std::span<const std::uint32_t> order) const;
+  bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;
+  /// Makes a fit of lower degree from the projection of the samples.
+  Fit makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand) const;
+  double squaredError(const Fit& fit, double meanSquare) const;
+  void rate(Fit& fit, double squared, const Box& cell) const;
+  bool keepsProjections() const { return options_.criterion == Criterion::optimal; }
+  Fit raisedByOwnSamples(const Box& cell, const Fit& current) const;
+
+  const DistanceFunction& distance_;
+  const BuildOptions& options_;
+  const Nearness& nearness_;
+  double nearDistance_;
+  const Progress& progress_;
+  mutable std::atomic<std::uint64_t> evaluations_ = 0;
+  mutable std::array<std::once_flag, kMaxDegree + 1> rulesMade_;
+  mutable std::array<std::unique_ptr<const Rules>, kMaxDegree + 1> rules_;
+};
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,193 @@
+#include "field/cells/prune.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "basis/projection.h"
+
+namespace hpsdf::detail {
+namespace {
+
+constexpr std::uint8_t kSplit = 0xff;  ///< stands for a degree where a node stays split
+constexpr int kHalvings = 60;          // of the logarithmic range of λ, down to its last bits
+
+/// Squared errors of a node by degree, up to the degree of its cached projection.
+std::vector<double> squaredErrors(const Fit& fit) {
+  std::vector<double> left(fit.cached.degree + 1, 0.0);
+  basis::forEachCoefficient(fit.cached.degree, [&](int i, int j, int k, int index) {
+    const double c = fit.cached.coefficients[index];
+    left[i + j + k] += c * c * basis::squaredNorm(i, j, k);
+  });
+  double rest = fit.cached.meanSquare;
+  for (double& shell : left) {
+    rest -= shell;
+    shell = std::max(rest, 0.0) * fit.error.volume;
+  }
+  return left;
+}
+
+class Pruning {
+ public:
+  Pruning(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits)
+      : tree_(tree),
+        limits_(limits),
+        squared_(tree.nodes.size()),
+        weight_(tree.nodes.size()),
+        chosen_(tree.nodes.size()) {
+    tbb::parallel_for(std::size_t{0}, tree.nodes.size(), [&](std::size_t n) {
+      const Fit& fit = tree.nodes[n].fit;
+      squared_[n] = squaredErrors(fit);
+      weight_[n] = fit.outsideBand ? 0 : nearness.weight(fit.coefficients[0]);
+    });
+  }
+
+  void run() {
+    double lambda = greatestLambda([&](const Totals& totals) { return limits_.goal.reached(totals.errors); });
+    if (limits_.mostBytes) lambda = std::max(lambda, leastLambda());
+    choose(lambda);
+    cut();
+  }
+
+ private:
+  struct Totals {
+    ErrorTotals errors;
+    double bytes = 0;
+  };
+
+  CellError errorAt(std::size_t n, int degree) const {
+    CellError error = tree_.nodes[n].fit.error;
+    error.squared = squared_[n][degree];
+    error.weighted = weight_[n] * error.squared;
+    return error;
+  }
+
+  /// Chooses the best leaf degree or split of each node for this λ, from the leaves up: children follow their parents.
+  void choose(double lambda) {
+    std::vector<double> cost(tree_.nodes.size());
+    for (std::size_t n = tree_.nodes.size(); n-- > 0;) {
+      cost[n] = chooseDegree(n, lambda);
+      const std::uint32_t first = tree_.nodes[n].firstChild;
+      if (first == 0) continue;
+      double below = lambda * limits_.nodeBytes;
+      for (std::uint32_t child = first; child < first + 8; ++child) below += cost[child];
+      if (below >= cost[n]) continue;
+      cost[n] = below;
+      chosen_[n] = kSplit;
+    }
+  }
+
+  /// Chooses the best degree of a node as a leaf, and returns its cost.
+  double chooseDegree(std::size_t n, double lambda) {
+    const Fit& fit = tree_.nodes[n].fit;
+    const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
+    // Outside of the narrow band no error counts, so that lowering would leave nothing of the fit.
+    const int low = fit.outsideBand ? fit.degree : std::min(limits_.leastDegree, top);
+    double least = HUGE_VAL;
+    for (int degree = low; degree <= top; ++degree) {
+      const double cost = weight_[n] * squared_[n][degree] + lambda * limits_.leafBytes[degree];
+      if (cost >= least) continue;
+      least = cost;
+      chosen_[n] = static_cast<std::uint8_t>(degree);
+    }
+    return least;
+  }
+
+  Totals totals() const {
+    Totals sum;
+    std::vector<std::uint32_t> stack;
+    for (std::uint32_t base = 0; base < tree_.baseCells(); ++base) {
+      stack.push_back(base);
+      while (!stack.empty()) {
+        const std::uint32_t n = stack.back();
+        stack.pop_back();
+        if (chosen_[n] == kSplit) {
+          sum.bytes += limits_.nodeBytes;
+          for (std::uint32_t child = 0; child < 8; ++child) stack.push_back(tree_.nodes[n].firstChild + child);
+        } else {
+          sum.bytes += limits_.leafBytes[chosen_[n]];
+          sum.errors.add(errorAt(n, chosen_[n]));
+        }
+      }
+    }
+    return sum;
+  }
+
+  /// The range of λ, in squared error per byte.
+  std::pair<double, double> range() const {
+    double most = 0;
+    for (std::size_t n = 0; n < squared_.size(); ++n) most = std::max(most, weight_[n] * squared_[n].front());
+    return {1e-30 * most, most};
+  }
+
+  /// The greatest λ whose tree is `good`, or the least of the range. The error grows with λ.
+  template <typename Good>
+  double greatestLambda(const Good& good) {
+    auto [low, high] = range();
+    for (int i = 0; i < kHalvings && low > 0; ++i) {
+      const double middle = std::sqrt(low * high);
+      choose(middle);
+      (good(totals()) ? low : high) = middle;
+    }
+    return low;
+  }
+
+  /// The least λ whose tree keeps the limit of bytes.
+  double leastLambda() {
+    auto [low, high] = range();
+    for (int i = 0; i < kHalvings && low > 0; ++i) {
+      const double middle = std::sqrt(low * high);
+      choose(middle);
+      (totals().bytes <= *limits_.mostBytes ? high : low) = middle;
+    }
+    return high;
+  }
+
+  /// Replaces the tree by the chosen one.
+  void cut() {
+    BuildTree kept;
+    kept.domain = tree_.domain;
+    kept.grid = tree_.grid;
+    const std::size_t base = tree_.baseCells();
+    for (std::size_t n = 0; n < base; ++n) take(kept, n);
+    for (std::size_t n = 0; n < kept.nodes.size(); ++n) {  // grows
+      const std::uint32_t from = kept.nodes[n].firstChild;
+      if (from == 0) continue;
+      kept.nodes[n].firstChild = static_cast<std::uint32_t>(kept.nodes.size());
+      for (std::uint32_t child = from; child < from + 8; ++child) take(kept, child);
+    }
+    tree_ = std::move(kept);
+  }
+
+  void take(BuildTree& kept, std::size_t n) {
+    BuildNode node = std::move(tree_.nodes[n]);
+    if (chosen_[n] == kSplit) {
+      node.fit = Fit{};
+    } else {
+      node.firstChild = 0;
+      node.fit.error = errorAt(n, chosen_[n]);
+      node.fit.degree = chosen_[n];
+      node.fit.coefficients = basis::truncated(node.fit.cached.coefficients, node.fit.cached.degree, chosen_[n]);
+      node.fit.cached = {};
+    }
+    kept.nodes.push_back(std::move(node));
+  }
+
+  BuildTree& tree_;
+  const PruneLimits& limits_;
+  std::vector<std::vector<double>> squared_;  ///< by node, by degree
+  std::vector<double> weight_;
+  std::vector<std::uint8_t> chosen_;  ///< a leaf's degree, or kSplit
+};
+
+}  // namespace
+
+void prune(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits) {
+  Pruning(tree, nearness, limits).run();
+}
+
+}  // namespace hpsdf::detail

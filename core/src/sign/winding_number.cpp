@@ -1,0 +1,198 @@
+#include "sign/winding_number.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sign/solid_angle.h"
+
+namespace hpsdf::sign {
+namespace {
+
+/// Truncation error that one cluster may have at each level. A sum consists of about a hundred clusters.
+constexpr std::array<double, WindingNumber::kLevels> kErrors = {1e-2, 5e-4, 2e-5, 5e-7};
+
+double square(double x) { return x * x; }
+
+/// Returns the error bound in the comment of `WindingNumber`, with `ratio` for t; infinite where the series need not
+/// converge.
+double truncationError(double area, double squaredDistance, double ratio) {
+  if (!(ratio < 1)) return HUGE_VAL;
+  return area / (4 * std::numbers::pi * squaredDistance) * (1 / square(1 - ratio) - 1 - ratio * (2 + 3 * ratio));
+}
+
+/// Returns the square of the least distance at which the truncation error is at most `error`, by bisection of the ratio
+/// t.
+double squaredFarDistance(double area, double radius, double error) {
+  if (radius == 0) return 0;
+  double low = 0, high = 1;
+  for (int i = 0; i < 30; ++i) {
+    const double ratio = (low + high) / 2;
+    (truncationError(area, square(radius / ratio), ratio) > error ? high : low) = ratio;
+  }
+  return low > 0 ? square(radius / low) : HUGE_VAL;
+}
+
+}  // namespace
+
+/// Makes a cluster of each node and each block of a hierarchy.
+class WindingNumber::Builder {
+ public:
+  explicit Builder(WindingNumber& winding) : winding_(winding), hierarchy_(*winding.hierarchy_) {
+    addCluster(0, 0, static_cast<std::uint32_t>(hierarchy_.triangles().size()));
+    winding_.moments_.resize(winding_.clusters_.size());
+    tbb::parallel_for(std::size_t{0}, winding_.clusters_.size(), [&](std::size_t n) { measure(n); });
+  }
+
+ private:
+  std::uint32_t firstSlot(std::uint32_t child) const {
+    while ((child & bvh::kBlockBit) == 0) child = hierarchy_.nodes()[child].child[0];
+    return hierarchy_.blocks()[child & ~bvh::kBlockBit].first;
+  }
+
+  /// Adds the cluster of a node or block and, recursively, those of its children. The slots below it are [begin, end).
+  void addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end) {
+    const std::size_t self = winding_.clusters_.size();
+    winding_.clusters_.push_back({.begin = begin, .end = end});
+    if ((child & bvh::kBlockBit) == 0) {
+      const bvh::Node& node = hierarchy_.nodes()[child];
+      for (int i = 0; i < bvh::kWidth && node.child[i] != bvh::kEmpty; ++i) {
+        const bool last = i + 1 == bvh::kWidth || node.child[i + 1] == bvh::kEmpty;
+        addCluster(node.child[i], firstSlot(node.child[i]), last ? end : firstSlot(node.child[i + 1]));
+      }
+    }
+    winding_.clusters_[self].next = static_cast<std::uint32_t>(winding_.clusters_.size());
+  }
+
+  std::array<Vector3, 3> corners(std::uint32_t slot) const {
+    const auto& [a, b, c] = hierarchy_.triangles()[slot];
+    return {winding_.vertices_[a], winding_.vertices_[b], winding_.vertices_[c]};
+  }
+
+  /// Computes center, moments and far distances of a cluster.
+  void measure(std::size_t n) {
+    Cluster& cluster = winding_.clusters_[n];
+    Moments& moments = winding_.moments_[n];
+    Vector3 sum = Vector3::Zero();
+    double total = 0;
+    for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
+      const auto [a, b, c] = corners(slot);
+      const double area = (b - a).cross(c - a).norm() / 2;
+      total += area;
+      sum += area / 3 * (a + b + c);
+    }
+    cluster.center = total > 0 ? Vector3(sum / total) : corners(cluster.begin)[0];
+    for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
+      const auto [a, b, c] = corners(slot);
+      addTriangle({a - cluster.center, b - cluster.center, c - cluster.center}, moments);
+    }
+    if (moments.radius > 0) moments.area /= std::pow(moments.radius, 3);
+    for (int level = 0; level < kLevels; ++level)
+      cluster.squaredFarDistance[level] = squaredFarDistance(moments.area, moments.radius, kErrors[level]);
+  }
+
+  /// Adds the moments of a triangle with corners `v`, relative to the cluster's center.
+  static void addTriangle(const std::array<Vector3, 3>& v, Moments& moments) {
+    const Vector3 normal = (v[1] - v[0]).cross(v[2] - v[0]) / 2, sum = v[0] + v[1] + v[2], mean = sum / 3;
+    double cubes = 0;
+    for (const Vector3& corner : v) {
+      const double distance = corner.norm();
+      moments.radius = std::max(moments.radius, distance);
+      cubes += distance * distance * distance;
+    }
+    moments.area += normal.norm() * cubes / 3;  // the mean of a convex function is at most that of its corners
+    const Eigen::Matrix3d spread =
+        (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
+    moments.first += normal;
+    const auto second = [&](int i, int j) { return (normal[i] * mean[j] + normal[j] * mean[i]) / 2; };
+    const auto third = [&](int i, int j, int k) {
+      return (normal[i] * spread(j, k) + normal[j] * spread(i, k) + normal[k] * spread(i, j)) / 3;
+    };
+    constexpr int kSecond[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+    for (std::size_t m = 0; m < moments.second.size(); ++m) moments.second[m] += second(kSecond[m][0], kSecond[m][1]);
+    constexpr int kThird[][3] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {0, 0, 1}, {0, 0, 2},
+                                 {0, 1, 1}, {1, 1, 2}, {0, 2, 2}, {1, 2, 2}, {0, 1, 2}};
+    for (std::size_t m = 0; m < moments.third.size(); ++m)
+      moments.third[m] += third(kThird[m][0], kThird[m][1], kThird[m][2]);
+  }
+
+  WindingNumber& winding_;
+  const bvh::Hierarchy& hierarchy_;
+};
+
+double WindingNumber::Moments::series(const Vector3& toCenter, double squaredDistance) const {
+  const double x = toCenter.x(), y = toCenter.y(), z = toCenter.z();
+  const double inverse = 1 / squaredDistance, cubed = inverse * std::sqrt(inverse);
+  const auto [xx, yy, zz, xy, xz, yz] = second;
+  const double quadratic = xx * x * x + yy * y * y + zz * z * z + 2 * (xy * x * y + xz * x * z + yz * y * z);
+  const auto [xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz] = third;
+  const double cubic = x * (xxx * x * x + 3 * (xyy * y * y + xzz * z * z)) +
+                       y * (yyy * y * y + 3 * (xxy * x * x + yzz * z * z)) +
+                       z * (zzz * z * z + 3 * (xxz * x * x + yyz * y * y)) + 6 * xyz * x * y * z;
+  const double traces = (xxx + xyy + xzz) * x + (xxy + yyy + yzz) * y + (xxz + yyz + zzz) * z;
+  return cubed * (first.dot(toCenter) + (xx + yy + zz) - 3 * inverse * quadratic +
+                  inverse * (7.5 * inverse * cubic - 4.5 * traces));
+}
+
+double WindingNumber::Moments::error(double squaredDistance) const {
+  return radius == 0 ? 0 : truncationError(area, squaredDistance, radius / std::sqrt(squaredDistance));
+}
+
+WindingNumber::WindingNumber(const bvh::Hierarchy& hierarchy)
+    : hierarchy_(&hierarchy), vertices_(hierarchy.vertices().size()) {
+  tbb::parallel_for(std::size_t{0}, vertices_.size(),
+                    [&](std::size_t v) { vertices_[v] = hierarchy.local(hierarchy.vertices()[v]); });
+  Builder build(*this);
+}
+
+double WindingNumber::sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const {
+  AngleSum angles;
+  for (std::uint32_t slot = begin; slot < end; ++slot) {
+    const auto& [a, b, c] = hierarchy_->triangles()[slot];
+    addHalfSolidAngle(vertices_[a] - local, vertices_[b] - local, vertices_[c] - local, angles);
+  }
+  return angles.value() / (2 * std::numbers::pi);
+}
+
+WindingNumber::Estimate WindingNumber::estimate(const Vector3& x, int level) const {
+  const Vector3 local = hierarchy_->local(x);
+  Estimate all{0, kRounding};
+  double series = 0;
+  for (std::size_t n = 0; n < clusters_.size();) {
+    const Cluster& cluster = clusters_[n];
+    const Vector3 toCenter = cluster.center - local;
+    const double squared = toCenter.squaredNorm();
+    if (squared > cluster.squaredFarDistance[level]) {
+      series += moments_[n].series(toCenter, squared);
+      all.error += moments_[n].error(squared);
+      n = cluster.next;
+    } else if (++n == cluster.next) {  // the cluster is a block
+      all.value += sumOver(local, cluster.begin, cluster.end);
+    }
+  }
+  all.value += series / (4 * std::numbers::pi);
+  return all;
+}
+
+double WindingNumber::withoutTriangle(const Vector3& x, std::uint32_t slot) const {
+  const Estimate all = estimateWithin(x, 0.05, [](const Estimate&) { return false; });
+  return all.value - sumOver(hierarchy_->local(x), slot, slot + 1);
+}
+
+double WindingNumber::exact(const Vector3& x) const {
+  return sumOver(hierarchy_->local(x), 0, static_cast<std::uint32_t>(hierarchy_->triangles().size()));
+}
+
+bool WindingNumber::isAbove(const Vector3& x, double level) const {
+  const auto decides = [&](const Estimate& found) { return std::abs(found.value - level) > found.error; };
+  return estimateWithin(x, 0, decides).value > level;
+}
+
+std::size_t WindingNumber::bytes() const {
+  return clusters_.size() * sizeof(Cluster) + moments_.size() * sizeof(Moments) + vertices_.size() * sizeof(Vector3);
+}
+
+}  // namespace hpsdf::sign

@@ -1,0 +1,148 @@
+#include "sign/winding_sign.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+namespace hpsdf::sign {
+namespace {
+
+constexpr std::size_t kBatch = 512;  // points that are signed from each other's winding numbers
+/// Error of the winding number from which the distance to a hole's closing surface is computed. A greater error would
+/// be noise, which refinement of the field would pursue.
+constexpr double kExact = 2e-3;
+/// Errors of the gradient, as change of the winding number over the distance to the triangles: the first mostly shows
+/// that no closing surface is nearer, the second adds little to the noise of `kExact`.
+constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
+
+/// Returns the indices of the distances, the greatest first; those that are not finite come last.
+std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
+  std::vector<std::uint32_t> order(distances.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto finite = [&](std::uint32_t i) { return std::isfinite(distances[i]) ? distances[i] : -1; };
+  std::ranges::sort(order, std::greater(), finite);
+  return order;
+}
+
+}  // namespace
+
+double probeDistance(const Box& box) {
+  const double largest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  return 1e-9 * box.sizes().norm() + 1e-14 * largest;
+}
+
+/// The side of a point, and bounds from which the sides of its neighbours follow.
+struct WindingSign::Sample {
+  Vector3 position;
+  double clearance;  ///< no triangle is nearer
+  double distance;   ///< distance to the surface, including the surfaces that close holes
+  bool inside;
+  double margin = 0;        ///< lower bound of |w − level|
+  double gradient = 0;      ///< upper bound of |∇w|
+  double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
+  double edgeDistance = 0;  ///< lower bound of the distance to the boundary edges, at least `clearance`
+
+  /// Returns the sample that follows for a point x with known distances; of unknown margin where x is too far away.
+  Sample movedTo(const Vector3& x, double itsClearance, double itsDistance) const {
+    const double squaredStep = (x - position).squaredNorm();
+    if (!(squaredStep < 0.998 * clearance * clearance)) return {x, itsClearance, itsDistance, inside};
+    return movedBy(std::sqrt(squaredStep), x, itsClearance, itsDistance);
+  }
+
+  /// Returns true if all points within `radius` that no triangle separates from this one are on its side.
+  bool holdsWithin(double radius) const {
+    return radius < edgeDistance && movedBy(radius, position, 0, radius).margin > 0;
+  }
+
+  /// Returns true if the sign is certain, and the surfaces that close holes are farther away than the triangles.
+  bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
+
+ private:
+  /// After a step s every boundary edge is at least 1 − s/edgeDistance times as far away. The bound of the derivative
+  /// grows at most with the inverse cube of that.
+  Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
+    const double nearer = 1 - step / edgeDistance;
+    const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;
+    return {x,
+            itsClearance,
+            itsDistance,
+            inside,
+            margin - steepest * step,
+            steepest,
+            changes,
+            std::max(edgeDistance - step, itsClearance)};
+  }
+};
+
+WindingSign::WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, BoundaryEdges edges)
+    : hierarchy_(&hierarchy), winding_(hierarchy), edges_(std::move(edges)) {
+  if (edges_.empty() && signedVolume(mesh) < 0) level_ = -0.5;
+}
+
+WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, double distance) const {
+  if (!std::isfinite(distance)) return {x, 0, distance, false};
+  if (edges_.empty()) return {x, clearance, distance, winding_.isAbove(x, level_), 0.5, 0, 0, HUGE_VAL};
+  const double scale = hierarchy_->scale();
+  const auto gradientWithin = [&](double change) {
+    return edges_.gradient(hierarchy_->local(x), change / (distance * scale));
+  };
+  BoundaryEdges::Gradient gradient = gradientWithin(kRoughChange);
+  const auto fromLevel = [&](const WindingNumber::Estimate& found) { return std::abs(found.value - level_); };
+  const auto isFarFromLevel = [&](const WindingNumber::Estimate& found) {
+    return fromLevel(found) - found.error > 1.01 * (gradient.value.norm() + gradient.error) * scale * distance;
+  };
+  const WindingNumber::Estimate found = winding_.estimateWithin(x, kExact, isFarFromLevel);
+  if (!isFarFromLevel(found) && gradient.error > 0) gradient = gradientWithin(kExactChange);
+  const bool inside = fromLevel(found) > found.error ? found.value > level_ : winding_.isAbove(x, level_);
+  const double slope = gradient.value.norm() * scale, toClosingSurface = fromLevel(found) / slope;
+  return {x,
+          clearance,
+          toClosingSurface < distance ? toClosingSurface : distance,
+          inside,
+          fromLevel(found) - found.error,
+          slope + gradient.error * scale,
+          gradient.derivative * scale * scale,
+          std::max(gradient.edgeDistance / scale, clearance)};
+}
+
+void WindingSign::applyTo(std::span<double> distances, std::span<const Vector3> points,
+                          std::span<const double> clearances) const {
+  std::vector<Sample> samples;
+  for (std::size_t first = 0; first < points.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, points.size() - first);
+    applyToBatch(distances.subspan(first, count), points.subspan(first, count), clearances.subspan(first, count),
+                 samples);
+  }
+}
+
+void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vector3> points,
+                               std::span<const double> clearances, std::vector<Sample>& samples) const {
+  samples.clear();
+  // Points with much clearance come first: their samples decide the sides of the most other points.
+  for (const std::uint32_t i : farthestFirst(clearances)) {
+    Sample here = {points[i], clearances[i], distances[i], false};
+    for (const Sample& other : samples)
+      if (here = other.movedTo(points[i], clearances[i], distances[i]); here.isCertain()) break;
+    if (!here.isCertain()) here = sampleAt(points[i], clearances[i], distances[i]);
+    samples.push_back(here);
+    distances[i] = here.inside ? -here.distance : std::min(here.distance, clearances[i]);
+  }
+}
+
+bool WindingSign::separatesOutsideFromInside(std::uint32_t slot) const {
+  const auto& [a, b, c] = hierarchy_->triangles()[slot];
+  const auto vertices = hierarchy_->vertices();
+  return std::abs(winding_.withoutTriangle((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_) < 0.25;
+}
+
+bool WindingSign::isInside(const Vector3& x) const { return sampleAt(x, 0, 0).inside; }
+
+bool WindingSign::isSameSideWithin(const Vector3& x, double radius) const {
+  return edges_.empty() || sampleAt(x, 0, radius).holdsWithin(radius);
+}
+
+}  // namespace hpsdf::sign

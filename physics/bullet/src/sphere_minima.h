@@ -1,0 +1,32 @@
+#pragma once
+// The points at which a sphere penetrates a field most deeply: one for each side on which the sphere touches it.
+
+#include <span>
+#include <vector>
+
+#include "hpsdf/field.h"
+
+namespace hpsdf::physics {
+
+/// A local minimum of the field over a sphere, or an approximation of one during the descent.
+struct SphereMinimum {
+  Vector3 direction = Vector3::UnitX();  ///< unit vector from the sphere's centre
+  double value = 0;                      ///< field value at that point of the sphere
+  Vector3 slope = Vector3::Zero();       ///< component of the field's gradient tangential to the sphere
+  double step = 1;                       ///< next step against the slope, in radii
+};
+
+/// Finds the minima of one sphere that moves a little from step to step: each search starts at the previous minima too.
+class SphereMinima {
+ public:
+  static constexpr std::size_t kMost = 12;
+
+  /// The minima with a value of at most `margin`, the lowest first. Allocates nothing after the first calls.
+  std::span<const SphereMinimum> find(const Field& field, const Vector3& center, double radius, double margin);
+  void forget() { minima_.clear(); }
+
+ private:
+  std::vector<SphereMinimum> minima_;
+};
+
+}  // namespace hpsdf::physics

@@ -1,0 +1,30 @@
+#pragma once
+// A hierarchy of bounding spheres around points.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf::physics {
+
+/// A node of the hierarchy, around the points with the positions `begin` to `end` (exclusive) in the tree's order. The
+/// nodes are stored in depth-first order. `next` is the index of the first node after this node's subtree, at which a
+/// search continues that skips the node; a node without children is followed directly by `next`.
+struct Sphere {
+  Vector3 center;
+  double radius;  ///< no point is farther from the centre, in spite of rounding
+  std::uint32_t begin, end;
+  std::uint32_t next;
+};
+
+struct SphereTree {
+  std::vector<Sphere> spheres;       ///< the first one contains all points
+  std::vector<std::uint32_t> order;  ///< the points' indices, in the order in which the nodes' ranges are contiguous
+};
+
+/// Builds the hierarchy of one or more points.
+SphereTree buildSphereTree(std::span<const Vector3> points);
+
+}  // namespace hpsdf::physics

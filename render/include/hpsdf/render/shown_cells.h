@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace hpsdf::render {
+
+/// How the octree's leaves are drawn in the picture of a surface.
+enum class CellStyle : std::uint8_t {
+  none,
+  lines,  ///< the edges of the cells; edges fade where their cells are small in the picture
+  boxes,  ///< solid boxes of 0.8 of the cells' extent
+};
+
+/// The leaves of the octree that a picture shows, and how it draws them.
+struct ShownCells {
+  CellStyle style = CellStyle::none;
+  std::vector<int> degrees = {};  ///< degrees of the leaves to show, ascending; empty for all degrees
+  std::vector<int> depths = {};   ///< depths of the leaves to show, ascending; empty for all depths
+};
+
+}  // namespace hpsdf::render

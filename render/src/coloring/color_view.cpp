@@ -1,0 +1,331 @@
+#include "coloring/color_view.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+
+#include "coloring/surface_shader.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr Color kPaper = {250, 250, 248};
+constexpr Color kOutline = {18, 16, 38};
+constexpr Color kIsoLine = {24, 28, 44};
+constexpr Color kZeroLine = {10, 10, 20};
+constexpr Color kSurfaceLine = {255, 255, 255};
+constexpr Color kSurfaceCasing = {16, 14, 34};
+constexpr Color kSection = {238, 222, 205};  // section of a clay surface
+constexpr Color kAir = {222, 228, 235};      // part of a plane that lies outside of the solid
+
+constexpr double kOutlineStrength = 0.62;
+constexpr double kIsoStrength = 0.42;
+// Widths of lines, in multiples of a thin line's width.
+constexpr double kZeroWidth = 2.4;
+constexpr double kSurfaceWidth = 1.6;
+constexpr double kCasingWidth = 3.4;
+// Outlines fade in cells that are narrower than this many thin lines, because they would cover the cells' colours.
+constexpr double kOutlineFadesBelow = 10;
+constexpr double kOutlineGoneBelow = 3;
+// The least slope of the distance that counts. Where the distance is almost constant in the plane of a slice (along a
+// medial axis, on a tangent plane) lines would otherwise grow into blots.
+constexpr double kFlattestSlope = 0.25;
+
+float smoothStep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return static_cast<float>(t * t * (3 - 2 * t));
+}
+
+// Calls colorRow(y, row) for each row of samples, in several threads, and averages the samples of each pixel.
+template <typename ColorRow>
+Image average(const ViewBuffers& buffers, int samples, const ColorRow& colorRow) {
+  Image image(buffers.width / samples, buffers.height / samples, kPaper);
+  const float share = 1.0F / float(samples * samples);
+  tbb::parallel_for(tbb::blocked_range<int>(0, image.height), [&](const tbb::blocked_range<int>& rows) {
+    std::vector<LinearColor> row(buffers.width);
+    std::vector<LinearColor> sums(image.width);
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      std::fill(sums.begin(), sums.end(), LinearColor::Zero());
+      for (int sampleRow = 0; sampleRow < samples; ++sampleRow) {
+        colorRow(y * samples + sampleRow, row);
+        for (int x = 0; x < image.width * samples; ++x) sums[x / samples] += row[x];
+      }
+      for (int x = 0; x < image.width; ++x) image.at(x, y) = encodeSrgb(share * sums[x]);
+    }
+  });
+  return image;
+}
+
+// Coverage of a sample by a line whose centre line is `distance` away; lengths in samples.
+float coverage(double distance, double width) {
+  return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
+}
+
+// Sections and planes are flat: they are unlit and show the outlines of their cells.
+bool isFlat(const ViewBuffers& buffers, std::size_t i) {
+  return buffers.shows(i, Shown::section) || buffers.shows(i, Shown::plane);
+}
+
+// Outlines of cells. They cover the leftmost and the topmost samples of each cell, so that they are as crisp as the
+// samples allow, and two neighbours never both draw their common edge.
+class CellOutlines {
+ public:
+  /// `inScene` restricts the outlines to sections and planes; otherwise the buffers are those of a slice.
+  CellOutlines(const ViewBuffers& buffers, const Sampling& sampling, bool inScene)
+      : buffers_(buffers), inScene_(inScene), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
+    if (inScene) {
+      flatCells_ = buffers.cell;
+      for (std::size_t i = 0; i < flatCells_.size(); ++i)
+        if (!isFlat(buffers, i)) flatCells_[i] = kNoCell;
+      cell_ = flatCells_;
+    }
+    widthUp_ = static_cast<int>(std::ceil(width_));
+    measureCells();
+  }
+
+  /// Coverage of sample (x, y), 0 to 1.
+  float operator()(int x, int y) const {
+    return std::max(alongAxis(x, y, x, -1), alongAxis(x, y, y, -std::ptrdiff_t(buffers_.width)));
+  }
+
+ private:
+  struct Extent {
+    int x0, x1, y0, y1;
+  };
+
+  // Chooses the strength of each cell's outline by the cell's size on the screen.
+  void measureCells() {
+    std::unordered_map<std::uint32_t, Extent> extents;
+    for (int y = 0; y < buffers_.height; ++y) {
+      const std::uint32_t* row = &cell_[std::size_t(y) * buffers_.width];
+      for (int x0 = 0, x1; x0 < buffers_.width; x0 = x1) {
+        for (x1 = x0 + 1; x1 < buffers_.width && row[x1] == row[x0];) ++x1;
+        if (row[x0] == kNoCell) continue;
+        Extent& extent = extents.try_emplace(row[x0], Extent{x0, x1, y, y + 1}).first->second;
+        extent = {std::min(extent.x0, x0), std::max(extent.x1, x1), extent.y0, y + 1};
+      }
+    }
+    strengths_.reserve(extents.size() + 1);
+    for (const auto& [cell, extent] : extents) {
+      const int size = std::max(extent.x1 - extent.x0, extent.y1 - extent.y0);
+      strengths_[cell] = smoothStep(kOutlineGoneBelow * width_, kOutlineFadesBelow * width_, size);
+    }
+    strengths_[kNoCell] = 0;
+  }
+
+  // Coverage by outlines across one axis. `position` is the number of samples before this one along the axis, `step`
+  // the index offset to the previous sample.
+  float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    const std::uint32_t* cell = &cell_[i];
+    const int most = std::min(widthUp_, position);
+    // Cells are convex: if both ends lie in one cell, so does everything between them.
+    if (most == 0 || cell[most * step] == *cell) return 0;
+    int k = 1;
+    while (cell[k * step] == *cell) ++k;
+    if (hidden(i, i + k * step)) return 0;
+    const float strength = std::max(strengths_.at(*cell), strengths_.at(cell[k * step]));
+    return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
+  }
+
+  // Tells if a plane ends at these two samples because something nearer covers it: that is no edge of a cell.
+  bool hidden(std::size_t i, std::size_t j) const {
+    if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
+    const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
+    return buffers_.covered(other) && buffers_.distance[other] < buffers_.distance[flat];
+  }
+
+  const ViewBuffers& buffers_;
+  bool inScene_;
+  std::vector<std::uint32_t> flatCells_;
+  std::span<const std::uint32_t> cell_;
+  double width_;  // width of an outline, in samples
+  int widthUp_;   // width_, rounded up
+  std::unordered_map<std::uint32_t, float> strengths_;
+};
+
+// Slopes and zero lines of the values in a slice, or on a plane before a camera.
+class Contours {
+ public:
+  /// The zero line is where the value equals `zero`.
+  explicit Contours(const ViewBuffers& buffers, double zero = 0) : buffers_(buffers), zero_(zero) {}
+
+  /// Change of the value from one sample to the next, at least kFlattestSlope times the distance of samples.
+  double slope(int x, int y, double sampleSize) const {
+    const std::size_t i = index(x, y);
+    const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);
+    const double dy = derivative(i, buffers_.width, y > 0, y + 1 < buffers_.height);
+    return std::max(std::hypot(dx, dy), kFlattestSlope * sampleSize);
+  }
+
+  /// Distance of sample (x, y) from the zero line, in samples. Where the field jumps over zero from one cell to the
+  /// next, the line runs between the two samples.
+  double toZero(int x, int y, double slopeHere) const {
+    const std::size_t i = index(x, y);
+    double distance = std::abs(buffers_.value[i] - zero_) / slopeHere;
+    if (x > 0) distance = std::min(distance, toCrossing(i, i - 1));
+    if (x + 1 < buffers_.width) distance = std::min(distance, toCrossing(i, i + 1));
+    if (y > 0) distance = std::min(distance, toCrossing(i, i - buffers_.width));
+    if (y + 1 < buffers_.height) distance = std::min(distance, toCrossing(i, i + buffers_.width));
+    return distance;
+  }
+
+ private:
+  std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
+
+  // Prefers differences within the cell, because a jump at a face is no slope.
+  double derivative(std::size_t i, std::size_t step, bool hasBefore, bool hasAfter) const {
+    const auto& cell = buffers_.cell;
+    const auto& value = buffers_.value;
+    hasBefore = hasBefore && joined(i, i - step);
+    hasAfter = hasAfter && joined(i, i + step);
+    const bool before = hasBefore && cell[i - step] == cell[i];
+    const bool after = hasAfter && cell[i + step] == cell[i];
+    if (before && after) return (double(value[i + step]) - value[i - step]) / 2;
+    if (after) return double(value[i + step]) - value[i];
+    if (before) return double(value[i]) - value[i - step];
+    if (hasBefore && hasAfter) return (double(value[i + step]) - value[i - step]) / 2;
+    if (hasAfter) return double(value[i + step]) - value[i];
+    return hasBefore ? double(value[i]) - value[i - step] : 0;
+  }
+
+  double toCrossing(std::size_t i, std::size_t neighbour) const {
+    const double here = buffers_.value[i] - zero_, there = buffers_.value[neighbour] - zero_;
+    if (!joined(i, neighbour) || (here < 0) == (there < 0)) return std::numeric_limits<double>::infinity();
+    return std::abs(here) / (std::abs(here) + std::abs(there));
+  }
+
+  // Tells if a neighbour belongs to the same plane.
+  bool joined(std::size_t i, std::size_t neighbour) const {
+    return buffers_.hit(neighbour) && (buffers_.shown.empty() || buffers_.shown[i] == buffers_.shown[neighbour]);
+  }
+
+  const ViewBuffers& buffers_;
+  double zero_;
+};
+
+// The line along which a plane meets the surface: white with dark borders.
+class SurfaceLine {
+ public:
+  explicit SurfaceLine(const Sampling& sampling) : thin_(sampling.lineWidth * sampling.samples) {}
+
+  /// Draws the line over a colour at this distance from the centre line, in samples.
+  LinearColor operator()(const LinearColor& ground, double distance) const {
+    const LinearColor cased = mix(ground, casing_, 0.8F * coverage(distance, kCasingWidth * thin_));
+    return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));
+  }
+
+ private:
+  double thin_;
+  LinearColor line_ = decodeSrgb(kSurfaceLine), casing_ = decodeSrgb(kSurfaceCasing);
+};
+
+}  // namespace
+
+Color paperColor() { return kPaper; }
+
+LinearColor backdropColor(double fromTop) {
+  return fromOklab({0.975 - 0.06 * fromTop * fromTop, -0.003, -0.006 - 0.004 * fromTop});
+}
+
+SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color) {
+  if (color == ColorBy::normal) return {};
+  const std::vector<std::uint8_t>& levels = color == ColorBy::degree ? buffers.degree : buffers.depth;
+  return [map = std::move(map), &levels](std::size_t i) { return map(levels[i]); };
+}
+
+SampleColor quantityColors(std::vector<float> quantity, ColorScale scale) {
+  return [quantity = std::move(quantity), scale = std::move(scale)](std::size_t i) { return scale(quantity[i]); };
+}
+
+Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
+  const CellOutlines outlines(buffers, sampling, false);
+  const Contours contours(buffers);
+  const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
+  const SurfaceLine lines(sampling);
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      LinearColor& sample = row[x];
+      sample = buffers.hit(i) ? color(i) : paper;
+      sample = mix(sample, outline, float(kOutlineStrength) * outlines(x, y));
+      if (!buffers.hit(i)) continue;
+      sample = lines(sample, contours.toZero(x, y, contours.slope(x, y, sampling.sampleSize)));
+    }
+  });
+}
+
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling) {
+  constexpr int kSteps = 2048;
+  std::vector<LinearColor> table(2 * kSteps + 1);
+  for (int i = -kSteps; i <= kSteps; ++i) table[i + kSteps] = divergingColor(double(i) / kSteps);
+
+  const Contours contours(buffers);
+  const LinearColor paper = decodeSrgb(kPaper), isoLine = decodeSrgb(kIsoLine), zeroLine = decodeSrgb(kZeroLine);
+  const double thin = sampling.lineWidth * sampling.samples;
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      LinearColor& sample = row[x];
+      sample = paper;
+      if (!buffers.hit(i)) continue;
+      const double value = buffers.value[i];
+      sample = table[static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps)) + kSteps];
+      const double slope = contours.slope(x, y, sampling.sampleSize);
+      const double nearest = std::round(value / scale.step);
+      if (nearest != 0) {
+        const double distance = std::abs(value - nearest * scale.step) / slope;
+        sample = mix(sample, isoLine, float(kIsoStrength) * coverage(distance, thin));
+      }
+      sample = mix(sample, zeroLine, coverage(contours.toZero(x, y, slope), kZeroWidth * thin));
+    }
+  });
+}
+
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
+                   double offset, const std::vector<float>& lines, std::span<const LinearColor> bodies) {
+  const SurfaceShader shader(buffers, camera, color, bodies);
+  const Contours contours(buffers, offset);
+  const SurfaceLine surfaceLine(sampling);
+  std::optional<CellOutlines> outlines;
+  if (!buffers.shown.empty()) outlines.emplace(buffers, sampling, true);
+  const LinearColor outline = decodeSrgb(kOutline), solid = decodeSrgb(kSection), air = decodeSrgb(kAir);
+  const auto flatColor = [&](std::size_t i) {
+    return color ? color(i) : buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
+  };
+  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
+    const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      LinearColor& sample = row[x];
+      sample = !buffers.covered(i) ? ground : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
+      if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
+      if (buffers.shows(i, Shown::plane)) {
+        const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));
+        sample = surfaceLine(sample, contours.toZero(x, y, slope));
+      }
+      if (!lines.empty()) sample = mix(sample, outline, float(kOutlineStrength) * lines[i]);
+    }
+  });
+}
+
+Image backdropPicture(int width, int height, int viewHeight) {
+  Image image(width, height, paperColor());
+  for (int y = 0; y < viewHeight; ++y)
+    std::fill_n(&image.at(0, y), width, encodeSrgb(backdropColor((y + 0.5) / viewHeight)));
+  return image;
+}
+
+void pasteView(Image& picture, const Image& view) {
+  for (int y = 0; y < view.height; ++y)
+    std::copy_n(&view.pixels[std::size_t(y) * view.width], view.width, &picture.at(0, y));
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,134 @@
+#include "coloring/quantity.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::render {
+namespace {
+
+/// Evaluates a quantity of points, in one batch.
+void measure(const Field& field, ColorBy quantity, const ReferenceData& reference, std::span<const Vector3> points,
+             std::span<double> out) {
+  if (quantity == ColorBy::slope) {
+    std::vector<ValueAndGradient> results(points.size());
+    field.valuesAndGradients(points, results);
+    for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(results[i].gradient.norm() - 1);
+    return;
+  }
+  std::vector<double> expected(points.size());
+  field.values(points, out);
+  if (quantity == ColorBy::difference)
+    reference.other->values(points, expected);
+  else
+    (*reference.exact)(points, expected);
+  for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - expected[i]);
+}
+
+/// A value with its weight in the choice of a scale.
+struct Weighted {
+  double value, weight;
+};
+
+/// The least and the greatest value above 0, without the lowest hundredth and the highest thousandth by weight: because
+/// of a few outliers all else would have one colour.
+std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
+  std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
+  if (values.empty()) return {0, 0};
+  std::ranges::sort(values, {}, &Weighted::value);
+  double total = 0;
+  for (const Weighted& v : values) total += v.weight;
+  const auto quantile = [&](double share) {
+    double sum = 0;
+    for (const Weighted& v : values)
+      if ((sum += v.weight) > share * total) return v.value;
+    return values.back().value;
+  };
+  return {quantile(0.01), quantile(0.999)};
+}
+
+/// Weights cells by their volume, so that many tiny ones in a corner do not decide.
+std::vector<Weighted> weighted(const Field& field, const std::vector<double>& ofCells) {
+  std::vector<Weighted> values;
+  field.forEachCell([&](const Cell& cell) { values.push_back({ofCells[cell.id], cell.box.volume()}); });
+  return values;
+}
+
+/// Picks at most some million samples at even intervals, which represent all of them.
+std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
+  constexpr std::size_t kMost = 1'000'000;
+  std::vector<Weighted> values;
+  for (std::size_t i = 0; i < ofSamples.size(); i += ofSamples.size() / kMost + 1) values.push_back({ofSamples[i], 1});
+  return values;
+}
+
+}  // namespace
+
+void requireReferenceData(ColorBy color, const ReferenceData& reference) {
+  if ((color == ColorBy::valueJump || color == ColorBy::gradientJump) && reference.jumps == nullptr)
+    throw Error("colours of jumps need the field's jumps");
+  if (color == ColorBy::error && reference.exact == nullptr)
+    throw Error("colours of the error need the exact distance");
+  if (color == ColorBy::difference && reference.other == nullptr)
+    throw Error("colours of the difference need another field");
+}
+
+std::vector<double> quantityOfCells(const Field& field, ColorBy quantity, const ReferenceData& reference) {
+  if (quantity == ColorBy::valueJump) return worstJumpOfCells(field, *reference.jumps, JumpKind::value);
+  if (quantity == ColorBy::gradientJump) return worstJumpOfCells(field, *reference.jumps, JumpKind::gradient);
+  if (quantity != ColorBy::cellError) return {};
+  std::vector<double> errors(field.data().nodes.size(), 0.0);
+  field.forEachCell([&](const Cell& cell) { errors[cell.id] = std::sqrt(cell.error / cell.box.volume()); });
+  return errors;
+}
+
+std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buffers,
+                                     const std::function<Vector3(int, int)>& pointAt, ColorBy quantity,
+                                     const ReferenceData& reference, const std::vector<double>& ofCells) {
+  std::vector<float> result(buffers.cell.size(), std::numeric_limits<float>::quiet_NaN());
+  tbb::parallel_for(tbb::blocked_range<int>(0, buffers.height), [&](const tbb::blocked_range<int>& rows) {
+    std::vector<std::size_t> pixels;
+    std::vector<Vector3> points;
+    std::vector<double> values;
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      pixels.clear();
+      points.clear();
+      for (int x = 0; x < buffers.width; ++x) {
+        const std::size_t i = std::size_t(y) * buffers.width + x;
+        if (!buffers.hit(i)) continue;
+        pixels.push_back(i);
+        if (ofCells.empty())
+          points.push_back(pointAt(x, y));
+        else
+          result[i] = static_cast<float>(ofCells[buffers.cell[i]]);
+      }
+      if (!ofCells.empty()) continue;
+      values.resize(points.size());
+      measure(field, quantity, reference, points, values);
+      for (std::size_t n = 0; n < pixels.size(); ++n) result[pixels[n]] = static_cast<float>(values[n]);
+    }
+  });
+  return result;
+}
+
+ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,
+                      const std::vector<float>& ofSamples) {
+  if (options.limits) {
+    const auto [low, high] = *options.limits;
+    if (!(low < high) || !std::isfinite(low) || !std::isfinite(high))
+      throw Error("range: expected LOW,HIGH with LOW below HIGH");
+    if (options.logarithmic && !(low > 0))
+      throw Error("range: a logarithmic scale needs limits above 0; give others, or a linear scale");
+    return {low, high, options.logarithmic};
+  }
+  const auto [least, greatest] = rangeWithoutOutliers(ofCells.empty() ? weighted(ofSamples) : weighted(field, ofCells));
+  return ColorScale::around(least, greatest, options.logarithmic);
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,110 @@
+#include "picture/color_key.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "coloring/quantity.h"
+#include "hpsdf/error.h"
+#include "picture/describe.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr int kBarColors = 256;
+
+/// The colours of a legend's bar; `colorAt` maps 0 to 1 to colours.
+std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
+  std::vector<Color> bar;
+  for (int i = 0; i < kBarColors; ++i) bar.push_back(encodeSrgb(colorAt(double(i) / (kBarColors - 1))));
+  return bar;
+}
+
+/// The names of a quantity, the longest first: the first that fits heads the colour bar, the last is for captions.
+std::span<const std::string> titlesOf(ColorBy quantity) {
+  static const std::map<ColorBy, std::vector<std::string>> titles = {
+      {ColorBy::valueJump, {"worst jump of the value", "jump of value", "value jump"}},
+      {ColorBy::gradientJump, {"worst jump of the gradient", "jump of gradient", "gradient jump"}},
+      {ColorBy::slope, {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"}},
+      {ColorBy::error, {"error |f − exact|", "error"}},
+      {ColorBy::difference, {"difference |f − other|", "difference"}},
+      {ColorBy::cellError, {"estimated cell error", "cell error"}}};
+  return titles.at(quantity);
+}
+
+ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field, const ViewBuffers& buffers,
+                       const std::function<Vector3(int, int)>& pointAt, ColorBy quantity, const ScaleOptions& options,
+                       const ReferenceData& reference) {
+  const std::vector<double> ofCells = quantityOfCells(field, quantity, reference);
+  std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, reference, ofCells);
+  const ColorScale scale = colorScale(options, field, ofCells, values);
+  const std::span<const std::string> titles = titlesOf(quantity);
+  addScaleBar(overlay, frame, titles, scale);
+
+  ColorKey key{.color = {}, .scale = options, .name = titles.back(), .range = describeGreatest(values)};
+  key.legend = {.title = titles.front(), .bar = barOf(orderedColor)};
+  for (const double value : scaleMarks(scale))
+    key.legend.marks.push_back({scale.fraction(value), formatNumber(value, 3)});
+  key.scale.limits = {scale.low(), scale.high()};
+  key.color = quantityColors(std::move(values), scale);
+  return key;
+}
+
+ColorKey keyOfLevels(Overlay& overlay, const Frame& frame, const FieldStatistics& figures, const ViewBuffers& buffers,
+                     ColorBy color, const ScaleOptions& options) {
+  const bool degree = color == ColorBy::degree;
+  static const std::string degreeTitles[] = {"polynomial degree", "degree"};
+  static const std::string depthTitles[] = {"octree depth", "depth"};
+  const std::span<const std::string> titles = degree ? degreeTitles : depthTitles;
+  std::map<int, double> shares = degree ? figures.degreeVolume : figures.depthVolume;
+  for (const int level : options.levels) shares.try_emplace(level, 0.0);
+
+  ColorKey key{.color = {}, .legend = {.title = titles.front()}, .scale = options, .name = titles.back(), .range = {}};
+  key.scale.levels.clear();
+  for (const auto& [level, share] : shares) key.scale.levels.push_back(level);
+  LevelMap map(key.scale.levels);
+  for (const auto& [level, share] : shares) key.legend.levels.push_back({level, encodeSrgb(map(level)), share});
+  addLevelLegend(overlay, frame, titles, shares, map);
+  key.color = levelColors(buffers, std::move(map), color);
+  return key;
+}
+
+}  // namespace
+
+ColorKey makeColorKey(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures,
+                      const ViewBuffers& buffers, const std::function<Vector3(int, int)>& pointAt, ColorBy color,
+                      const ScaleOptions& scale, const ReferenceData& reference) {
+  return isQuantity(color) ? keyOfQuantity(overlay, frame, field, buffers, pointAt, color, scale, reference)
+                           : keyOfLevels(overlay, frame, figures, buffers, color, scale);
+}
+
+DistanceScale distanceScaleFor(const ViewBuffers& buffers, const ScaleOptions& options) {
+  double minimum = 0, maximum = 0;
+  bool any = false;
+  for (std::size_t i = 0; i < buffers.value.size(); ++i) {
+    if (!buffers.hit(i)) continue;
+    minimum = any ? std::min<double>(minimum, buffers.value[i]) : buffers.value[i];
+    maximum = any ? std::max<double>(maximum, buffers.value[i]) : buffers.value[i];
+    any = true;
+  }
+  if (!options.limits) return distanceScale(minimum, maximum);
+  const auto [low, high] = *options.limits;
+  if (!(low <= high) || !std::isfinite(low) || !std::isfinite(high))
+    throw Error("range: expected LOW,HIGH with LOW below HIGH");
+  DistanceScale scale = distanceScale(low, high);
+  scale.minimum = minimum;
+  scale.maximum = maximum;
+  return scale;
+}
+
+Legend distanceLegend(const DistanceScale& scale) {
+  Legend legend{.title = "signed distance", .bar = barOf([](double t) { return divergingColor(2 * t - 1); })};
+  for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0})
+    legend.marks.push_back({0.5 + 0.5 * share, formatNumber(share * scale.range, 3)});
+  return legend;
+}
+
+}  // namespace hpsdf::render

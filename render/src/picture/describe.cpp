@@ -1,0 +1,81 @@
+#include "picture/describe.h"
+
+#include <cstdio>
+
+namespace hpsdf::render {
+namespace {
+
+/// "2, 4–6" for ascending levels.
+std::string describeRuns(const std::vector<int>& levels) {
+  std::string text;
+  for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {
+    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1;) ++last;
+    text += (i == 0 ? "" : ", ") + std::to_string(levels[i]);
+    if (last > i) text += "–" + std::to_string(levels[last]);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string formatVector(const Vector3& v, int digits) {
+  return "(" + formatNumber(v.x(), digits) + ", " + formatNumber(v.y(), digits) + ", " + formatNumber(v.z(), digits) +
+         ")";
+}
+
+std::string describeSource(const Field& field) {
+  const std::string& name = field.metadata().source.name;
+  return name.empty() ? "unnamed field" : name;
+}
+
+std::string describeTarget(const Field& field) { return "τ = " + formatNumber(field.metadata().settings.targetError.weighted(), 3); }
+
+std::string describePlane(const std::string& name, const Plane& plane) {
+  if (const auto* axis = std::get_if<AxisPlane>(&plane))
+    return name + " " + "xyz"[axis->axis] + " = " + formatNumber(axis->offset);
+  const auto& free = std::get<FreePlane>(plane);
+  return name + " through " + formatVector(free.point) + " with normal " + formatVector(free.normal);
+}
+
+std::string describeCells(const ShownCells& cells) {
+  std::string text = cells.style == CellStyle::lines ? "edges of cells" : "cells";
+  if (!cells.degrees.empty()) text += " of degree " + describeRuns(cells.degrees);
+  if (!cells.depths.empty())
+    text += std::string(cells.degrees.empty() ? " of" : ",") + " depth " + describeRuns(cells.depths);
+  return text;
+}
+
+std::string describeCamera(const OrbitCamera& camera) {
+  return (camera.projection == Projection::orthographic ? "orthographic camera " : "camera ") +
+         formatNumber(camera.azimuthDegrees) + "°, " + formatNumber(camera.elevationDegrees) + "°" +
+         (camera.target ? " at " + formatVector(*camera.target) : "");
+}
+
+std::string describeCracks(const Cracks& cracks) {
+  if (cracks.pixels == 0) return "no cracks";
+  return "cracks (magenta) in " + formatCount(cracks.pixels) + (cracks.pixels == 1 ? " pixel" : " pixels") +
+         ", up to " + formatNumber(cracks.widest, 3);
+}
+
+std::string describeLevels(const std::map<int, double>& shares) {
+  const int first = shares.begin()->first, last = shares.rbegin()->first;
+  return first == last ? std::to_string(first) : std::to_string(first) + "–" + std::to_string(last);
+}
+
+std::string describeBytes(std::size_t bytes) {
+  char text[32];
+  if (bytes < 1000000)
+    std::snprintf(text, sizeof text, "%.1f kB", double(bytes) / 1e3);
+  else
+    std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
+  return text;
+}
+
+std::string describeGreatest(const std::vector<float>& values) {
+  float greatest = -1;
+  for (const float value : values)
+    if (value > greatest) greatest = value;
+  return greatest < 0 ? "nothing shown" : "up to " + formatNumber(greatest, 3);
+}
+
+}  // namespace hpsdf::render

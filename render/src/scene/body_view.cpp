@@ -1,0 +1,70 @@
+#include "scene/body_view.h"
+
+#include <algorithm>
+#include <string>
+
+#include "hpsdf/error.h"
+#include "view/view_checks.h"
+
+namespace hpsdf::render {
+namespace {
+
+constexpr std::size_t kMostPixels = std::size_t{1} << 26;
+constexpr double kLeastDepth = 1e-5;  // least visible depth in perspective, in parts of the farthest depth
+
+}  // namespace
+
+void checkBodyView(const Camera& camera, int width, int height) {
+  checkCamera(camera, width, height);
+  if (std::size_t(width) * std::size_t(height) > kMostPixels)
+    throw Error("a view of " + std::to_string(width) + "x" + std::to_string(height) +
+                " pixels is more than the 64 million that bodies are drawn in: give a smaller one");
+  if (camera.right.isZero(0) || camera.up.isZero(0))
+    throw Error("a camera's right or up vector is zero: give half the view's width and height");
+}
+
+double farthestDepth(const Camera& camera, const Box& box) {
+  double farthest = 0;
+  for (int i = 0; i < 8; ++i)
+    farthest = std::max(farthest, (box.corner(Box::CornerType(i)) - camera.eye).dot(camera.forward));
+  return farthest > 0 ? farthest : 1;
+}
+
+double leastDepth(const Camera& camera, double farthest) {
+  return camera.projection == Projection::perspective ? kLeastDepth * farthest : 0;
+}
+
+BodyBuffers emptyBodyBuffers(int width, int height) {
+  const std::size_t pixels = std::size_t(width) * std::size_t(height);
+  BodyBuffers buffers{.width = width, .height = height, .body = {}, .triangle = {}, .normal = {}, .distance = {}};
+  buffers.body.assign(pixels, kNoBody);
+  buffers.triangle.assign(pixels, 0);
+  buffers.normal.assign(pixels, Eigen::Vector3f::Zero());
+  buffers.distance.assign(pixels, 0);
+  return buffers;
+}
+
+void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers) {
+  buffers.body.assign(buffers.cell.size(), kNoBody);
+  for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
+    if (!bodies.hit(i) || (buffers.hit(i) && buffers.distance[i] <= bodies.distance[i])) continue;
+    buffers.cell[i] = kNoCell;
+    buffers.degree[i] = buffers.depth[i] = buffers.crack[i] = 0;
+    buffers.value[i] = 0;
+    buffers.body[i] = bodies.body[i];
+    buffers.normal[i] = bodies.normal[i];
+    buffers.distance[i] = bodies.distance[i];
+  }
+}
+
+Camera startingBefore(const Box& box, const Camera& camera) {
+  if (camera.projection == Projection::perspective || box.isEmpty()) return camera;
+  constexpr double kMargin = 0.01;  // distance from the rays' start to the box, in diagonals of the box
+  const double half = 0.5 * box.sizes().dot(camera.forward.cwiseAbs());
+  const double nearest = (box.center() - camera.eye).dot(camera.forward) - half - kMargin * box.diagonal().norm();
+  Camera moved = camera;
+  if (nearest < 0) moved.eye += nearest * camera.forward;
+  return moved;
+}
+
+}  // namespace hpsdf::render

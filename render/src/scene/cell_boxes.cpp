@@ -1,0 +1,140 @@
+#include "scene/cell_boxes.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "scene/cell_selection.h"
+#include "scene/pixel_rows.h"
+#include "scene/section.h"
+
+namespace hpsdf::render {
+namespace {
+
+/// The rectangle of the pixels that may see a box: the whole view for a box that extends behind the eye.
+PixelRect rectOf(const Box& box, const Camera& camera, int width, int height) {
+  Eigen::AlignedBox2d seen;
+  int behind = 0;
+  for (const Vector3& corner : cornersOf(box)) {
+    const PicturePoint p = project(camera, corner, width, height);
+    if (p.depth > 0)
+      seen.extend(Eigen::Vector2d(p.x, p.y));
+    else
+      ++behind;
+  }
+  if (behind == 8) return {};
+  if (behind > 0) return {0, 0, width, height};
+  const auto clamped = [](double pixel, int pixels) { return int(std::clamp(pixel, 0.0, double(pixels))); };
+  return {clamped(std::floor(seen.min().x()), width), clamped(std::floor(seen.min().y()), height),
+          clamped(std::ceil(seen.max().x()), width), clamped(std::ceil(seen.max().y()), height)};
+}
+
+struct PixelRay {
+  Vector3 start, direction, inverse;
+};
+
+PixelRay rayOf(const Camera& camera, int x, int y, int width, int height) {
+  PixelRay ray{pixelEye(camera, x, y, width, height), pixelRay(camera, x, y, width, height), {}};
+  // A zero component has a very large inverse rather than an infinite one, because infinity times 0 is not a number.
+  for (int axis = 0; axis < 3; ++axis)
+    ray.inverse[axis] = 1 / (ray.direction[axis] != 0 ? ray.direction[axis] : 1e-200);
+  return ray;
+}
+
+/// The point at which a ray enters a box.
+struct Entry {
+  double distance;
+  int axis;  ///< axis across the face that the ray enters
+};
+
+/// The entry of a ray that starts outside of the box.
+std::optional<Entry> enter(const PixelRay& ray, const Box& box) {
+  const Vector3 a = (box.min() - ray.start).cwiseProduct(ray.inverse);
+  const Vector3 b = (box.max() - ray.start).cwiseProduct(ray.inverse);
+  const Vector3 near = a.cwiseMin(b);
+  Entry entry{near.x(), 0};
+  for (int axis = 1; axis < 3; ++axis)
+    if (near[axis] > entry.distance) entry = {near[axis], axis};
+  if (!(entry.distance > 0) || entry.distance > a.cwiseMax(b).minCoeff()) return std::nullopt;
+  return entry;
+}
+
+/// The drawn box of a cell.
+struct CellBox {
+  Box box;
+  const Cell* cell;
+  double squaredDistance;  ///< squared distance of the box from the eye
+};
+
+/// The boxes of the cells, the nearest first, because it hides most of the others.
+std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& cells) {
+  const Camera& camera = view.camera;
+  std::vector<CellBox> boxes;
+  for (const Cell& cell : cells) {
+    const Vector3 half = 0.5 * kBoxShare * cell.box.sizes();
+    const Box box = clipped(Box(cell.box.center() - half, cell.box.center() + half), view);
+    const bool containsEye = camera.projection == Projection::perspective && box.contains(camera.eye);
+    if (!box.isEmpty() && !containsEye) boxes.push_back({box, &cell, box.squaredExteriorDistance(camera.eye)});
+  }
+  std::ranges::stable_sort(boxes, {}, &CellBox::squaredDistance);
+  return boxes;
+}
+
+void show(const CellBox& box, const Entry& entry, const PixelRay& ray, std::size_t i, ViewBuffers& buffers) {
+  buffers.cell[i] = box.cell->id;
+  buffers.degree[i] = static_cast<std::uint8_t>(box.cell->degree);
+  buffers.depth[i] = static_cast<std::uint8_t>(box.cell->depth);
+  buffers.normal[i] = (ray.direction[entry.axis] > 0 ? -1.0F : 1.0F) * Eigen::Vector3f::Unit(entry.axis);
+  buffers.distance[i] = static_cast<float>(entry.distance);
+  buffers.crack[i] = 0;
+  buffers.shown[i] = Shown::box;
+}
+
+/// Sets f in the pixels that show boxes, in the rows from y0 on to which the rays belong.
+void addValues(const Field& field, int y0, const std::vector<PixelRay>& rays, ViewBuffers& buffers) {
+  const std::size_t first = std::size_t(y0) * buffers.width;
+  std::vector<std::size_t> pixels;
+  std::vector<Vector3> points;
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    if (!buffers.shows(first + n, Shown::box)) continue;
+    pixels.push_back(first + n);
+    points.push_back(rays[n].start + double(buffers.distance[first + n]) * rays[n].direction);
+  }
+  std::vector<double> values(points.size());
+  field.values(points, values);
+  for (std::size_t n = 0; n < pixels.size(); ++n) buffers.value[pixels[n]] = static_cast<float>(values[n]);
+}
+
+}  // namespace
+
+void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells, ViewBuffers& buffers) {
+  prepareShown(buffers);
+  const int width = buffers.width, height = buffers.height;
+  const std::vector<CellBox> boxes = boxesOf(view, cells);
+  std::vector<PixelRect> rects(boxes.size());
+  tbb::parallel_for(std::size_t{0}, boxes.size(),
+                    [&](std::size_t n) { rects[n] = rectOf(boxes[n].box, view.camera, width, height); });
+  forEachStrip(height, rects, [&](int y0, int y1, const std::vector<std::uint32_t>& inStrip) {
+    if (inStrip.empty()) return;
+    std::vector<PixelRay> rays;
+    rays.reserve(std::size_t(y1 - y0) * width);
+    for (int y = y0; y < y1; ++y)
+      for (int x = 0; x < width; ++x) rays.push_back(rayOf(view.camera, x, y, width, height));
+    for (const std::uint32_t n : inStrip) {
+      const PixelRect& rect = rects[n];
+      for (int y = std::max(y0, rect.y0); y < std::min(y1, rect.y1); ++y)
+        for (int x = rect.x0; x < rect.x1; ++x) {
+          const std::size_t i = std::size_t(y) * width + x;
+          const PixelRay& ray = rays[std::size_t(y - y0) * width + x];
+          const auto entry = enter(ray, boxes[n].box);
+          if (entry && !(buffers.hit(i) && buffers.distance[i] <= static_cast<float>(entry->distance)))
+            show(boxes[n], *entry, ray, i, buffers);
+        }
+    }
+    addValues(field, y0, rays, buffers);
+  });
+}
+
+}  // namespace hpsdf::render

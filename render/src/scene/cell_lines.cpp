@@ -1,0 +1,232 @@
+#include "scene/cell_lines.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "scene/cell_selection.h"
+#include "scene/pixel_rows.h"
+
+namespace hpsdf::render {
+namespace {
+
+// Edges fade between two lengths in the picture, given in multiples of the line width.
+constexpr double kFullLength = 24;  // edges of this length or more have full strength
+constexpr double kGoneLength = 6;   // edges of this length or less are not drawn
+
+constexpr double kFarthestStrength = 0.3;  // strength at the far end of the domain; it is 1 at the near end
+constexpr double kNearDepth = 1e-3;        // least depth at which lines are drawn, in domain diagonals
+
+/// A cell's edge, or the part of it that a clipping plane leaves.
+struct Segment {
+  Vector3 a, b;
+  double edgeLength;  ///< length of the whole edge, world units
+};
+
+/// A segment in the picture.
+struct Edge {
+  Segment segment;
+  PicturePoint from, to;
+  float strength = 0;  ///< 0 for an edge that is not drawn
+};
+
+/// Identifies an edge: equal for all cells of one size that share the edge.
+struct EdgeKey {
+  std::array<std::uint64_t, 3> from;  ///< lower end, in cells of the greatest depth
+  std::uint64_t kind;                 ///< axis and depth
+  bool operator==(const EdgeKey&) const = default;
+};
+
+/// A hash set of edges, by open addressing: faster than `std::unordered_set` by a multiple.
+class EdgeSet {
+ public:
+  explicit EdgeSet(std::size_t most) : slots_(std::bit_ceil(2 * most + 1), 0) { keys_.reserve(most); }
+
+  /// Adds an edge. Returns whether it was not in the set.
+  bool add(const EdgeKey& key) {
+    std::uint64_t hash = key.kind;
+    for (const std::uint64_t x : key.from) hash = (hash ^ x) * 0x9e3779b97f4a7c15;
+    for (std::size_t i = hash >> 32;; ++i) {
+      std::uint32_t& slot = slots_[i & (slots_.size() - 1)];
+      if (slot == 0) {
+        keys_.push_back(key);
+        slot = static_cast<std::uint32_t>(keys_.size());
+        return true;
+      }
+      if (keys_[slot - 1] == key) return false;
+    }
+  }
+
+ private:
+  std::vector<std::uint32_t> slots_;  ///< index of a key + 1, or 0 for a free slot
+  std::vector<EdgeKey> keys_;
+};
+
+/// The edges of the cells that `mayShow` accepts, each once, cut by the clipping plane.
+template <typename MayShow>
+std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
+                             const MayShow& mayShow) {
+  const Vector3 lower = field.domain().min();
+  const Vector3 cellsPerUnit =
+      Vector3(field.grid()[0], field.grid()[1], field.grid()[2]).cwiseQuotient(field.domain().sizes()) *
+      std::ldexp(1.0, kMaxDepth);
+  EdgeSet known(12 * cells.size());
+  std::vector<Segment> segments;
+  for (const Cell& cell : cells) {
+    const Box box = clipped(cell.box, view);
+    if (box.isEmpty() || !mayShow(cell.box)) continue;
+    const Vector3 first = (cell.box.min() - lower).cwiseProduct(cellsPerUnit);
+    const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
+    const std::array<Vector3, 8> corners = cornersOf(box);
+    for (int i = 0; i < 8; ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        if (i >> axis & 1) continue;
+        EdgeKey key{{}, std::uint64_t(cell.depth) * 3 + axis};
+        for (int k = 0; k < 3; ++k) key.from[k] = std::uint64_t(std::llround(first[k])) + (i >> k & 1 ? size : 0);
+        if (known.add(key)) segments.push_back({corners[i], corners[i | 1 << axis], cell.box.sizes()[axis]});
+      }
+  }
+  return segments;
+}
+
+float smoothStep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return static_cast<float>(t * t * (3 - 2 * t));
+}
+
+/// Draws edges into the coverage.
+class EdgePainter {
+ public:
+  EdgePainter(const Camera& camera, const Box& domain, const ViewBuffers& buffers, double lineWidth,
+              std::vector<float>& coverage)
+      : camera_(camera),
+        buffers_(buffers),
+        parallel_(camera.projection == Projection::orthographic),
+        pixel_(pixelSize(camera, 1, buffers.height)),
+        width_(lineWidth),
+        radius_(lineWidth / 2 + 0.5),
+        nearDepth_(kNearDepth * domain.diagonal().norm()),
+        coverage_(coverage) {
+    const double middle = (domain.center() - camera.eye).dot(camera.forward);
+    const double half = 0.5 * domain.sizes().dot(camera.forward.cwiseAbs());
+    nearest_ = std::max(0.0, middle - half);
+    farthest_ = std::max(middle + half, nearest_ + 1e-9 * half);
+  }
+
+  /// False where all edges of a box are too small in the picture or behind the eye.
+  bool mayShow(const Box& box) const {
+    const double middle = (box.center() - camera_.eye).dot(camera_.forward);
+    const double half = 0.5 * box.sizes().dot(camera_.forward.cwiseAbs());
+    return middle + half > nearDepth_ && pixelsAt(box.sizes().maxCoeff(), middle - half) > kGoneLength * width_;
+  }
+
+  /// The part of a segment before the eye, in the picture.
+  Edge projected(Segment segment) const {
+    const auto toPicture = [&](const Vector3& p) { return project(camera_, p, buffers_.width, buffers_.height); };
+    Edge edge{segment, toPicture(segment.a), toPicture(segment.b)};
+    if (std::max(edge.from.depth, edge.to.depth) <= nearDepth_) return edge;
+    const double length = pixelsAt(segment.edgeLength, 0.5 * (edge.from.depth + edge.to.depth));
+    edge.strength = smoothStep(kGoneLength * width_, kFullLength * width_, length);
+    if (std::min(edge.from.depth, edge.to.depth) >= nearDepth_) return edge;
+    const double share = (nearDepth_ - edge.from.depth) / (edge.to.depth - edge.from.depth);
+    const Vector3 cut = segment.a + share * (segment.b - segment.a);
+    const bool fromBehind = edge.from.depth < nearDepth_;
+    (fromBehind ? edge.segment.a : edge.segment.b) = cut;
+    (fromBehind ? edge.from : edge.to) = toPicture(cut);
+    return edge;
+  }
+
+  /// The pixels that an edge may cover; empty for an edge that is not drawn.
+  PixelRect rectOf(const Edge& edge) const {
+    if (edge.strength <= 0) return {};
+    const auto low = [&](double p, double q, int most) {
+      return int(std::clamp(std::floor(std::min(p, q) - radius_), 0.0, double(most)));
+    };
+    const auto high = [&](double p, double q, int most) {
+      return int(std::clamp(std::ceil(std::max(p, q) + radius_), 0.0, double(most)));
+    };
+    return {low(edge.from.x, edge.to.x, buffers_.width), low(edge.from.y, edge.to.y, buffers_.height),
+            high(edge.from.x, edge.to.x, buffers_.width), high(edge.from.y, edge.to.y, buffers_.height)};
+  }
+
+  /// Draws the part of an edge in the rows from y0 to y1 − 1.
+  void paint(const Edge& edge, int y0, int y1) const {
+    const PixelRect rect = rectOf(edge);
+    const double dx = edge.to.x - edge.from.x, dy = edge.to.y - edge.from.y, length = std::hypot(dx, dy);
+    for (int y = std::max(y0, rect.y0); y < std::min(y1, rect.y1); ++y) {
+      double left = rect.x0, right = rect.x1;
+      // Restrict the row to the band about the infinite line.
+      if (std::abs(dy) > 1e-6 * length) {
+        const double x = edge.from.x + (y + 0.5 - edge.from.y) / dy * dx, half = radius_ * length / std::abs(dy);
+        left = std::clamp(std::floor(x - half), left, right);
+        right = std::clamp(std::ceil(x + half), left, right);
+      }
+      for (int x = int(left); x < int(right); ++x) paintPixel(edge, dx, dy, length, x, y);
+    }
+  }
+
+ private:
+  /// The pixels that a length covers at a depth.
+  double pixelsAt(double length, double depth) const {
+    return length / pixelSize(camera_, std::max(depth, nearDepth_), buffers_.height);
+  }
+
+  void paintPixel(const Edge& edge, double dx, double dy, double length, int x, int y) const {
+    // Find the share of the pixel that the line covers, by the distance of the pixel's middle from the segment.
+    const double fromX = x + 0.5 - edge.from.x, fromY = y + 0.5 - edge.from.y;
+    const double t = length > 0 ? std::clamp((fromX * dx + fromY * dy) / (length * length), 0.0, 1.0) : 0.0;
+    const double acrossX = fromX - t * dx, acrossY = fromY - t * dy, square = acrossX * acrossX + acrossY * acrossY;
+    if (square >= radius_ * radius_) return;
+    const double covered = std::min(radius_ - std::sqrt(square), 1.0);
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    // Find the parameter s of the point in space: equal steps in a perspective picture are not equal steps in space.
+    const double toFar = parallel_ ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel_ ? t : t * edge.from.depth;
+    const double s = toNear / (toFar + toNear);
+    const double depth = edge.from.depth + s * (edge.to.depth - edge.from.depth);
+    const double relativeDepth = std::clamp((depth - nearest_) / (farthest_ - nearest_), 0.0, 1.0);
+    const float strength = edge.strength * static_cast<float>(covered * (1 + relativeDepth * (kFarthestStrength - 1)));
+    if (strength <= coverage_[i]) return;
+    if (buffers_.covered(i)) {
+      const Vector3 p = edge.segment.a + s * (edge.segment.b - edge.segment.a);
+      // The surface on which a line lies may have been sampled a pixel or two away from the line.
+      const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth);
+      if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance) return;
+    }
+    coverage_[i] = strength;
+  }
+
+  const Camera& camera_;
+  const ViewBuffers& buffers_;
+  bool parallel_;              ///< whether the camera's rays are parallel
+  double pixel_;               ///< height of a pixel at depth 1, world units
+  double width_;               ///< width of lines, pixels
+  double radius_;              ///< distance from a line's middle up to which pixels are covered, pixels
+  double nearDepth_;           ///< least depth at which lines are drawn, world units
+  double nearest_, farthest_;  ///< depths of the domain's ends
+  std::vector<float>& coverage_;
+};
+
+}  // namespace
+
+std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
+                             const ViewBuffers& buffers, double lineWidth) {
+  std::vector<float> coverage(buffers.cell.size(), 0.0F);
+  const EdgePainter painter(view.camera, field.domain(), buffers, lineWidth, coverage);
+  const auto mayShow = [&](const Box& box) { return painter.mayShow(box); };
+  const std::vector<Segment> segments = edgesOf(field, view, cells, mayShow);
+  std::vector<Edge> edges(segments.size());
+  std::vector<PixelRect> rects(segments.size());
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t n) {
+    edges[n] = painter.projected(segments[n]);
+    rects[n] = painter.rectOf(edges[n]);
+  });
+  forEachStrip(buffers.height, rects, [&](int y0, int y1, const std::vector<std::uint32_t>& inStrip) {
+    for (const std::uint32_t n : inStrip) painter.paint(edges[n], y0, y1);
+  });
+  return coverage;
+}
+
+}  // namespace hpsdf::render

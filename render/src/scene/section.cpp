@@ -1,0 +1,109 @@
+#include "scene/section.h"
+
+#include <tbb/parallel_for.h>
+
+#include <vector>
+
+#include "view/grid_space.h"
+
+namespace hpsdf::render {
+namespace {
+
+/// A plane in the scene.
+struct ScenePlane {
+  Vector3 point;
+  Vector3 normal;                          ///< unit vector
+  Vector3 lookupOffset = Vector3::Zero();  ///< vector from a point of the plane to where its cell and value are taken
+};
+
+/// The intersection of a pixel's ray with a plane.
+struct PlaneHit {
+  std::size_t pixel;
+  double distance;
+  Vector3 point;
+  Vector3 ray;  ///< unit direction of the ray
+};
+
+/// The axis that a direction is parallel to, or −1.
+int axisAlong(const Vector3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (direction[(axis + 1) % 3] == 0 && direction[(axis + 2) % 3] == 0) return axis;
+  return -1;
+}
+
+/// Writes a plane's cell, value, normal and distance to the pixel of a hit.
+void show(const Field& field, const ScenePlane& plane, const PlaneHit& hit, double value, Shown shown,
+          ViewBuffers& buffers) {
+  const std::size_t i = hit.pixel;
+  const Cell cell = field.cellAt(hit.point + plane.lookupOffset);
+  buffers.cell[i] = cell.id;
+  buffers.degree[i] = static_cast<std::uint8_t>(cell.degree);
+  buffers.depth[i] = static_cast<std::uint8_t>(cell.depth);
+  buffers.value[i] = static_cast<float>(value);
+  buffers.normal[i] = (plane.normal.dot(hit.ray) > 0 ? Vector3(-plane.normal) : plane.normal).cast<float>();
+  buffers.distance[i] = static_cast<float>(hit.distance);
+  buffers.crack[i] = 0;
+  buffers.shown[i] = shown;
+}
+
+/// Shows the part of a plane within the domain where `visible(hit)` and `keeps(value)` hold.
+template <typename Visible, typename Keeps>
+void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& plane, Shown shown,
+                   const Visible& visible, const Keeps& keeps, ViewBuffers& buffers) {
+  prepareShown(buffers);
+  const int axis = axisAlong(plane.normal);
+  tbb::parallel_for(0, buffers.height, [&](int y) {
+    std::vector<PlaneHit> hits;
+    std::vector<Vector3> points;
+    for (int x = 0; x < buffers.width; ++x) {
+      const Vector3 eye = pixelEye(camera, x, y, buffers.width, buffers.height);
+      const Vector3 ray = pixelRay(camera, x, y, buffers.width, buffers.height);
+      const double distance = plane.normal.dot(plane.point - eye) / plane.normal.dot(ray);
+      if (!(distance > 0)) continue;
+      Vector3 point = eye + distance * ray;
+      // The coordinate across an axis-aligned plane must be exact, because cells are half-open.
+      if (axis >= 0) point[axis] = plane.point[axis];
+      const PlaneHit hit{std::size_t(y) * buffers.width + x, distance, point, ray};
+      if (!field.domain().contains(point) || !visible(hit)) continue;
+      hits.push_back(hit);
+      points.push_back(point + plane.lookupOffset);
+    }
+    std::vector<double> values(points.size());
+    field.values(points, values);
+    for (std::size_t n = 0; n < hits.size(); ++n)
+      if (keeps(values[n])) show(field, plane, hits[n], values[n], shown, buffers);
+  });
+}
+
+}  // namespace
+
+void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers) {
+  if (!view.clip) return;
+  const auto [axis, offset] = *view.clip;
+  ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
+  const double nudge = kClipNudge * field.domain().sizes()[axis];
+  plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
+  // Rays start behind the plane, so that the section lies before whatever they hit.
+  addScenePlane(
+      field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
+      [&](double value) { return value < view.offset; }, buffers);
+}
+
+void addPlane(const Field& field, const SurfaceView& view, const SliceView& plane, ViewBuffers& buffers) {
+  const Vector3 right = plane.right.normalized(), up = plane.up.normalized();
+  const bool above = view.clip && eyeAbove(view.camera, *view.clip);
+  const auto clippedAway = [&](const Vector3& point) {
+    if (!view.clip) return false;
+    const double beyond = point[view.clip->axis] - view.clip->offset;
+    return above ? beyond > 0 : beyond < 0;
+  };
+  const auto visible = [&](const PlaneHit& hit) {
+    return !clippedAway(hit.point) &&
+           !(buffers.hit(hit.pixel) && buffers.distance[hit.pixel] <= static_cast<float>(hit.distance));
+  };
+  addScenePlane(
+      field, view.camera, {plane.origin, right.cross(up).normalized()}, Shown::plane, visible,
+      [](double) { return true; }, buffers);
+}
+
+}  // namespace hpsdf::render

@@ -1,0 +1,233 @@
+// `hpsdf build`: meshes, domains, memory, inside tests, warnings.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include "cli_fixture.h"
+#include "hpsdf/field_file.h"
+
+namespace hpsdf::app {
+namespace {
+
+using namespace cli;
+using BuildCommand = Cli;
+
+TEST_F(BuildCommand, buildWritesAFieldThatLoads) {
+  const Outcome built = run({{"build", "builtin:sphere", "-o", at("s.hpsdf"), "--target-error", "1e-3", "--json"}});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const Json json = Json::parse(built.out);
+  EXPECT_GT(json.at("build_seconds").get<double>(), 0);
+  const Field loaded = load(at("s.hpsdf"));
+  const FieldStatistics counts = statistics(loaded);
+  EXPECT_EQ(json.at("leaves"), counts.leaves);
+  EXPECT_EQ(json.at("coefficients"), counts.coefficients);
+  EXPECT_EQ(json.at("mesh_report").at("closed"), true);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("s.hpsdf"));
+}
+
+TEST_F(BuildCommand, normalizedCubeIsExact) {
+  writeFile(at("t.obj"), kTetrahedron);
+  const auto domainOf = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"build", at("t.obj"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome built = run({words});
+    EXPECT_EQ(built.status, 0) << built.err;
+    return Json::parse(built.out).at("domain");
+  };
+  const double edge = 1 + 0.1;
+  EXPECT_EQ(domainOf({"--normalize"}), Json({{-edge, -edge, -edge}, {edge, edge, edge}}));
+  EXPECT_EQ(domainOf({"--paper"}), Json({{-edge, -edge, -edge}, {edge, edge, edge}}));
+  EXPECT_EQ(domainOf({"--normalize", "--margin", "0.5"}), Json({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}));
+  EXPECT_EQ(domainOf({"--domain", "-1,-2,-3,4,5,6"}), Json({{-1, -2, -3}, {4, 5, 6}}));
+  const Json plain = domainOf({});
+  EXPECT_NEAR(plain[0][0].get<double>(), -0.05, 1e-12);
+  EXPECT_NEAR(plain[1][2].get<double>(), 1.05, 1e-12);
+}
+
+TEST_F(BuildCommand, analyticShapesAreNormalizedToo) {
+  const Outcome built = run({{"build", "analytic:sphere,radius=0.25", "-o", at("s.hpsdf"), "--normalize",
+                              "--target-error", "1e-5", "--grid", "3"}});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const Field sphere = load(at("s.hpsdf"));
+  EXPECT_NEAR(sphere.value(Vector3(1, 0, 0)), 0, 0.02);
+  EXPECT_NEAR(sphere.value(Vector3(0, 0.5, 0)), -0.5, 0.02);
+}
+
+TEST_F(BuildCommand, warnsOfOpenMeshes) {
+  writeFile(at("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto built = [&](const std::string& sign) {
+    const Outcome outcome = run({{"build", at("open.obj"), "-o", at("f.hpsdf"), "--target-error", "1", "--domain",
+                                  "-1,-1,-1,2,2,2", "--sign", sign}});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(built("pseudonormal"),
+              HasSubstr("warning: " + at("open.obj") + ": the surface is not closed (3 boundary"));
+  EXPECT_THAT(built("auto"), HasSubstr("sign by winding number: 3 edges are unbalanced"));
+  EXPECT_THAT(built("auto"), testing::Not(HasSubstr("warning")));
+  const Json mesh = Json::parse(run({{"mesh", at("open.obj"), "--json"}}).out);
+  EXPECT_EQ(mesh.at("closed"), false);
+  EXPECT_EQ(mesh.at("boundary_edges"), 3);
+}
+
+TEST_F(BuildCommand, memoryIsLimitedWithoutATarget) {
+  std::string soup;  // triangles here and there, which surround nothing
+  std::uint32_t random = 1;
+  const auto number = [&] { return double((random = random * 1664525 + 1013904223) >> 8) / 0x1p24; };
+  for (int v = 0; v < 300; ++v) {
+    const double x = number(), y = number(), z = number();
+    soup += fmt::format("v {} {} {}\n", x, y, z);
+  }
+  for (int t = 0; t < 100; ++t) soup += fmt::format("f {} {} {}\n", 3 * t + 1, 3 * t + 2, 3 * t + 3);
+  writeFile(at("soup.obj"), soup);
+  const auto built = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", at("soup.obj"), "-o", at("soup.hpsdf"), "--sign", "pseudonormal"});
+    return run({more});
+  };
+  const Outcome limited = built({"--memory-limit", "1e6"});
+  EXPECT_EQ(limited.status, 2);
+  EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1.00 MB allowed"));
+  EXPECT_FALSE(std::filesystem::exists(at("soup.hpsdf")));
+  EXPECT_EQ(built({"--memory-limit", "1e8", "--target-error", "1"}).status, 0);
+  const Outcome small = run({{"build", "analytic:sphere", "-o", at("s.hpsdf"), "--grid", "1", "--target-error", "1e-14",
+                              "--memory-limit", "1e5"}});
+  EXPECT_EQ(small.status, 2);
+  EXPECT_THAT(small.err, ContainsRegex("about [0-9]+ cells and [0-9.]+ kB of memory are needed")) << "not 0.00 million";
+}
+
+TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
+  const auto built = [&](const std::string& surface, std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", surface, "-o", at("f.hpsdf"), "--max-steps", "0"});
+    return run({more});
+  };
+  const Outcome limited = built("builtin:torus", {"--memory-limit", "1e7"});
+  EXPECT_EQ(limited.status, 2);
+  EXPECT_THAT(limited.err, HasSubstr("the distance that the field is made from holds"));
+  EXPECT_THAT(limited.err, HasSubstr("of memory, more than the 10.00 MB allowed"));
+  EXPECT_EQ(built("builtin:torus", {"--memory-limit", "1e8"}).status, 0);
+  EXPECT_EQ(built("builtin:torus,segments=700,sides=700", {}).status, 0) << "untold, the limit is for what grows";
+}
+
+/// The importer stores coordinates as floats; a warning reports a coarse resolution.
+TEST_F(BuildCommand, warnsOfCoordinatesFarFromTheOrigin) {
+  const auto tetrahedron = [&](double x) {
+    return fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 2 0\nv {0} 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", x, x + 2);
+  };
+  writeFile(at("near.obj"), tetrahedron(1));
+  writeFile(at("far.obj"), tetrahedron(1e6));
+  const std::string warning = at("far.obj") +
+                              ": coordinates reach 1e6, where the reader keeps them 0.0625 apart (0.0312 of the mesh's "
+                              "longest side): move the mesh nearer to the origin before it is exported\n";
+  const Outcome mesh = run({{"mesh", at("far.obj")}});
+  EXPECT_EQ(mesh.err, "hpsdf: warning: " + warning);
+  EXPECT_THAT(mesh.out, HasSubstr("the reader stores them in steps of 0.0625"));
+  EXPECT_THAT(mesh.out, HasSubstr("(1000000, 0, 0) to (1000002, 2, 2)"));
+  const Outcome built = run({{"build", at("far.obj"), "-o", at("far.hpsdf"), "--target-error", "1e-3"}});
+  EXPECT_EQ(built.status, 0);
+  EXPECT_THAT(built.err, HasSubstr(warning));
+  EXPECT_THAT(run({{"info", at("far.hpsdf")}}).out, HasSubstr("(999999.9, -0.1, -0.1) to (1000002.1, 2.1, 2.1)"));
+  EXPECT_EQ(Json::parse(run({{"mesh", at("far.obj"), "--json"}}).out).at("coordinate_spacing"), 0.0625);
+  EXPECT_THAT(run({{"mesh", at("near.obj")}}).err, IsEmpty());
+  EXPECT_EQ(Json::parse(run({{"mesh", "builtin:box", "--json"}}).out).at("coordinate_spacing"), 0);
+}
+
+TEST_F(BuildCommand, everyGivenOptionHasAnEffect) {
+  for (const char* option : {"--hull", "--sign=winding"})
+    expectRefused({{"build", "analytic:sphere", "-o", at("x.hpsdf"), option}},
+                  "an analytic shape has a sign of its own");
+  expectRefused({{"turntable", field(), "-o", at("turn"), "--frames", "2", "--defects", at("none.obj")}},
+                "none.obj: no such file");
+  writeFile(at("flap.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n");
+  const auto places = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"mesh", at("flap.obj")};
+    words.insert(words.end(), more.begin(), more.end());
+    const std::string out = run({words}).out;
+    return std::ranges::count(out.substr(out.find("boundary edges  ")), ';');
+  };
+  EXPECT_GT(places({"--places", "5"}), places({}));
+  EXPECT_GT(places({}), places({"--places", "1"}));
+  const Outcome foreign = run({{"render", field(), "--defects", at("flap.obj"), "-o", at("x.png"), "--cpu"}});
+  EXPECT_EQ(foreign.status, 0);
+  EXPECT_THAT(foreign.err, HasSubstr("flap.obj is not what the field was made from"));
+}
+
+TEST_F(BuildCommand, controlCharactersInNamesDoNotReachTheTerminal) {
+  const std::string name = at("red\x1b[31m.obj");
+  writeFile(name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+  for (const Call& call : {Call{{"build", name, "-o", at("x.hpsdf"), "--sign", "pseudonormal", "--max-steps", "3"}},
+                           Call{{"render", field(), "--defects", name, "-o", at("x.png"), "--cpu"}},
+                           Call{{"slice", field(), "--color", "error", "--mesh", name, "-o", at("y.png"), "--cpu"}}}) {
+    const Outcome outcome = run(call);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("warning"), HasSubstr("red"), Not(HasSubstr("\x1b"))));
+  }
+}
+
+TEST_F(BuildCommand, outerHullOmitsInteriorWalls) {
+  const std::string box = "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 2 2 0\nv 0 0 2\nv 2 0 2\nv 0 2 2\nv 2 2 2\n";
+  std::string text = box;
+  for (const char* v :
+       {"1 0.5 0.5", "3 0.5 0.5", "1 1.5 0.5", "3 1.5 0.5", "1 0.5 1.5", "3 0.5 1.5", "1 1.5 1.5", "3 1.5 1.5"})
+    text += fmt::format("v {}\n", v);
+  for (const int first : {1, 9})
+    for (const auto& f : {std::array{0, 2, 3, 1}, std::array{4, 5, 7, 6}, std::array{0, 1, 5, 4},
+                          std::array{2, 6, 7, 3}, std::array{0, 4, 6, 2}, std::array{1, 3, 7, 5}})
+      text += fmt::format("f {} {} {} {}\n", first + f[0], first + f[1], first + f[2], first + f[3]);
+  writeFile(at("boxes.obj"), text);
+  const auto valueIn = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", at("boxes.obj"), "-o", at(name), "--target-error", "1e-4"});
+    EXPECT_EQ(run({more}).status, 0);
+    writeFile(at("point.csv"), "1 1 1\n");
+    return Json::parse(run({{"query", at(name), at("point.csv"), "--json"}}).out)[0].at("distance").get<double>();
+  };
+  EXPECT_NEAR(valueIn("plain.hpsdf", {}), 0, 0.05) << "on the smaller one's wall";
+  EXPECT_NEAR(valueIn("hull.hpsdf", {"--hull"}), -1, 0.05);
+  EXPECT_EQ(Json::parse(run({{"info", at("hull.hpsdf"), "--json"}}).out).at("mesh").at("sign"), "hull");
+  const Outcome verified = run({{"verify", at("hull.hpsdf"), at("boxes.obj"), "--json", "--points", "2000"}});
+  EXPECT_EQ(verified.status, 0) << verified.err;
+  EXPECT_LT(Json::parse(verified.out).at("uniform").at("error").at("rms"), 0.02);
+  expectRefused({{"build", at("boxes.obj"), "-o", at("x.hpsdf"), "--hull", "--sign", "pseudonormal"}}, "hull");
+}
+
+TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
+  const auto refused = [&](const std::vector<std::string>& options, const std::string& message) {
+    std::vector<std::string> words = {"build", "builtin:torus", "-o", at("f.hpsdf")};
+    words.insert(words.end(), options.begin(), options.end());
+    expectRefused({words}, message);
+  };
+  refused({"--continuity-weight", "1"}, "continuity-weight belongs to continuity weak");
+  refused({"--continuity", "exact", "--continuity-weight", "1"}, "continuity-weight belongs to continuity weak");
+  refused({"--blend-width", "0.1"}, "blend-width belongs to continuity exact");
+  refused({"--continuity", "weak", "--blend-width", "0.1"}, "blend-width belongs to continuity exact");
+  refused({"--near-distance", "0.1"}, "near-distance belongs to near-error");
+  refused({"--max-bytes", "1e3"}, "the base grid alone takes more than 1000 bytes");
+  // Studies refuse options that would have no effect or another meaning there.
+  for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+    expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
+  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+    expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
+                  "not for 'study convergence'");
+}
+
+TEST_F(BuildCommand, warnsOfADomainBesideTheSurface) {
+  const auto build = [&](const std::string& domain) {
+    return run({{"build", "analytic:sphere", "-o", at("f.hpsdf"), "--domain", domain, "--target-error", "1e-2"}}).err;
+  };
+  EXPECT_THAT(build("5,5,5,6,6,6"), HasSubstr("warning: the domain leaves out the whole surface"));
+  EXPECT_THAT(build("0,-2,-2,2,2,2"), HasSubstr("warning: the domain leaves out part of the surface"));
+  EXPECT_THAT(build("-2,-2,-2,2,2,2"), Not(HasSubstr("warning")));
+}
+
+TEST_F(BuildCommand, normalizationIsRemembered) {
+  writeFile(at("mesh.off"), "OFF\n4 4 0\n10 0 0\n14 0 0\n10 2 0\n10 0 2\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n");
+  ASSERT_EQ(run({{"build", at("mesh.off"), "-o", at("f.hpsdf"), "--normalize", "--target-error", "1e-3"}}).status, 0);
+  const auto json = nlohmann::json::parse(run({{"info", at("f.hpsdf"), "--json"}}).out);
+  EXPECT_EQ(json["normalization"]["scale"], 0.5);
+  EXPECT_EQ(json["normalization"]["center"], nlohmann::json({12.0, 1.0, 1.0}));
+  EXPECT_THAT(run({{"info", at("f.hpsdf")}}).out, HasSubstr("field = 0.5 · (mesh − (12, 1, 1))"));
+}
+
+}  // namespace
+}  // namespace hpsdf::app

@@ -1,0 +1,225 @@
+// `hpsdf info` and `hpsdf query`, and files that are not fields.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "cli_fixture.h"
+#include "hpsdf/field_file.h"
+#include "language/point_query.h"
+#include "support/one_leaf_field.h"
+
+namespace hpsdf::app {
+namespace {
+
+using namespace cli;
+using FieldFile = Cli;
+
+TEST_F(FieldFile, infoDescribesTheField) {
+  const Outcome info = run({{"info", field(), "--json"}});
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_THAT(info.err, IsEmpty());
+  const Json json = Json::parse(info.out);
+  const Field torus = load(field());
+  const FieldStatistics counts = statistics(torus);
+  EXPECT_EQ(json.at("leaves"), counts.leaves);
+  EXPECT_EQ(json.at("coefficients"), counts.coefficients);
+  EXPECT_EQ(json.at("bytes"), counts.bytes);
+  EXPECT_EQ(json.at("total_error"), torus.metadata().totalError);
+  EXPECT_EQ(json.at("target_error"), 1e-4);
+  EXPECT_EQ(json.at("rms_estimate"), torus.metadata().rmsEstimate(torus.domain()));
+  EXPECT_EQ(json.at("exact_evaluations"), torus.metadata().exactEvaluations);
+  EXPECT_EQ(json.at("steps"), torus.metadata().steps.value());
+  EXPECT_EQ(json.at("mesh").at("faces"), torus.metadata().source.faces);
+  EXPECT_EQ(std::stoull(json.at("mesh").at("fingerprint").get<std::string>(), nullptr, 16),
+            torus.metadata().source.fingerprint);
+  EXPECT_EQ(json.at("file_bytes"), fs::file_size(field()));
+  EXPECT_EQ(json.at("domain")[1][0], torus.domain().max().x());
+  for (const char* histogram : {"degree_volume", "depth_volume"}) {
+    double sum = 0;
+    for (const auto& [level, share] : json.at(histogram).items()) sum += share.get<double>();
+    EXPECT_NEAR(sum, 1, 1e-12) << histogram;
+  }
+  const Outcome text = run({{"info", field()}});
+  EXPECT_THAT(text.out, HasSubstr("leaves"));
+  EXPECT_THAT(text.out, HasSubstr("▇"));
+}
+
+TEST_F(FieldFile, damagedFieldsAreRefused) {
+  const std::string whole = readFile(field());
+  std::mt19937_64 random(5);
+  for (int n = 0; n < 40; ++n) {
+    std::string bytes = whole;
+    const std::size_t at = random() % (n % 4 < 2 ? 400 : whole.size());
+    if (n % 2 == 0)
+      bytes.resize(at);
+    else
+      bytes[at] = char(bytes[at] ^ (1 << random() % 8));
+    writeFile(this->at("damaged.hpsdf"), bytes);
+    expectRefused({{"info", this->at("damaged.hpsdf")}}, "damaged.hpsdf: ");
+  }
+}
+
+/// The field has figures that are not numbers, and a name that would clear the screen.
+TEST_F(FieldFile, infoDescribesAnyFieldThatLoads) {
+  FieldData data = oneLeafField(1, 2).data();
+  data.metadata.source.name = "evil\n\x1b[2J\xff.obj";
+  data.metadata.settings.targetError = NAN;
+  data.metadata.totalError = -INFINITY;
+  save(Field(data), at("evil.hpsdf"));
+  const Outcome text = run({{"info", at("evil.hpsdf")}});
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("evil  [2J\xff.obj\n"));
+  EXPECT_THAT(text.out, HasSubstr("-inf, nan"));
+  EXPECT_THAT(text.out, Not(HasSubstr("\x1b")));
+  const Outcome json = run({{"info", at("evil.hpsdf"), "--json"}});
+  EXPECT_EQ(json.status, 0) << json.err;
+  EXPECT_TRUE(Json::parse(json.out).at("target_error").is_null());
+}
+
+TEST_F(FieldFile, queryAnswersPoints) {
+  const Outcome outcome =
+      run({{"query", field()}, "x,y,z\n0.1,0.2,0.3\n\n# a comment\n-0.5 1e-1 0 # here too\n9,9,9\r\n"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, IsEmpty());
+  std::istringstream lines(outcome.out);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "x,y,z,distance,gx,gy,gz");
+  const Field torus = load(field());
+  for (const Vector3& x : {Vector3(0.1, 0.2, 0.3), Vector3(-0.5, 0.1, 0), Vector3(9, 9, 9)}) {
+    ASSERT_TRUE(std::getline(lines, line));
+    std::ranges::replace(line, ',', ' ');
+    std::istringstream numbers(line);
+    std::array<double, 7> row{};
+    for (double& number : row) numbers >> number;
+    const auto [value, gradient] = torus.valueAndGradient(x);
+    EXPECT_THAT(row, ElementsAre(x.x(), x.y(), x.z(), value, gradient.x(), gradient.y(), gradient.z()));
+  }
+  EXPECT_FALSE(std::getline(lines, line));
+}
+
+TEST_F(FieldFile, queryReadsAndWritesFiles) {
+  writeFile(at("points.txt"), "0 0 0\n1 1 1");
+  const Outcome toFile = run({{"query", field(), at("points.txt"), "-o", at("out.csv")}});
+  EXPECT_EQ(toFile.status, 0) << toFile.err;
+  EXPECT_EQ(readFile(at("out.csv")), run({{"query", field()}, "0 0 0\n1 1 1\n"}).out);
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("out.csv", "points.txt"));
+  EXPECT_EQ(run({{"query", field(), "--json"}, ""}).out, "[]\n");
+}
+
+TEST_F(FieldFile, badPointsAreRefusedByLine) {
+  for (const char* bad : {"1 2", "1 2 3 4", "a b c", "1,,2", "1 2 3x", "nan 0 0", "1 inf 2", ",1,2,3"}) {
+    writeFile(at("points.txt"), "0 0 0\n" + std::string(bad) + "\n");
+    expectRefused({{"query", field(), at("points.txt"), "-o", at("out.csv")}}, "points.txt:2: expected three finite");
+  }
+  writeFile(at("points.txt"), "1 2 \x1b[2J\n");
+  expectRefused({{"query", field(), at("points.txt")}}, "found '1 2  [2J'");
+  const Outcome first = run({{"query", field()}, "nan,nan,nan\n"});
+  EXPECT_EQ(first.status, 2);
+  EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));
+  expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");
+  expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
+}
+
+/// A program that sends one point at a time gets each answer before the next point.
+TEST_F(FieldFile, queriesOnAPipeAreAnsweredAtOnce) {
+  Process process({.words = {"query", field()}, .keepInputOpen = true});
+  process.type("0 0 0\n");
+  process.waitForLines(2);
+  process.type("1 1 1\n");
+  process.waitForLines(3);
+  process.closeInput();
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(lineCount(outcome.out), 3u);
+}
+
+TEST(PointQuery, answersManyBatchesInOrder) {
+  const Field field(FieldData{.domain = Box(Vector3::Zero(), Vector3::Ones()),
+                              .nodes = {node::leaf(0, 0)},
+                              .coefficients = std::vector<double>{0.25},
+                              .metadata = {}});
+  std::string text;
+  constexpr std::size_t kPoints = 40000;
+  for (std::size_t i = 0; i < kPoints; ++i) text += "0.5 0.5 " + std::to_string(double(i % 100) / 100) + "\n";
+  std::istringstream in(text);
+  std::string out;
+  std::size_t writes = 0;
+  EXPECT_EQ(queryPoints(field, in, "points", PointFormat::json,
+                        [&](std::string_view part) {
+                          out += part;
+                          ++writes;
+                        }),
+            kPoints);
+  EXPECT_GT(writes, 2u);
+  const Json json = Json::parse(out);
+  ASSERT_EQ(json.size(), kPoints);
+  for (std::size_t i = 0; i < kPoints; i += 997) {
+    EXPECT_EQ(json[i].at("z"), double(i % 100) / 100);
+    EXPECT_EQ(json[i].at("distance"), 0.25);
+  }
+}
+
+TEST_F(FieldFile, badFieldFilesAreRefused) {
+  const std::string good = readFile(field());
+  const auto variant = [&](const std::string& name, const std::string& bytes) { writeFile(at(name), bytes); };
+  variant("truncated.hpsdf", good.substr(0, good.size() / 2));
+  variant("short.hpsdf", good.substr(0, 5));
+  variant("empty.hpsdf", "");
+  variant("foreign.hpsdf", std::string(kTetrahedron));
+  variant("longer.hpsdf", good + "x");
+  for (const std::size_t byte : {good.size() / 3, good.size() - 100, std::size_t{100}}) {
+    std::string altered = good;
+    altered[byte] = static_cast<char>(altered[byte] ^ 0x10);
+    variant("altered" + std::to_string(byte) + ".hpsdf", altered);
+  }
+  std::string version = good;
+  version[8] = static_cast<char>(version[8] + 1);  // docs/file-format.md: the version follows 8 bytes of magic
+  variant("newer.hpsdf", version);
+  fs::create_directory(at("folder.hpsdf"));
+  const auto before = namesIn(folder_.path());
+  for (std::string name : before) {
+    expectRefused({{"info", at(name)}}, name, before);
+    expectRefused({{"slice", at(name), "-o", at("s.png"), "--cpu"}}, name, before);
+    expectRefused({{"query", at(name), "-o", at("q.csv")}, "0 0 0\n"}, name, before);
+  }
+  expectRefused({{"info", at("newer.hpsdf")}}, "version 5", before);
+  expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
+}
+
+/// Another thread creates and removes the file; the program prints its content or one line of error.
+TEST_F(FieldFile, fileThatAppearsAndDisappearsIsReadOrRefused) {
+  std::atomic<bool> over = false;
+  std::thread other([&] {
+    for (bool there = false; !over; there = !there) {
+      if (there)
+        fs::remove(at("f.hpsdf"));
+      else
+        fs::create_hard_link(field(), at("f.hpsdf"));
+    }
+  });
+  int refused = 0, read = 0;
+  const auto start = Clock::now();
+  for (int n = 0; n < 300 || ((refused == 0 || read == 0) && Clock::now() - start < std::chrono::seconds(20)); ++n) {
+    const Outcome outcome = runHere({"info", at("f.hpsdf")});
+    ++(outcome.status == 0 ? read : refused);
+    if (outcome.status == 0) continue;
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("f.hpsdf"), Not(HasSubstr("fault of the program"))));
+  }
+  over = true;
+  other.join();
+  EXPECT_GT(refused, 0);
+  EXPECT_GT(read, 0);
+}
+
+}  // namespace
+}  // namespace hpsdf::app

@@ -1,0 +1,158 @@
+// Outputs that cannot be written, and interrupts.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+
+#include "cli_fixture.h"
+#include "support/short_files.h"
+
+namespace hpsdf::app {
+namespace {
+
+using namespace cli;
+using Outputs = Cli;
+
+TEST_F(Outputs, unwritableOutputsAreRefusedBeforeTheWork) {
+  writeFile(at("file"), "x");
+  for (const std::string& output :
+       {at("none/f.hpsdf"), at("file/f.hpsdf"), folder_.path().string(), std::string("/dev/null")}) {
+    const auto start = Clock::now();
+    // The construction would take minutes, so that this test fails where the file is opened after it.
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12"}}, output);
+    EXPECT_LT(Clock::now() - start, std::chrono::seconds(10));
+  }
+  expectRefused({{"slice", field(), "-o", at("none/s.png"), "--cpu"}}, "none/s.png");
+  expectRefused({{"slice", field(), "-o", at("none/s.csv"), "--cpu"}}, "none/s.csv");
+  expectRefused({{"render", field(), "-o", at("none/s.png"), "--cpu"}}, "none/s.png");
+  expectRefused({{"query", field(), "-o", at("none/q.csv")}}, "none/q.csv");
+  expectRefused({{"jumps", field(), "-o", at("none/j.csv")}}, "none/j.csv");
+  expectRefused({{"report", field(), "-o", at("file")}}, "file");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST_F(Outputs, closedStandardOutputIsAnError) {
+  const Outcome outcome = run({.words = {"info", field()}, .stdoutClosed = true});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
+  EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+}
+
+/// Writing fails as on a full disk; older files stay and no unfinished ones remain.
+TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
+  const std::vector<std::vector<std::string>> calls = {
+      {"build", "builtin:torus", "--target-error", "1e-4", "-o"},
+      {"build", "builtin:torus", "--target-error", "1e-4", "--checkpoint", "-o"},
+      {"smooth", field(), "-o"},
+      {"blend", field(), "-o"},
+      {"bounds", field(), "-o"},
+      {"export", field(), "--resolution", "9", "-o"},
+      {"jumps", field(), "-o"},
+      {"slice", field(), "--cpu", "--size", "64x64", "-o"},
+      {"render", field(), "--cpu", "--size", "64x64", "-o"},
+      {"docs", "-o"}};
+  for (std::vector<std::string> words : calls) {
+    const std::string output = at(words[0] == "export"                          ? "old.cdf"
+                                  : words[0] == "slice" || words[0] == "render" ? "old.png"
+                                  : words[0] == "jumps"                         ? "old.csv"
+                                                                                : "old.hpsdf");
+    words.push_back(output);
+    SCOPED_TRACE(words[0]);
+    writeFile(output, "old");
+    const Outcome outcome = [&] {
+      const support::ShortFiles limit(512);
+      return run({words});
+    }();
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("hpsdf: error: " + output + ": writing failed"));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_EQ(readFile(output), "old");
+    EXPECT_THAT(namesIn(folder_.path()), ElementsAre(fs::path(output).filename().string()));
+    fs::remove(output);
+  }
+}
+
+TEST_F(Outputs, standardOutputOnAFullDiskIsAnError) {
+  for (const auto& words :
+       {std::vector<std::string>{"info", field()}, {"info", field(), "--json"}, {"query", field()}}) {
+    const Outcome outcome = run({.words = words, .input = "0 0 0\n", .output = "/dev/full"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
+    EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+  }
+}
+
+TEST_F(Outputs, readOnlyFoldersAreRefusedBeforeTheWork) {
+  for (const std::string& output :
+       {std::string("/proc/f.hpsdf"), std::string("/dev/full"), at(std::string(300, 'x'))}) {
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12"}}, output);
+    expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12", "--checkpoint"}}, output);
+  }
+  expectRefused({{"report", field(), "-o", at(std::string(300, 'x'))}}, "File name too long; check");
+}
+
+TEST_F(Outputs, outputsMustDifferFromInputs) {
+  fs::copy_file(field(), at("f.hpsdf"));
+  writeFile(at("mesh.obj"), kTetrahedron);
+  writeFile(at("points"), "0 0 0\n");
+  fs::create_symlink(at("f.hpsdf"), at("link.csv"));
+  const auto before = namesIn(folder_.path());
+  expectRefused({{"build", at("mesh.obj"), "-o", at("mesh.obj")}}, "mesh.obj", before);
+  expectRefused({{"query", at("f.hpsdf"), at("points"), "-o", at("f.hpsdf")}}, "f.hpsdf", before);
+  expectRefused({{"query", at("f.hpsdf"), at("points"), "-o", at("points")}}, "points", before);
+  expectRefused({{"slice", at("f.hpsdf"), "-o", at("link.csv"), "--cpu"}}, "link.csv", before);
+  expectRefused({{"run", "-e", "query " + at("f.hpsdf") + " " + at("points") + " output=" + at("points")}}, "points",
+                before);
+  EXPECT_EQ(readFile(at("f.hpsdf")), readFile(field()));
+  EXPECT_EQ(readFile(at("points")), "0 0 0\n");
+  EXPECT_EQ(readFile(at("mesh.obj")), kTetrahedron);
+}
+
+TEST_F(Outputs, interruptStopsTheConstruction) {
+  for (const auto& words :
+       {std::vector<std::string>{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"},
+        std::vector<std::string>{"report", "builtin:gear", "-o", at("report"), "--target-error", "1e-12"},
+        std::vector<std::string>{"frames", "builtin:gear", "-o", at("frames"), "--target-error", "1e-12"},
+        std::vector<std::string>{"turntable", field(), "-o", at("turn"), "--frames", "9999", "--size", "160x120",
+                                 "--cpu"},
+        std::vector<std::string>{"export", field(), "-o", at("grid.cdf"), "--resolution", "3", "--points", "1e8"}}) {
+    Process process({words});
+    process.waitForErrorLine();
+    const auto start = Clock::now();
+    process.send(SIGINT);
+    const Outcome outcome = process.finish();
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    EXPECT_EQ(outcome.status, 130) << outcome.err;
+    EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_LT(seconds, 5) << "the promise is one second; this machine may be busy";
+    EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+  }
+}
+
+/// A full pipe makes the process wait in the middle of writing its temporary file.
+TEST_F(Outputs, interruptOutsideAConstructionLeavesNothing) {
+  Process process({.words = {"query", field(), "-o", at("q.csv")}, .keepInputOpen = true});
+  for (int i = 0; i < 1000 && namesIn(folder_.path()).empty(); ++i) usleep(10000);
+  ASSERT_EQ(namesIn(folder_.path()).size(), 1u) << "the temporary file";
+  process.send(SIGTERM);
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 143);
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
+  EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+}
+
+TEST_F(Outputs, olderFileSurvivesAnInterrupt) {
+  fs::copy_file(field(), at("f.hpsdf"));
+  Process process({{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"}});
+  process.waitForErrorLine();
+  process.send(SIGINT);
+  EXPECT_EQ(process.finish().status, 130);
+  EXPECT_EQ(readFile(at("f.hpsdf")), readFile(field()));
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
+}
+
+}  // namespace
+}  // namespace hpsdf::app
