@@ -9,7 +9,7 @@ const bool kBlended = true;
 const int kWall = 31;     // stands for the depth of a neighbour at the domain's walls
 const int kDeepest = 20;  // greatest depth of a leaf
 
-// Whether a point of a leaf, in local coordinates, lies in a blend zone.
+// Returns true if a point of a leaf, in local coordinates, lies in a blend zone.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
 // The cells of depth `level` whose boxes come within `near` (up to 0.5) of their edges of a point: one or two along each

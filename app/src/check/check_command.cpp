@@ -135,7 +135,7 @@ struct Candidate {
   std::string renderer = {};
 };
 
-/// What the last check's scripts wrote, wrong pictures left out.
+/// Lists the results of the last check's scripts, without negative controls.
 std::vector<Candidate> candidates(const Json& results, const fs::path& from) {
   std::vector<Candidate> found;
   for (const Json& item : results.at("items")) {
@@ -166,7 +166,7 @@ std::array<std::size_t, 2> sizeOf(const fs::path& file) {
   return {std::size_t(image.width), std::size_t(image.height)};
 }
 
-/// What is known of the baseline so far; nothing where there is none, or no more than its bytes.
+/// Reads the description of the existing baseline; returns nothing where there is no baseline or no description.
 std::optional<BaselineFacts> olderFacts(const fs::path& baseline) {
   if (!fs::exists(baseline) || !fs::exists(factsFile(baseline))) return std::nullopt;
   return loadFacts(baseline);

@@ -38,7 +38,7 @@ BuildOptions buildOptions(const Arguments& arguments);
 /// The inside test that they ask for.
 DistanceOptions distanceOptions(const Arguments& arguments);
 
-/// Whether they ask for the mesh to be scaled and centred.
+/// Returns true if the arguments ask for the mesh to be scaled and centred.
 bool wantsNormalized(const Arguments& arguments);
 
 /// The domain that they ask for around a surface's box.

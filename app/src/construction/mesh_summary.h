@@ -1,5 +1,5 @@
 #pragma once
-// What is known of a mesh, for people and for machines.
+// Summaries of meshes as text and as JSON.
 
 #include <string>
 

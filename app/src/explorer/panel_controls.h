@@ -1,5 +1,5 @@
 #pragma once
-// What all panels share: controls that ask for commands, and helpers that draw into the current column.
+// The panels share these controls, which ask for commands, and functions that draw into the current column.
 
 #include <fmt/format.h>
 #include <imgui.h>

@@ -112,7 +112,7 @@ struct Command {
   bool includesScript = false;    ///< the lines of the script that the parameter `script` names replace the command
 };
 
-/// How help texts present the parameter of a name, in whichever command it occurs.
+/// Group and audience of a parameter in help texts, for every command that has a parameter of this name.
 struct ParameterPresentation {
   std::string_view name;
   std::string_view group;

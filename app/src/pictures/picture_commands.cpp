@@ -32,7 +32,7 @@ SliceFormat sliceFormat(const std::string& file) {
                           file, kind));
 }
 
-/// What the colours of a slice would stand for; NaN outside the domain.
+/// Returns the numbers that the colours of a slice stand for; NaN outside the domain.
 std::vector<float> rawValues(const Field& field, const render::SliceView& view, const render::ViewBuffers& buffers,
                              render::ColorBy what, const render::ReferenceData& reference) {
   if (render::isQuantity(what)) return render::quantityAt(field, view, buffers, what, reference);

@@ -12,7 +12,7 @@ Recording::Recording(Explorer& explorer, std::vector<std::string> lines)
 Recording::~Recording() { explorer_.onCommand = nullptr; }
 
 void Recording::add(const std::string& line, bool replaces) {
-  // Of the many sizes that a window has while it is resized, only the last is recorded.
+  // A window has many sizes while it is resized; only the last is recorded.
   const auto isSize = [](const std::string& any) { return any.starts_with("show size=") && any.rfind(' ') == 4; };
   if (replaces || (isSize(line) && !lines_.empty() && isSize(lines_.back())))
     lines_.back() = line;

@@ -9,7 +9,7 @@
 
 namespace hpsdf {
 
-/// What an `Error` is about, so that callers need not search its message.
+/// The kind of thing that an `Error` is about, so that callers need not search its message.
 enum class ErrorKind : std::uint8_t {
   general,  ///< none of the kinds below
   option,   ///< an option, or a parameter of a shape, has a value that is not accepted

@@ -34,7 +34,7 @@ double safeDistance(const Field& field, const Vector3& x);
 /// The result of tracing a ray by safe distances.
 struct SafeTrace {
   double length = 0;  ///< length of the ray, in the field's units, that certainly does not touch the surface
-  /// Whether the surface may lie within `slack` of the ray at this length. Rounding may add to the slack far from the
+  /// True if the surface may lie within `slack` of the ray at this length. Rounding may add to the slack far from the
   /// domain. If false, the ray left the domain.
   bool mayTouch = false;
   int steps = 0;

@@ -31,7 +31,7 @@ struct Group {
   bool hasBothOrientations() const { return reversed > 0; }
   /// The first triangle with the more frequent orientation.
   std::uint32_t representative() const { return reversed > same ? firstReversed : first; }
-  /// How many more triangles have the representative's orientation than the opposite one.
+  /// The number by which more triangles have the representative's orientation than the opposite one.
   int excess() const { return std::abs(same - reversed); }
 };
 
@@ -124,7 +124,7 @@ std::vector<char> wallsOf(const Groups& groups) {
   return walls;
 }
 
-/// How many triangles of a group stay.
+/// The numbers of triangles of a group that stay.
 struct Kept {
   int same = 1;      ///< triangles with the representative's orientation
   int reversed = 0;  ///< triangles with the opposite orientation

@@ -80,7 +80,7 @@ class BodyView {
     return project(camera_, point, buffers_.width, buffers_.height);
   }
 
-  /// Whether a point lies before the eye, so that its position in the picture is defined.
+  /// Returns true if a point lies before the eye, so that its position in the picture is defined.
   bool isBeforeEye(const PicturePoint& p) const {
     return camera_.projection == Projection::orthographic || p.depth >= leastDepth_;
   }

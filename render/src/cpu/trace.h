@@ -73,7 +73,7 @@ class TraceField {
  private:
   class March;
 
-  /// Whether more than one leaf may have a weight at the point.
+  /// True if more than one leaf may have a weight at the point.
   bool inBlendZone(const CellPoint& at) const;
 
   Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;

@@ -104,8 +104,8 @@ Ball ballAround(const BodyMesh& mesh) {
   return ball;
 }
 
-/// Whether a ball may be visible: whether it extends inside the left, right, lower and upper planes of the frustum and
-/// the far plane. `center` is relative to the eye.
+/// Returns true if a ball may be visible, that is, if it extends inside the left, right, lower and upper planes of the
+/// frustum and the far plane. `center` is relative to the eye.
 bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
   constexpr double kRounding = 1e-6;
   for (const auto& [axis, sign] : {std::pair(0, 1), {0, -1}, {1, 1}, {1, -1}, {2, -1}}) {

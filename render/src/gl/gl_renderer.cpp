@@ -342,7 +342,7 @@ class GlRenderer final : public Renderer {
     glDrawArrays(GL_POINTS, 0, blocks);
   }
 
-  /// Whether the march of a pixel in the result of the hit pass has not ended.
+  /// Returns true if the march of a pixel in the result of the hit pass has not ended.
   static bool isUnderWay(const Texel& texel) { return texel[0] == kNoCell && texel[1] != 0; }
 
   /// Copies a pixel of the tile to the view.

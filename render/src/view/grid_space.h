@@ -42,7 +42,7 @@ struct SliceGeometry {
 /// section are looked up at the same distance.
 constexpr double kClipNudge = 1e-6;
 
-/// Whether a clipping plane removes its side of greater coordinates, on which the eye is.
+/// Returns true if a clipping plane removes its side of greater coordinates, on which the eye is.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
 /// The rays of a camera. With across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, the ray of pixel (x, y) starts

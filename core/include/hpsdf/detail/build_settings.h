@@ -18,7 +18,7 @@ namespace hpsdf {
 /// word for a choice; one for each axis of the grid; none where the setting asks for nothing.
 struct BuildSetting {
   enum class Type : std::uint8_t { number, wholeNumber, wholeNumbers, choice, flag };
-  /// How a setting ends the construction.
+  /// The way in which a setting ends the construction.
   enum class Ending : std::uint8_t {
     none,           ///< it does not
     target,         ///< by the target error

@@ -13,7 +13,7 @@
 
 namespace hpsdf {
 
-/// How a field was built: stored with it, shown by `info`. Lengths are in the field's own units.
+/// The record of how a field was built: stored with it, shown by `info`. Lengths are in the field's own units.
 struct FieldMetadata {
   Source source;
   /// The settings as they took effect: where errors by distance were asked for, τ is the error reached and θ the

@@ -36,7 +36,7 @@ class Refiner {
           const GrowthObserver& observer)
       : setup_(setup), fitter_(fitter), state_(state), observer_(observer) {}
 
-  /// Nothing where the leaf has reached the limits of degree and depth.
+  /// Returns nothing where the leaf has reached the limits of degree and depth.
   std::optional<Refinement> allowed(const BuildNode& leaf) const;
   /// False once the limit of steps or bytes is reached.
   bool mayStep() const;

@@ -5,7 +5,7 @@
 
 namespace hpsdf::query {
 
-/// How much a field changes when its coefficients are rounded to float, in units of length.
+/// The change of a field when its coefficients are rounded to float, in units of length.
 struct Rounding {
   double rms = 0;
   double max = 0;  ///< bound of the change anywhere

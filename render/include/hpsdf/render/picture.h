@@ -47,7 +47,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
                   const ReferenceData& reference = {});
 
-/// What the middle sample of a picture's pixel shows.
+/// The content of the middle sample of a picture's pixel.
 struct Pick {
   /// World units. A position that rounding has moved across a face is moved back into the cell, by at most 1e-5 of the
   /// domain.

@@ -20,7 +20,7 @@
 
 namespace hpsdf::render {
 
-/// What the colours of a view stand for.
+/// The quantity that the colours of a view stand for.
 enum class ColorBy : std::uint8_t {
   normal,    ///< the light on a surface; not for slices
   degree,    ///< degree of the cell

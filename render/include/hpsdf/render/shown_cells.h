@@ -5,7 +5,7 @@
 
 namespace hpsdf::render {
 
-/// How the octree's leaves are drawn in the picture of a surface.
+/// The style in which the octree's leaves are drawn in the picture of a surface.
 enum class CellStyle : std::uint8_t {
   none,
   lines,  ///< the edges of the cells; edges fade where their cells are small in the picture

@@ -109,8 +109,8 @@ enum class Shown : std::uint8_t {
   box,      ///< a cell drawn as a solid box
 };
 
-/// What the pixels of a view see, rows top to bottom; the colouring reads nothing else. A pixel of a slice outside of
-/// the domain, or of a ray that misses the surface, has `cell` kNoCell and 0 in the other buffers.
+/// The data that the pixels of a view see, rows top to bottom; the colouring reads nothing else. A pixel of a slice
+/// outside of the domain, or of a ray that misses the surface, has `cell` kNoCell and 0 in the other buffers.
 struct ViewBuffers {
   int width = 0;
   int height = 0;
@@ -129,13 +129,13 @@ struct ViewBuffers {
   /// body has the body's normal and distance; the other buffers hold the values of a ray that misses the surface.
   std::vector<std::uint32_t> body;
 
-  /// Whether the pixel shows a part of the field.
+  /// Returns true if the pixel shows a part of the field.
   bool hit(std::size_t pixel) const { return cell[pixel] != kNoCell; }
   bool shows(std::size_t pixel, Shown what) const {
     return hit(pixel) && (shown.empty() ? what == Shown::surface : shown[pixel] == what);
   }
   bool showsBody(std::size_t pixel) const { return !body.empty() && body[pixel] != kNoBody; }
-  /// Whether the pixel shows anything but the backdrop.
+  /// Returns true if the pixel shows anything but the backdrop.
   bool covered(std::size_t pixel) const { return hit(pixel) || showsBody(pixel); }
 };
 
