@@ -20,9 +20,9 @@
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
 #include "picture/cracks.h"
+#include "scene/section.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
-#include "scene/section.h"
 
 namespace hpsdf::render {
 namespace {

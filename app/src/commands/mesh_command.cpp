@@ -106,7 +106,8 @@ Json verdictJson(const MeshReport& report, const MeshDefects& defects) {
 }
 
 Json checkJson(const SignCheck& check) {
-  Json json{{"places", check.points}, {"nearer_than", check.tolerance}, {"near", check.tooNear}, {"wrong", check.wrong}};
+  Json json{
+      {"places", check.points}, {"nearer_than", check.tolerance}, {"near", check.tooNear}, {"wrong", check.wrong}};
   if (check.wrong > 0) json["worst"] = {{"at", vectorJson(check.worst)}, {"distance", check.worstDistance}};
   return json;
 }
@@ -185,8 +186,8 @@ std::string repairText(const RepairedMesh& repairedMesh, const std::string& file
   add(report.reversed, "reversed the whole mesh");
   std::string text = summaryRow("repaired", done.empty() ? "nothing to do" : done);
   if (repairedMesh.imported.report.inconsistentEdges > 0)
-    text +=
-        summaryRow("left", countOf(repairedMesh.imported.report.inconsistentEdges, "edge", "edges") + " of surfaces that have one side only");
+    text += summaryRow("left", countOf(repairedMesh.imported.report.inconsistentEdges, "edge", "edges") +
+                                   " of surfaces that have one side only");
   return text + summaryRow("written", printable(file) + ": " + closednessText(report));
 }
 

@@ -71,7 +71,8 @@ class SpawnSettings {
     posix_spawn_file_actions_addopen(&actions_, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     sigset_t ours;
     sigemptyset(&ours);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ours, signal);  // Ctrl-C reaches both processes; this one reacts
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+      sigaddset(&ours, signal);  // Ctrl-C reaches both processes; this one reacts
     posix_spawnattr_init(&attributes_);
     posix_spawnattr_setsigmask(&attributes_, &ours);
     posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);

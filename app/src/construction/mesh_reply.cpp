@@ -22,8 +22,8 @@ constexpr std::uint64_t kLongestText = 1 << 16;
 using Triangle = std::array<std::uint32_t, 3>;
 static_assert(sizeof(Vector3) == 3 * sizeof(double) && sizeof(Triangle) == 12, "arrays are sent as they lie in memory");
 
-/// The beginning of a reply; vertices, triangles and text follow. It needs neither a version nor a byte order, since one
-/// program on one machine writes and reads it.
+/// The beginning of a reply; vertices, triangles and text follow. It needs neither a version nor a byte order, since
+/// one program on one machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
   std::uint64_t checksum = 0;  ///< of all bytes after it

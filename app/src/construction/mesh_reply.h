@@ -30,12 +30,12 @@ class DamagedReply : public Error {
 /// Length of the header with which every reply begins.
 extern const std::size_t kReplyHeaderBytes;
 
-/// Length of the whole reply, by its first `kReplyHeaderBytes` bytes or more. Throws `DamagedReply` when there are fewer,
-/// or when they are no header.
+/// Length of the whole reply, by its first `kReplyHeaderBytes` bytes or more. Throws `DamagedReply` when there are
+/// fewer, or when they are no header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
-/// Parses a whole reply. It allocates memory only for elements that are there, and checks a mesh's indices, coordinates,
-/// box and checksum. Throws `DamagedReply`.
+/// Parses a whole reply. It allocates memory only for elements that are there, and checks a mesh's indices,
+/// coordinates, box and checksum. Throws `DamagedReply`.
 MeshReply parseReply(std::span<const std::byte> bytes);
 
 /// Receives the bytes of a reply in pieces.

@@ -1,7 +1,7 @@
 #include "explorer/setting_panels.h"
 
-#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/field.h"
 #include "pictures/picture_arguments.h"
 #include "pictures/picture_names.h"

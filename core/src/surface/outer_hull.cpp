@@ -189,7 +189,8 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
     const Corners corners = cornersOf(t);
     std::vector<Cutter> cutters;
     for (const Pair& pair : std::span(pairs).subspan(firsts[n], firsts[n + 1] - firsts[n])) {
-      if (mesh::haveSameCorners(mesh.triangles[t], mesh.triangles[pair[1]])) continue;  // a coincident triangle cuts nothing
+      if (mesh::haveSameCorners(mesh.triangles[t], mesh.triangles[pair[1]]))
+        continue;  // a coincident triangle cuts nothing
       const Corners other = cornersOf(pair[1]);
       cutters.push_back({pair[1], other, areCoplanar(corners, other)});
     }

@@ -28,7 +28,9 @@ std::string describeSource(const Field& field) {
   return name.empty() ? "unnamed field" : name;
 }
 
-std::string describeTarget(const Field& field) { return "τ = " + formatNumber(field.metadata().settings.targetError.weighted(), 3); }
+std::string describeTarget(const Field& field) {
+  return "τ = " + formatNumber(field.metadata().settings.targetError.weighted(), 3);
+}
 
 std::string describePlane(const std::string& name, const Plane& plane) {
   if (const auto* axis = std::get_if<AxisPlane>(&plane))

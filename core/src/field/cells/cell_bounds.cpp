@@ -264,7 +264,8 @@ struct Disagreement {
 
 /// Bounds the difference of the polynomials of two touching leaves where both have a weight: on either side of their
 /// interface, at most as far as the smaller leaf's edge times the blend width.
-Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small, const query::OctreeNode& large) {
+Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small,
+                                const query::OctreeNode& large) {
   const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
   const int levels = small.depth - large.depth;
   std::array<Rows, 3> smallRows, largeRows;

@@ -129,7 +129,8 @@ std::vector<double> CellFitter::distances(const Box& cell, std::span<const Vecto
   return values;
 }
 
-bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const {
+bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection,
+                             std::span<const double> samples) const {
   if (!(options_.band > 0)) return false;
   double clearance = 0;  // lower bound of the cell's distance from the surface, since Φ is 1-Lipschitz
   for (std::size_t i = 0; i < samples.size(); ++i) {

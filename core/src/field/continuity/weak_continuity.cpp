@@ -22,8 +22,9 @@ constexpr std::size_t kChunk = 4096;
 template <std::size_t Sums, typename F>
 std::array<double, Sums> sumChunks(std::size_t items, const F& f) {
   std::vector<std::array<double, Sums>> parts(detail::chunksOf(items, kChunk));
-  detail::forEachChunk(items, kChunk,
-               [&](std::size_t chunk, std::size_t first, std::size_t count) { f(first, first + count, parts[chunk]); });
+  detail::forEachChunk(items, kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+    f(first, first + count, parts[chunk]);
+  });
   std::array<double, Sums> total{};
   for (const auto& part : parts)
     for (std::size_t s = 0; s < Sums; ++s) total[s] += part[s];
@@ -36,7 +37,9 @@ double squaredNorm(const std::vector<double>& x) {
   })[0];
 }
 
-void report(const Progress& progress, double fraction) { progress.update("closing jumps", std::clamp(fraction, 0.0, 1.0)); }
+void report(const Progress& progress, double fraction) {
+  progress.update("closing jumps", std::clamp(fraction, 0.0, 1.0));
+}
 
 /// Solves (M + λ)d = −Mx₀ by conjugate gradients with the diagonal as preconditioner.
 class ConjugateGradients {

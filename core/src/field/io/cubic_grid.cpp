@@ -217,17 +217,19 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
   const double near = grid.cellSize().norm();
   std::vector<Differences> parts(detail::chunksOf(points, kChunk));
   withThreads(threads, [&] {
-    detail::forEachChunk(points, kChunk, progress, "measuring", [&](std::size_t chunk, std::size_t first, std::size_t count) {
-      std::vector<Vector3> at(count);
-      std::vector<double> values(count);
-      for (std::size_t n = 0; n < count; ++n) at[n] = detail::Random(seed, first + n).inBox(grid.domain);
-      field.values(at, values);
-      for (std::size_t n = 0; n < count; ++n) {
-        const double difference = std::abs(grid.value(at[n]) - values[n]);
-        parts[chunk].everywhere.add(difference);
-        if (std::abs(values[n]) <= near) parts[chunk].nearSurface.add(difference);
-      }
-    });
+    detail::forEachChunk(points, kChunk, progress, "measuring",
+                         [&](std::size_t chunk, std::size_t first, std::size_t count) {
+                           std::vector<Vector3> at(count);
+                           std::vector<double> values(count);
+                           for (std::size_t n = 0; n < count; ++n)
+                             at[n] = detail::Random(seed, first + n).inBox(grid.domain);
+                           field.values(at, values);
+                           for (std::size_t n = 0; n < count; ++n) {
+                             const double difference = std::abs(grid.value(at[n]) - values[n]);
+                             parts[chunk].everywhere.add(difference);
+                             if (std::abs(values[n]) <= near) parts[chunk].nearSurface.add(difference);
+                           }
+                         });
   });
   Differences all;
   for (const Differences& part : parts) {

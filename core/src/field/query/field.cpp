@@ -129,9 +129,9 @@ Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& 
             .depth = leaf.depth,
             .error = 0};
   const double volume = cellSize(field, leaf.depth).prod();
-  cell.error =
-      std::visit([&](const auto& c) { return basis::topDegreeError(c.data() + node::offset(bits), cell.degree, volume); },
-                 field.coefficients);
+  cell.error = std::visit(
+      [&](const auto& c) { return basis::topDegreeError(c.data() + node::offset(bits), cell.degree, volume); },
+      field.coefficients);
   return cell;
 }
 
