@@ -222,7 +222,7 @@ void checkMesh(const Arguments& arguments) {
   for (const char* name : kCameraParameters) requireOwner(arguments, name, "picture", draws);
   if (!draws) return;
   const std::string file = arguments.text("picture");
-  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  requirePng(file);
   cameraPicture(arguments);
   backend(arguments);
 }

@@ -15,7 +15,6 @@
 #include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/session.h"
-#include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -71,14 +70,6 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
   }
 }
 
-void report(Session& session, const Arguments& arguments, int width, int height, const render::Renderer& renderer) {
-  const std::string file = arguments.text("output");
-  if (session.wantsJson(arguments))
-    return printJson(session.console().out,
-                     {{"output", file}, {"width", width}, {"height", height}, {"renderer", renderer.description()}});
-  session.console().out << fmt::format("{}: {}x{}, {}\n", file, width, height, renderer.description());
-}
-
 void runSlice(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const SliceFormat format = sliceFormat(file);
@@ -111,12 +102,12 @@ void runSlice(Session& session, const Arguments& arguments) {
       writeCsv(view, buffers, out);
     out.commit();
   }
-  report(session, arguments, picture.width, picture.height, renderer);
+  reportPicture(session, arguments, file, picture.width, picture.height, renderer.description());
 }
 
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+  requirePng(file);
   render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
   checkWritable(file);
@@ -128,7 +119,7 @@ void runRender(Session& session, const Arguments& arguments) {
   session.setPicture(render::drawSurface(renderer, field, picture, reference));
   savePng(session.picture().image, file);
   noteOddSurface(session.console(), field, picture, session.picture().seen);
-  report(session, arguments, picture.width, picture.height, renderer);
+  reportPicture(session, arguments, file, picture.width, picture.height, renderer.description());
 }
 
 using render::ColorBy;
