@@ -30,5 +30,6 @@ void* operator new(std::size_t size, const std::nothrow_t&) noexcept {  // stabl
   return std::malloc(size);
 }
 void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+// GCC takes the free of an inlined delete for a mismatch.
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }

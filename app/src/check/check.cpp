@@ -103,11 +103,11 @@ void reverseVerdict(CheckedItem& item, Verdict stated) {
                fmt::format("it is meant to fail with '{}', but: {}", verdictText(stated), item.problem));
 }
 
-using Controls = std::map<int, Verdict>;  ///< verdicts that negative controls must fail with, by their lines
+using NegativeControls = std::map<int, Verdict>;  ///< verdicts that negative controls must fail with, by their lines
 
 /// Turns comments "# wrong REASON: COMMAND" into commands. Lines and columns stay the same, for error messages.
-Controls enableControls(const std::string& file, std::string& text) {
-  Controls controls;
+NegativeControls enableControls(const std::string& file, std::string& text) {
+  NegativeControls controls;
   std::size_t begin = 0;
   for (int line = 1; begin < text.size(); ++line) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
@@ -177,7 +177,7 @@ class ScriptCheck {
 
   void runCalls(const Registry& registry, const Console& console) {
     std::string text = readTextFile(file_);
-    const Controls controls = enableControls(file_, text);
+    const NegativeControls controls = enableControls(file_, text);
     Variables variables = request_.variables;
     variables["out"] = actual_.string();
     variables["wrong"] = wrong_.string();

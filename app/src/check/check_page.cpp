@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kStyle = R"(
+constexpr std::string_view kCheckStyle = R"(
 table.items th, table.items td { padding-right: 1.2rem; }
 table.items tr.failed td { font-weight: 600; }
 td.number { text-align: right; }
@@ -155,7 +155,7 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page) {
   const std::string subtitle = failures == 0
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
-  std::string html = htmlHead(page.title, subtitle, kStyle);
+  std::string html = htmlHead(page.title, subtitle, kCheckStyle);
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
   html += fmt::format("<code>{}</code>\n", htmlEscaped(page.checkCommand));
   for (const CheckedItem& item : outcome.items)

@@ -10,6 +10,7 @@
 #include "hpsdf/detail/line.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/line_plot.h"
+#include "pictures/picture_arguments.h"
 #include "session/field_argument.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -24,11 +25,6 @@ bool isPicture(const std::string& file) {
     throw Error(
         fmt::format("{}: unknown kind of output '{}'; expected .png for a plot or .csv for the samples", file, kind));
   return kind == ".png";
-}
-
-Vector3 pointOf(const Arguments& arguments, std::string_view name) {
-  const auto numbers = arguments.numbers(name);
-  return {numbers[0], numbers[1], numbers[2]};
 }
 
 Line lineOf(const Field& field, const Arguments& arguments) {

@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "construction/mesh_reply.h"
+#include "files/other_program.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
@@ -43,7 +44,7 @@ constexpr const char* kCommand = "__read-mesh";  // hidden command; FILE SECONDS
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
 constexpr auto kTick = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
-constexpr double kQuietSeconds = 2;                    // a busy machine starts a process slowly
+constexpr double kSilentSeconds = 2;                   // a busy machine starts a process slowly
 
 // An idle machine reads 20 MB a second and takes 4 to 9 bytes of memory for one of the file (docs/meshes.md).
 constexpr double kSeconds = 60;
@@ -92,14 +93,6 @@ class SpawnSettings {
   posix_spawnattr_t attributes_;
 };
 
-/// Calls waitpid again where a signal interrupts it.
-pid_t await(pid_t id, int& status, int options) {
-  for (;;) {
-    const pid_t ended = waitpid(id, &status, options);
-    if (ended >= 0 || errno != EINTR) return ended;
-  }
-}
-
 /// The reading process and the pipe from its standard output. The destructor kills it if it still runs.
 class ReadingProcess {
  public:
@@ -125,7 +118,7 @@ class ReadingProcess {
     if (!running_) return;
     kill(id_, SIGKILL);
     int status = 0;
-    await(id_, status, 0);
+    waitForProcess(id_, status, 0);
   }
   ReadingProcess(const ReadingProcess&) = delete;
   ReadingProcess& operator=(const ReadingProcess&) = delete;
@@ -148,7 +141,7 @@ class ReadingProcess {
   /// The exit status; nothing while the process runs.
   std::optional<int> ended() {
     int status = 0;
-    if (await(id_, status, WNOHANG) == 0) return std::nullopt;
+    if (waitForProcess(id_, status, WNOHANG) == 0) return std::nullopt;
     running_ = false;
     return status;
   }
@@ -234,7 +227,7 @@ class Reading {
     if (elapsed > limits_.seconds)
       throw Error(fmt::format("{}: reading it takes more than {} s; check or export the file again, or set {} above {}",
                               file_.string(), limits_.seconds, kSecondsVariable, limits_.seconds));
-    if (elapsed > kQuietSeconds && progress_.report) progress_.report(task_, 0);  // the fraction is unknown
+    if (elapsed > kSilentSeconds && progress_.report) progress_.report(task_, 0);  // the fraction is unknown
   }
 
   Error died() {

@@ -55,15 +55,14 @@ pid_t start(const fs::path& program, const std::vector<std::string>& arguments, 
   return id;
 }
 
-/// Calls waitpid, again where a signal interrupts it.
-pid_t await(pid_t id, int& status, int options) {
+}  // namespace
+
+pid_t waitForProcess(pid_t id, int& status, int options) {
   for (;;) {
     const pid_t ended = waitpid(id, &status, options);
     if (ended >= 0 || errno != EINTR) return ended;
   }
 }
-
-}  // namespace
 
 std::optional<fs::path> findProgram(const std::string& name) {
   const char* path = std::getenv("PATH");
@@ -80,10 +79,10 @@ int runOtherProgram(const fs::path& program, const std::vector<std::string>& arg
                     const fs::path& log, const std::function<bool()>& cancelled) {
   const pid_t id = start(program, arguments, SpawnActions(folder, log));
   int status = 0;
-  while (await(id, status, WNOHANG) == 0) {
+  while (waitForProcess(id, status, WNOHANG) == 0) {
     if (cancelled && cancelled()) {
       kill(id, SIGKILL);
-      await(id, status, 0);
+      waitForProcess(id, status, 0);
       throw Cancelled();
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -1,6 +1,8 @@
 #pragma once
 // Runs other programs without a shell.
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -11,6 +13,9 @@ namespace hpsdf::app {
 
 /// Searches PATH for an executable file of this name.
 std::optional<std::filesystem::path> findProgram(const std::string& name);
+
+/// Calls waitpid, again where a signal interrupts it.
+pid_t waitForProcess(pid_t id, int& status, int options);
 
 /// Runs the program in `folder` with an empty standard input; standard output and standard error go to `log`. Returns
 /// the exit status, or 128 + the signal that ended it. Throws `Error` where the program cannot be started, and

@@ -11,6 +11,7 @@
 
 #include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -19,7 +20,6 @@ constexpr std::size_t kBatch = 16384;
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
 bool isSeparator(char c) { return c == ',' || c == ';' || kBlanks.find(c) != std::string_view::npos; }
-bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
 /// Parses exactly three numbers, finite or not, separated by blanks and at most one comma or semicolon.
 std::optional<Vector3> parsePoint(std::string_view text) {

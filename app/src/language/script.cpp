@@ -22,10 +22,6 @@ constexpr std::size_t kDeepestInclude = 16;  // the same limit as for scripts th
 constexpr std::size_t kMostCalls = 100'000;
 constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // sum over all replacements of $name
 
-bool isLower(char c) { return c >= 'a' && c <= 'z'; }
-bool isDigit(char c) { return c >= '0' && c <= '9'; }
-bool isLetter(char c) { return isLower(c) || (c >= 'A' && c <= 'Z') || c == '_'; }
-
 /// True for a name of a variable: letters, digits and _, not starting with a digit.
 bool isIdentifier(std::string_view name) {
   return !name.empty() && isLetter(name[0]) &&

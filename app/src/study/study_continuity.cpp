@@ -25,7 +25,7 @@ namespace {
 /// Width of the region near the surface, as a share of the domain's longest edge.
 constexpr double kNear = 0.01;
 
-struct Row {
+struct ContinuityRow {
   std::string mesh;
   bool enriched = false;
   double weight = 0;  ///< λ; 0 without weak continuity
@@ -38,8 +38,8 @@ struct Row {
 
 /// A row with its ratios to `first`, the mesh's field without enrichment and without weak continuity.
 struct Compared {
-  const Row& row;
-  const Row& first;
+  const ContinuityRow& row;
+  const ContinuityRow& first;
   double jump() const { return row.jump / first.jump; }
   double greatestJump() const { return row.greatestJump / first.greatestJump; }
   double rms() const { return row.rms / first.rms; }
@@ -59,15 +59,15 @@ class ContinuityStudy {
     takeSamples();
   }
 
-  std::vector<Row> run() {
-    std::vector<Row> rows;
+  std::vector<ContinuityRow> run() {
+    std::vector<ContinuityRow> rows;
     for (const bool enriched : {false, true}) {
       BuildOptions options = input_.options;
       options.enrich = enriched;
       const auto begin = std::chrono::steady_clock::now();
       const Field built = withProgress(
           console_, [&](const Progress& progress) { return build(*input_.exact, input_.domain, options, progress); });
-      Row row{.mesh = mesh_, .enriched = enriched, .buildSeconds = input_.setUpSeconds + secondsSince(begin)};
+      ContinuityRow row{.mesh = mesh_, .enriched = enriched, .buildSeconds = input_.setUpSeconds + secondsSince(begin)};
       measure(built, row);
       rows.push_back(row);
       for (const double weight : arguments_.numbers("weights")) {
@@ -96,7 +96,7 @@ class ContinuityStudy {
     });
   }
 
-  void measure(const Field& field, Row& row) const {
+  void measure(const Field& field, ContinuityRow& row) const {
     const Jumps jumps = withProgress(
         console_, [&](const Progress& progress) { return findJumps(field, input_.options.threads, progress); });
     row.jump = jumps.value.rms;
@@ -125,7 +125,7 @@ std::string csv(const std::vector<Compared>& rows) {
       "mesh,enriched,weight,jump_rms,jump_rms_ratio,jump_max,jump_max_ratio,rms,rms_ratio,near_rms,near_rms_ratio,"
       "bytes,bytes_ratio,iterations,seconds,seconds_ratio\n";
   for (const Compared& ratio : rows) {
-    const Row& row = ratio.row;
+    const ContinuityRow& row = ratio.row;
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", quoted(row.mesh), int(row.enriched),
                         row.weight > 0 ? fmt::format("{}", row.weight) : "", row.jump, ratio.jump(), row.greatestJump,
                         ratio.greatestJump(), row.rms, ratio.rms(), row.nearRms, ratio.nearRms(), row.bytes,
@@ -137,7 +137,7 @@ std::string csv(const std::vector<Compared>& rows) {
 Json json(const std::vector<Compared>& rows) {
   Json all = Json::array();
   for (const Compared& ratio : rows) {
-    const Row& row = ratio.row;
+    const ContinuityRow& row = ratio.row;
     all.push_back({{"mesh", row.mesh},
                    {"enriched", row.enriched},
                    {"weight", row.weight > 0 ? Json(row.weight) : Json()},
@@ -162,7 +162,7 @@ Json json(const std::vector<Compared>& rows) {
 std::string table(const std::vector<Compared>& rows) {
   std::string text, mesh;
   for (const Compared& ratio : rows) {
-    const Row& row = ratio.row;
+    const ContinuityRow& row = ratio.row;
     if (row.mesh != mesh) {
       mesh = row.mesh;
       text +=
@@ -186,11 +186,11 @@ void runContinuity(Session& session, const Arguments& arguments) {
   const std::vector<std::string> meshes = arguments.texts("mesh");
   for (std::size_t n = 0; n < meshes.size(); ++n)
     buildArguments(session, arguments, n);  // reports mistakes before the long work
-  std::vector<std::vector<Row>> all;
+  std::vector<std::vector<ContinuityRow>> all;
   for (std::size_t n = 0; n < meshes.size(); ++n) all.push_back(ContinuityStudy(session, arguments, n).run());
   std::vector<Compared> rows;
   for (const auto& ofMesh : all)
-    for (const Row& row : ofMesh) rows.push_back({row, ofMesh.front()});
+    for (const ContinuityRow& row : ofMesh) rows.push_back({row, ofMesh.front()});
 
   folder.write("continuity.csv", csv(rows));
   folder.write("continuity.json", json(rows).dump(2) + "\n");

@@ -32,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array kStrategies = {Strategy::hp, Strategy::h2, Strategy::h1};
-constexpr std::array kColors = {"#1683ab", "#d1721b", "#6b7280"};
+constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
 
 /// The figures of a field during its construction. Errors are scaled to a mesh with a longest side of 2.
 struct Stage {
@@ -250,7 +250,7 @@ std::string plotScript(const Convergence& convergence) {
   for (std::size_t n = 0; n < convergence.curves.size(); ++n)
     for (const auto& [column, what, style] : kinds) {
       script += fmt::format("{}\"plot.dat\" index {} using 3:{} {} lc rgb \"{}\" title \"{}, {}\"", separator, n,
-                            column, style, kColors[n], strategyName(convergence.curves[n].strategy), what);
+                            column, style, kCurveColors[n], strategyName(convergence.curves[n].strategy), what);
       separator = ", \\\n     ";
     }
   return script + "\n";

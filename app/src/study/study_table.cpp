@@ -102,21 +102,21 @@ std::string cssColor(const render::Color& color) {
   return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
 }
 
-constexpr int kBarHeight = 18;
+constexpr int kShareBarHeight = 18;
 
 /// An SVG picture of that width with the given elements.
 std::string rowSvg(int width, const std::string& parts) {
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
-      width, kBarHeight, parts);
+      width, kShareBarHeight, parts);
 }
 
 /// A rectangle in a level's colour. It contains the level's number if there is room.
 std::string partSvg(double from, double width, int level, const render::Color& color, const std::string& title) {
   std::string svg =
       fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
-                  from, width, kBarHeight, cssColor(color), title);
+                  from, width, kShareBarHeight, cssColor(color), title);
   const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
   if (width > 12)
     svg += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", from + width / 2,
@@ -242,7 +242,7 @@ Json jsonOf(const TableRow& row) {
           {"measured_max", row.error.max / row.scale()}};
 }
 
-constexpr std::string_view kStyle = R"(
+constexpr std::string_view kTableStyle = R"(
 body { max-width: none; }
 td, th { padding: .4rem .9rem .4rem 0; vertical-align: middle; }
 td { overflow-wrap: normal; white-space: nowrap; }
@@ -260,7 +260,7 @@ std::string legendHtml(const std::string& title, const Colors& colors) {
 std::string htmlOf(const std::vector<TableRow>& rows, const std::vector<RowPictures>& pictures) {
   std::string html =
       htmlHead("What hp-adaptive signed distance fields cost",
-               fmt::format("{} meshes, as in Table 1 of Koschier, Deul and Bender (2016)", rows.size()), kStyle);
+               fmt::format("{} meshes, as in Table 1 of Koschier, Deul and Bender (2016)", rows.size()), kTableStyle);
   html += legendHtml("Degree", pictures.front().degree.colors) + legendHtml("Depth", pictures.front().depth.colors);
   const auto addCells = [&](const char* tag, const TableRow& row, bool names) {
     for (const auto& [name, value] : cellsOf(row))

@@ -11,6 +11,10 @@
 
 namespace hpsdf::app {
 
+/// True for the digits and for the letters of ASCII and _; unlike the functions of <cctype>, in every locale.
+constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
+constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
 /// Separates thousands by commas: 1234567 becomes "1,234,567".
 std::string grouped(std::uint64_t number);
 

@@ -25,9 +25,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPollSeconds = 0.2;    // longest wait for an event, because Ctrl-C does not end a wait
-constexpr double kQuietSeconds = 0.06;  // time without an event after which a slow picture is drawn in full
-constexpr double kQuickSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
+constexpr double kPollSeconds = 0.2;     // longest wait for an event, because Ctrl-C does not end a wait
+constexpr double kRestSeconds = 0.06;    // time without an event after which a slow picture is drawn in full
+constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // pixels, the range of `show size`
 
 /// The reason of GLFW's last error.
@@ -164,7 +164,7 @@ class Window {
   void run() {
     draw(false);
     while (!ended()) {
-      glfwWaitEventsTimeout(explorer_.isStale() ? kQuietSeconds : kPollSeconds);
+      glfwWaitEventsTimeout(explorer_.isStale() ? kRestSeconds : kPollSeconds);
       const bool happened = takeEvents();
       if (ended()) break;
       if (happened)
@@ -316,8 +316,8 @@ class Window {
 
   /// Draws and shows a frame. `roughly` draws a picture that takes too long with fewer pixels.
   void draw(bool roughly) {
-    const bool slow = roughly && fullSeconds_ > kQuickSeconds;
-    const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kQuickSeconds))), 2, 4) : 1;
+    const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
+    const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
     const bool measures = explorer_.isStale() && shrink == 1;
     const auto start = Clock::now();
     const render::Image image = frame(shrink);

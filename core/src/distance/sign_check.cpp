@@ -13,7 +13,7 @@
 namespace hpsdf {
 namespace {
 
-constexpr std::size_t kChunk = 16;  // points of one parallel task
+constexpr std::size_t kSignsPerTask = 16;  // points of one parallel task
 
 /// Returns the random point with a number: even numbers lie in the box, odd ones beside a triangle.
 Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
@@ -62,7 +62,7 @@ SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std
   SignCheck check{.points = points, .tolerance = 1e-6 * size};
   Tally all;
   std::mutex adding;
-  detail::forEachChunk(points, kChunk, progress, "summing winding numbers",
+  detail::forEachChunk(points, kSignsPerTask, progress, "summing winding numbers",
                        [&](std::size_t, std::size_t first, std::size_t count) {
                          Tally tally;
                          for (std::size_t i = first; i < first + count; ++i) {

@@ -19,8 +19,7 @@ namespace hpsdf {
 namespace surface {
 namespace {
 
-using Corners = std::array<std::uint32_t, 3>;
-using Triangle = std::array<Vector3, 3>;
+using Indices = std::array<std::uint32_t, 3>;
 using Axes = std::array<int, 2>;
 
 bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axes) {
@@ -28,18 +27,18 @@ bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axe
 }
 
 /// Returns two axes onto whose plane the triangle projects with an area; twice the same axis for a degenerate triangle.
-Axes projectionAxes(const Triangle& t) {
+Axes projectionAxes(const Corners& t) {
   for (const Axes axes : {Axes{0, 1}, Axes{1, 2}, Axes{2, 0}})
     if (orientation(axes, t[0], t[1], t[2]) != 0) return axes;
   return {0, 0};
 }
 
-bool isDegenerate(const Triangle& t) {
+bool isDegenerate(const Corners& t) {
   const Axes axes = projectionAxes(t);
   return axes[0] == axes[1];
 }
 
-bool contains(const Triangle& t, const Vector3& x, const Axes& axes) {
+bool contains(const Corners& t, const Vector3& x, const Axes& axes) {
   const int turn = orientation(axes, t[0], t[1], t[2]);
   for (int k = 0; k < 3; ++k)
     if (orientation(axes, t[k], t[(k + 1) % 3], x) * turn < 0) return false;
@@ -55,7 +54,7 @@ bool segmentsIntersect(const Vector3& a, const Vector3& b, const Vector3& c, con
 }
 
 /// Returns true if a closed segment intersects a closed triangle that is not degenerate.
-bool intersect(const Vector3& from, const Vector3& to, const Triangle& t) {
+bool segmentIntersects(const Vector3& from, const Vector3& to, const Corners& t) {
   const int start = orientation(t[0], t[1], t[2], from), end = orientation(t[0], t[1], t[2], to);
   if (start * end > 0) return false;
   if (start == 0 && end == 0) {
@@ -75,7 +74,7 @@ bool intersect(const Vector3& from, const Vector3& to, const Triangle& t) {
 }
 
 /// Returns true if all points lie strictly on one side of the triangle's plane.
-bool lieOnOneSide(const Triangle& t, std::span<const Vector3> points) {
+bool lieOnOneSide(const Corners& t, std::span<const Vector3> points) {
   int sum = 0;
   for (const Vector3& point : points) sum += orientation(t[0], t[1], t[2], point);
   return static_cast<std::size_t>(std::abs(sum)) == points.size();
@@ -84,21 +83,21 @@ bool lieOnOneSide(const Triangle& t, std::span<const Vector3> points) {
 /// Returns true if two triangles that share their first corner have another point in common. Such a point lies on a ray
 /// from the shared corner, and the ray leaves one of the triangles through the opposite edge, within the other
 /// triangle.
-bool intersectBeyondCorner(const Triangle& one, const Triangle& other) {
+bool intersectBeyondCorner(const Corners& one, const Corners& other) {
   if (lieOnOneSide(one, {other.begin() + 1, 2}) || lieOnOneSide(other, {one.begin() + 1, 2})) return false;
-  return intersect(one[1], one[2], other) || intersect(other[1], other[2], one);
+  return segmentIntersects(one[1], one[2], other) || segmentIntersects(other[1], other[2], one);
 }
 
 /// Returns true if two triangles that share their first two corners have a point beyond that edge in common: only if
 /// they are folded flat onto each other.
-bool intersectBeyondEdge(const Triangle& one, const Triangle& other) {
+bool intersectBeyondEdge(const Corners& one, const Corners& other) {
   if (orientation(one[0], one[1], one[2], other[2]) != 0) return false;
   const Axes axes = projectionAxes(one);
   return orientation(axes, one[0], one[1], one[2]) == orientation(axes, one[0], one[1], other[2]);
 }
 
 /// Moves the corners that both triangles share to the front, and returns their number.
-int moveSharedToFront(Corners& one, Corners& other) {
+int moveSharedToFront(Indices& one, Indices& other) {
   int shared = 0;
   for (int i = 0; i < 3; ++i) {
     const auto same = std::find(other.begin() + shared, other.end(), one[i]);
@@ -129,7 +128,7 @@ double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, con
 }
 
 /// Returns true if all points lie on one side of the triangle's plane, farther from it than the margin.
-bool lieFarOnOneSide(const Triangle& t, std::span<const Vector3> points, double margin) {
+bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double margin) {
   const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
   const double least = margin * normal.norm();
   int above = 0, below = 0;
@@ -143,7 +142,7 @@ bool lieFarOnOneSide(const Triangle& t, std::span<const Vector3> points, double 
 
 /// Returns true if a point, a segment or the boundary of a triangle, according to the number of `corners`, comes nearer
 /// to the triangle t than the margin.
-bool isNear(const Triangle& t, std::span<const Vector3> corners, double margin) {
+bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   if (lieFarOnOneSide(t, corners, margin)) return false;
   const bvh::TriangleFrame frame = bvh::makeFrame(t, 0);
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -158,8 +157,8 @@ bool isNear(const Triangle& t, std::span<const Vector3> corners, double margin) 
 
 /// Returns true if two triangles come nearer than the margin elsewhere than at the corners they share, which come
 /// first.
-bool areNear(const Triangle& one, const Triangle& other, int shared, double margin) {
-  const auto unshared = [&](const Triangle& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
+bool areNear(const Corners& one, const Corners& other, int shared, double margin) {
+  const auto unshared = [&](const Corners& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
   return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
 }
 
@@ -214,8 +213,8 @@ class Finder {
 
   static constexpr std::uint32_t kWidth = 4;  ///< boxes in a box of the next level
 
-  Triangle cornersOf(const Corners& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
-  Triangle corners(std::uint32_t slot) const { return cornersOf(hierarchy_.triangles()[slot]); }
+  Corners cornersOf(const Indices& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
+  Corners corners(std::uint32_t slot) const { return cornersOf(hierarchy_.triangles()[slot]); }
 
   void makeBoxes() {
     const auto count = static_cast<std::uint32_t>(hierarchy_.triangles().size());
@@ -248,15 +247,15 @@ class Finder {
   }
 
   bool isCrossing(std::uint32_t slot, std::uint32_t otherSlot) const {
-    Corners one = hierarchy_.triangles()[slot], other = hierarchy_.triangles()[otherSlot];
+    Indices one = hierarchy_.triangles()[slot], other = hierarchy_.triangles()[otherSlot];
     const int shared = moveSharedToFront(one, other);
-    const Triangle first = cornersOf(one), second = cornersOf(other);
+    const Corners first = cornersOf(one), second = cornersOf(other);
     if (isDegenerate(second)) return false;
     return intersectBeyondShared(first, second, shared) || (margin_ > 0 && areNear(first, second, shared, margin_));
   }
 
-  static bool intersectBeyondShared(const Triangle& first, const Triangle& second, int shared) {
-    if (shared == 0) return surface::intersect(first, second);
+  static bool intersectBeyondShared(const Corners& first, const Corners& second, int shared) {
+    if (shared == 0) return intersect(first, second);
     if (shared == 1) return intersectBeyondCorner(first, second);
     return shared == 3 || intersectBeyondEdge(first, second);
   }
@@ -275,14 +274,15 @@ class Finder {
 
 }  // namespace
 
-bool intersect(const Triangle& one, const Triangle& other) {
+bool intersect(const Corners& one, const Corners& other) {
   if (lieOnOneSide(one, other) || lieOnOneSide(other, one)) return false;
   for (int k = 0; k < 3; ++k)
-    if (intersect(one[k], one[(k + 1) % 3], other) || intersect(other[k], other[(k + 1) % 3], one)) return true;
+    if (segmentIntersects(one[k], one[(k + 1) % 3], other) || segmentIntersects(other[k], other[(k + 1) % 3], one))
+      return true;
   return false;
 }
 
-bool edgesIntersect(const Triangle& one, const Triangle& other, const std::array<bool, 3>& counts) {
+bool edgesIntersect(const Corners& one, const Corners& other, const std::array<bool, 3>& counts) {
   Eigen::Index steepest = 0;
   (other[1] - other[0]).cross(other[2] - other[0]).cwiseAbs().maxCoeff(&steepest);
   const Axes axes = {int(steepest + 1) % 3, int(steepest + 2) % 3};
@@ -296,7 +296,7 @@ bool edgesIntersect(const Triangle& one, const Triangle& other, const std::array
   return false;
 }
 
-bool areCoplanar(const Triangle& one, const Triangle& other) {
+bool areCoplanar(const Corners& one, const Corners& other) {
   constexpr double kRounding = 1e-12;
   const Vector3 normal = (one[1] - one[0]).cross(one[2] - one[0]).stableNormalized();
   return std::ranges::all_of(other, [&](const Vector3& x) { return std::abs(normal.dot(x - one[0])) < kRounding; });

@@ -10,16 +10,18 @@
 
 namespace hpsdf::surface {
 
+/// The positions of the corners of a triangle.
+using Corners = std::array<Vector3, 3>;
+
 /// Returns true if two triangles have a point in common, decided exactly. Their coordinates must be of order 1.
-bool intersect(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
+bool intersect(const Corners& one, const Corners& other);
 
 /// Returns true if an edge of the coplanar triangle `other`, among those that `counts` selects, intersects the triangle
 /// `one`. Both are projected along the axis from which `other` shows the most area.
-bool edgesIntersect(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other,
-                    const std::array<bool, 3>& counts);
+bool edgesIntersect(const Corners& one, const Corners& other, const std::array<bool, 3>& counts);
 
 /// Returns true if two triangles are coplanar, up to rounding. Their coordinates must be of order 1.
-bool areCoplanar(const std::array<Vector3, 3>& one, const std::array<Vector3, 3>& other);
+bool areCoplanar(const Corners& one, const Corners& other);
 
 /// Returns a factor that scales coordinates to order 1. It is a power of two, so that scaling is exact.
 double scaleToOne(std::span<const Vector3> vertices);

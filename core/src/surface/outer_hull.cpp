@@ -23,8 +23,6 @@
 namespace hpsdf::surface {
 namespace {
 
-using Corners = std::array<Vector3, 3>;
-
 /// Length of the smallest pieces over the mesh's longest side. It doubles from the first value, up to the second, while
 /// there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;

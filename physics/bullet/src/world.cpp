@@ -24,25 +24,25 @@ constexpr double kFarthest = 1e6;  // units in one step; Bullet silently leaves 
 bool finite(const btVector3& v) { return std::isfinite(v.x() + v.y() + v.z()); }
 bool isPossible(const btVector3& velocity, double step) { return velocity.length() * step < kFarthest; }
 
-/// Bullet's constraint solver, which also measures its time.
-class TimedSolver final : public btSequentialImpulseConstraintSolver {
- public:
-  btScalar solveGroup(btCollisionObject** bodies, int bodyCount, btPersistentManifold** manifolds, int manifoldCount,
-                      btTypedConstraint** constraints, int constraintCount, const btContactSolverInfo& info,
-                      btIDebugDraw* drawer, btDispatcher* dispatcher) override {
-    const auto start = Clock::now();
-    const btScalar left = btSequentialImpulseConstraintSolver::solveGroup(
-        bodies, bodyCount, manifolds, manifoldCount, constraints, constraintCount, info, drawer, dispatcher);
-    seconds += secondsSince(start);
-    return left;
-  }
-
-  double seconds = 0;
-};
-
 }  // namespace
 
 struct World::Parts {
+  /// Bullet's constraint solver, which also measures its time.
+  class TimedSolver final : public btSequentialImpulseConstraintSolver {
+   public:
+    btScalar solveGroup(btCollisionObject** bodies, int bodyCount, btPersistentManifold** manifolds, int manifoldCount,
+                        btTypedConstraint** constraints, int constraintCount, const btContactSolverInfo& info,
+                        btIDebugDraw* drawer, btDispatcher* dispatcher) override {
+      const auto start = Clock::now();
+      const btScalar left = btSequentialImpulseConstraintSolver::solveGroup(
+          bodies, bodyCount, manifolds, manifoldCount, constraints, constraintCount, info, drawer, dispatcher);
+      seconds += secondsSince(start);
+      return left;
+    }
+
+    double seconds = 0;
+  };
+
   btSoftBodyRigidBodyCollisionConfiguration configuration;
   FieldDispatcher dispatcher{&configuration};
   btDbvtBroadphase broadphase;

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "coloring/surface_shader.h"
+#include "image/color.h"
 
 namespace hpsdf::render {
 namespace {
@@ -37,11 +38,6 @@ constexpr double kOutlineGoneBelow = 3;
 // The least slope of the distance that counts. Where the distance is almost constant in the plane of a slice (along a
 // medial axis, on a tangent plane) lines would otherwise grow into blots.
 constexpr double kFlattestSlope = 0.25;
-
-float smoothStep(double low, double high, double x) {
-  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
-  return static_cast<float>(t * t * (3 - 2 * t));
-}
 
 // Calls colorRow(y, row) for each row of samples, in several threads, and averages the samples of each pixel.
 template <typename ColorRow>

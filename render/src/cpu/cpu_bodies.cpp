@@ -20,7 +20,7 @@ constexpr int kStrip = 16;                 // rows that one task fills
 constexpr double kEdgeTolerance = 1e-12;   // in barycentric coordinates, so that no ray passes between two triangles
 constexpr double kRectangleMargin = 1e-6;  // margin of triangles' rectangles for rounding, pixels
 
-struct PixelRay {
+struct BodyRay {
   Vector3 start, direction;
 };
 
@@ -43,7 +43,7 @@ struct TriangleHit {
 };
 
 /// The intersection of a ray with a triangle (Möller, Trumbore 1997).
-std::optional<TriangleHit> intersect(const PixelRay& ray, const Vector3& a, const Vector3& b, const Vector3& c) {
+std::optional<TriangleHit> intersect(const BodyRay& ray, const Vector3& a, const Vector3& b, const Vector3& c) {
   const Vector3 toB = b - a, toC = c - a, across = ray.direction.cross(toC);
   const double determinant = toB.dot(across);
   if (determinant == 0) return std::nullopt;  // the ray is parallel to the triangle, or the triangle is degenerate
@@ -100,7 +100,7 @@ class BodyView {
   }
 
   void fillStrip(const PixelRange& rows) {
-    std::vector<PixelRay> rays;
+    std::vector<BodyRay> rays;
     for (int y = rows.first; y <= rows.last; ++y)
       for (int x = 0; x < buffers_.width; ++x)
         rays.push_back({pixelEye(camera_, x, y, buffers_.width, buffers_.height),
@@ -113,7 +113,7 @@ class BodyView {
   }
 
   /// Draws a body into a strip; `projectedBody` is scratch memory.
-  void drawBody(std::size_t body, const PixelRange& rows, const std::vector<PixelRay>& rays,
+  void drawBody(std::size_t body, const PixelRange& rows, const std::vector<BodyRay>& rays,
                 ProjectedBody& projectedBody, std::vector<double>& nearest) {
     projectedBody.points.clear();
     projectedBody.inPicture.clear();
@@ -146,7 +146,7 @@ class BodyView {
   }
 
   /// Shows triangle t of a body where the pixel's ray hits it nearer than `nearest`.
-  void drawPixel(std::size_t body, std::uint32_t t, const PixelRay& ray, const std::vector<Vector3>& points,
+  void drawPixel(std::size_t body, std::uint32_t t, const BodyRay& ray, const std::vector<Vector3>& points,
                  std::size_t pixel, double& nearest) {
     const BodyMesh& mesh = meshes_[bodies_[body].mesh];
     const Triangle& triangle = mesh.triangles()[t];

@@ -36,9 +36,9 @@ struct Instance {
 };
 
 /// The render target of a tile: body and triangle, and depth.
-class Target {
+class BodyTarget {
  public:
-  Target(int width, int height) {
+  BodyTarget(int width, int height) {
     glTextureStorage2D(seen_.name(), 1, GL_RG32UI, width, height);
     glTextureStorage2D(depth_.name(), 1, GL_DEPTH_COMPONENT32F, width, height);
     glTextureParameteri(seen_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -146,8 +146,8 @@ class MeshUpload {
 };
 
 /// The objects on the device. The context must be current when they are created and destroyed.
-struct Resources {
-  explicit Resources(const BodyMeshes& bodyMeshes) : program(linkedProgram({"bodies.vert"}, {"bodies.frag"})) {
+struct BodyResources {
+  explicit BodyResources(const BodyMeshes& bodyMeshes) : program(linkedProgram({"bodies.vert"}, {"bodies.frag"})) {
     for (std::size_t i = 0; i < bodyMeshes.size(); ++i) {
       meshes.emplace_back(bodyMeshes[i]);
       checkGl("take the meshes of bodies");
@@ -204,7 +204,7 @@ class GlBodyRenderer final : public BodyRenderer {
  public:
   GlBodyRenderer(std::vector<TriangleMesh> meshes, GlChoice choice) : meshes_(std::move(meshes)), context_(choice) {
     const EglContext::Current current(context_);
-    resources_ = std::make_unique<Resources>(meshes_);
+    resources_ = std::make_unique<BodyResources>(meshes_);
   }
 
   ~GlBodyRenderer() override {
@@ -222,7 +222,7 @@ class GlBodyRenderer final : public BodyRenderer {
     const double farthest = farthestDepth(camera, meshes_.bounds(bodies));
     BodyBuffers buffers = emptyBodyBuffers(width, height);
     const EglContext::Current current(context_);
-    const Target target(std::min(width, kTile), std::min(height, kTile));
+    const BodyTarget target(std::min(width, kTile), std::min(height, kTile));
     std::vector<BodyTriangle> pixels;
     for (const Tile& tile : tiles({0, 0, width, height})) {
       glViewport(0, 0, tile.width, tile.height);
@@ -305,7 +305,7 @@ class GlBodyRenderer final : public BodyRenderer {
 
   BodyMeshes meshes_;
   EglContext context_;
-  std::unique_ptr<Resources> resources_;
+  std::unique_ptr<BodyResources> resources_;
 };
 
 }  // namespace

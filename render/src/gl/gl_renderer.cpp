@@ -28,7 +28,7 @@ enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
 enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kBlendedSteps };
 enum : GLint { kViewport = 13, kStartSide };
-constexpr GLint kMostRefinements = kMostSteps;
+constexpr GLint kRefinementLimit = kMostSteps;
 
 constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, the same as on the CPU
 constexpr int kRefinementsInAll = 24;
@@ -249,7 +249,7 @@ class GlRenderer final : public Renderer {
     setRays(resources_->march, rays, view.offset, space_.diagonal);
     setRays(resources_->hit, rays, view.offset, space_.diagonal);
     glProgramUniform1i(resources_->march.name(), kMostSteps, stepsInPass_);
-    glProgramUniform1i(resources_->hit.name(), kMostRefinements, refinements_);
+    glProgramUniform1i(resources_->hit.name(), kRefinementLimit, refinements_);
 
     // Upload the blocks that may see the surface.
     ViewBuffers buffers = emptyBuffers(width, height, true);

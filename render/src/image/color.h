@@ -2,6 +2,7 @@
 // Colour spaces: 8-bit sRGB for files, linear sRGB for shading and averaging, Oklab for the choice of colours.
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "hpsdf/render/image.h"
 
@@ -34,5 +35,11 @@ LinearColor fromOklch(double lightness, double chroma, double hueDegrees);
 double colorDifference(const Oklab& a, const Oklab& b);
 
 inline LinearColor mix(const LinearColor& a, const LinearColor& b, float t) { return a + t * (b - a); }
+
+/// Rises from 0 at `low` to 1 at `high` with a slope of 0 at both ends.
+inline float smoothStep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return static_cast<float>(t * t * (3 - 2 * t));
+}
 
 }  // namespace hpsdf::render

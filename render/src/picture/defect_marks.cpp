@@ -12,15 +12,15 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr Color kCasing = {24, 22, 34};
-constexpr float kCasingStrength = 0.7F;
-constexpr float kHidden =
+constexpr Color kMarkCasing = {24, 22, 34};
+constexpr float kMarkCasingStrength = 0.7F;
+constexpr float kHiddenMark =
     0.7F;  // opacity of hidden marks; they are dashed rather than faint, so that hues stay distinct
 // Lengths are in multiples of a thin line's width.
 constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;
 constexpr double kDotRadius = 2.6;
-constexpr double kCasingBorder = 0.9;
+constexpr double kMarkCasingBorder = 0.9;
 constexpr double kSmallGroup = 16;   // a group up to this size gets a ring
 constexpr double kLeastRing = 9;     // radius of the smallest ring
 constexpr double kHiddenBeyond = 4;  // pixels of depth that a surface may rise beside an edge of its own
@@ -94,7 +94,7 @@ class Painter {
         if (covered <= 0) continue;
         const bool hidden = isHidden(stroke, t, x, y);
         if (hidden && isGap(stroke, middle)) continue;
-        const float strength = hidden ? kHidden : 1.0F;
+        const float strength = hidden ? kHiddenMark : 1.0F;
         Color& pixel = picture_.at(x, y);
         pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
       }
@@ -271,7 +271,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
 
   // Paint all casings before the cores, so that no casing covers a neighbour.
   Painter painter(picture, buffers, samples, lineWidth);
-  painter.paint(strokes, kCasingBorder * lineWidth, &kCasing, kCasingStrength);
+  painter.paint(strokes, kMarkCasingBorder * lineWidth, &kMarkCasing, kMarkCasingStrength);
   painter.paint(strokes, 0, nullptr, 1);
 }
 

@@ -19,8 +19,8 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kFarthest = 1e15;  // greatest coordinate of a camera's target, in a unit near the mesh's size
-constexpr double kBorder = 0.04;    // free border around a whole mesh, as a share of the view's width and height
+constexpr double kFarthest = 1e15;    // greatest coordinate of a camera's target, in a unit near the mesh's size
+constexpr double kMeshBorder = 0.04;  // free border around a whole mesh, as a share of the view's width and height
 
 /// The sides of faces, as indices of the picture's materials.
 enum Side : std::uint32_t { front, back, crossing };
@@ -66,7 +66,7 @@ OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbi
     const Vector3 from = point - target;
     const double nearer = orbit.projection == Projection::perspective ? -from.dot(camera.forward) : 0;
     for (const Vector3& half : {camera.right, camera.up})  // half the view's sides at distance 1
-      distance = std::max(distance, nearer + std::abs(from.dot(half)) / half.squaredNorm() / (1 - 2 * kBorder));
+      distance = std::max(distance, nearer + std::abs(from.dot(half)) / half.squaredNorm() / (1 - 2 * kMeshBorder));
   }
   orbit.distance = distance / domain.diagonal().norm();
   return orbit;

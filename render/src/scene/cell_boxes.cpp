@@ -31,12 +31,12 @@ PixelRect rectOf(const Box& box, const Camera& camera, int width, int height) {
           clamped(std::ceil(seen.max().x()), width), clamped(std::ceil(seen.max().y()), height)};
 }
 
-struct PixelRay {
+struct BoxRay {
   Vector3 start, direction, inverse;
 };
 
-PixelRay rayOf(const Camera& camera, int x, int y, int width, int height) {
-  PixelRay ray{pixelEye(camera, x, y, width, height), pixelRay(camera, x, y, width, height), {}};
+BoxRay rayOf(const Camera& camera, int x, int y, int width, int height) {
+  BoxRay ray{pixelEye(camera, x, y, width, height), pixelRay(camera, x, y, width, height), {}};
   // A zero component has a very large inverse rather than an infinite one, because infinity times 0 is not a number.
   for (int axis = 0; axis < 3; ++axis)
     ray.inverse[axis] = 1 / (ray.direction[axis] != 0 ? ray.direction[axis] : 1e-200);
@@ -50,7 +50,7 @@ struct Entry {
 };
 
 /// The entry of a ray that starts outside of the box.
-std::optional<Entry> enter(const PixelRay& ray, const Box& box) {
+std::optional<Entry> enter(const BoxRay& ray, const Box& box) {
   const Vector3 a = (box.min() - ray.start).cwiseProduct(ray.inverse);
   const Vector3 b = (box.max() - ray.start).cwiseProduct(ray.inverse);
   const Vector3 near = a.cwiseMin(b);
@@ -82,7 +82,7 @@ std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& c
   return boxes;
 }
 
-void show(const CellBox& box, const Entry& entry, const PixelRay& ray, std::size_t i, ViewBuffers& buffers) {
+void show(const CellBox& box, const Entry& entry, const BoxRay& ray, std::size_t i, ViewBuffers& buffers) {
   buffers.cell[i] = box.cell->id;
   buffers.degree[i] = static_cast<std::uint8_t>(box.cell->degree);
   buffers.depth[i] = static_cast<std::uint8_t>(box.cell->depth);
@@ -93,7 +93,7 @@ void show(const CellBox& box, const Entry& entry, const PixelRay& ray, std::size
 }
 
 /// Sets f in the pixels that show boxes, in the rows from y0 on to which the rays belong.
-void addValues(const Field& field, int y0, const std::vector<PixelRay>& rays, ViewBuffers& buffers) {
+void addValues(const Field& field, int y0, const std::vector<BoxRay>& rays, ViewBuffers& buffers) {
   const std::size_t first = std::size_t(y0) * buffers.width;
   std::vector<std::size_t> pixels;
   std::vector<Vector3> points;
@@ -118,7 +118,7 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
                     [&](std::size_t n) { rects[n] = rectOf(boxes[n].box, view.camera, width, height); });
   forEachStrip(height, rects, [&](int y0, int y1, const std::vector<std::uint32_t>& inStrip) {
     if (inStrip.empty()) return;
-    std::vector<PixelRay> rays;
+    std::vector<BoxRay> rays;
     rays.reserve(std::size_t(y1 - y0) * width);
     for (int y = y0; y < y1; ++y)
       for (int x = 0; x < width; ++x) rays.push_back(rayOf(view.camera, x, y, width, height));
@@ -127,7 +127,7 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
       for (int y = std::max(y0, rect.y0); y < std::min(y1, rect.y1); ++y)
         for (int x = rect.x0; x < rect.x1; ++x) {
           const std::size_t i = std::size_t(y) * width + x;
-          const PixelRay& ray = rays[std::size_t(y - y0) * width + x];
+          const BoxRay& ray = rays[std::size_t(y - y0) * width + x];
           const auto entry = enter(ray, boxes[n].box);
           if (entry && !(buffers.hit(i) && buffers.distance[i] <= static_cast<float>(entry->distance)))
             show(boxes[n], *entry, ray, i, buffers);

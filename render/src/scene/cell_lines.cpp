@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 
+#include "image/color.h"
 #include "scene/cell_selection.h"
 #include "scene/pixel_rows.h"
 
@@ -90,11 +91,6 @@ std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const 
       }
   }
   return segments;
-}
-
-float smoothStep(double low, double high, double x) {
-  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
-  return static_cast<float>(t * t * (3 - 2 * t));
 }
 
 /// Draws edges into the coverage.

@@ -6,13 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace hpsdf::render {
+#include "image/pixel_rect.h"
 
-/// A rectangle of pixels, half-open: x0 ≤ x < x1, y0 ≤ y < y1.
-struct PixelRect {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  bool empty() const { return x1 <= x0 || y1 <= y0; }
-};
+namespace hpsdf::render {
 
 /// Draws things with known rectangles in parallel: calls fill(y0, y1, indices) for strips of 16 rows, where `indices`
 /// are those of the rectangles that meet the rows, ascending. The result does not depend on the number of threads as

@@ -11,8 +11,8 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kBorder = 0.025;    // margin around the section, in parts of the picture's width or height
-constexpr double kRayMargin = 0.01;  // distance from the start of parallel rays to the domain, in domain diagonals
+constexpr double kSectionMargin = 0.025;  // margin around the section, in parts of the picture's width or height
+constexpr double kRayMargin = 0.01;       // distance from the start of parallel rays to the domain, in domain diagonals
 
 std::string text(double x) {
   char buffer[32];
@@ -31,7 +31,7 @@ SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vec
                  const Vector3& up, int width, int height) {
   const Eigen::Vector2d center = 0.5 * (lo + hi);
   const Eigen::Vector2d extent = hi - lo;
-  const double pixel = std::max(extent.x() / width, extent.y() / height) / (1 - 2 * kBorder);
+  const double pixel = std::max(extent.x() / width, extent.y() / height) / (1 - 2 * kSectionMargin);
   return {base + center.x() * right + center.y() * up, right * (pixel * width), up * (pixel * height)};
 }
 

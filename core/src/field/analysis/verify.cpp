@@ -19,11 +19,11 @@ namespace {
 
 /// Number of samples whose sums are added before those of other chunks, so that the number of threads does not change
 /// the rounding.
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kPointsPerTask = 4096;
 
 detail::Sums sumsOf(std::span<const double> values) {
-  std::vector<detail::Sums> parts(detail::chunksOf(values.size(), kChunk));
-  detail::forEachChunk(values.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  std::vector<detail::Sums> parts(detail::chunksOf(values.size(), kPointsPerTask));
+  detail::forEachChunk(values.size(), kPointsPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     for (const double x : values.subspan(first, count)) parts[chunk].add(x);
   });
   detail::Sums all;
@@ -57,7 +57,7 @@ std::vector<double> errorsOf(std::span<const ValueAndGradient> found, std::span<
 
 std::vector<ValueAndGradient> fieldAt(const Field& field, std::span<const Vector3> points) {
   std::vector<ValueAndGradient> found(points.size());
-  detail::forEachChunk(points.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+  detail::forEachChunk(points.size(), kPointsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     field.valuesAndGradients(points.subspan(first, count), std::span(found).subspan(first, count));
   });
   return found;
@@ -87,7 +87,7 @@ std::vector<double> anglesAt(const VerifiedSurface& surface, const ExactSamples&
   if (wanted == 0) return {};
   const std::size_t stride = std::max<std::size_t>(1, samples.points.size() / wanted);
   std::vector<double> angles((samples.points.size() + stride - 1) / stride, -1.0);
-  detail::forEachChunk(angles.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+  detail::forEachChunk(angles.size(), kPointsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
     for (std::size_t n = first; n < first + count; ++n) {
       const std::size_t at = n * stride;
@@ -104,7 +104,7 @@ GradientFigures gradientFigures(const ExactSamples& samples, std::span<const Val
                                 std::vector<double> angles) {
   GradientFigures figures{.angles = angles.size()};
   std::vector<double> lengths(found.size()), deviations(found.size()), slopes(found.size(), 0.0);
-  detail::forEachChunk(found.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+  detail::forEachChunk(found.size(), kPointsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n) {
       lengths[n] = found[n].gradient.norm();
       deviations[n] = std::abs(lengths[n] - 1);
@@ -213,7 +213,7 @@ Progress part(const Progress& progress, double from, double to) {
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads) {
   return withThreads(threads, [&] {
     std::vector<double> values(samples.points.size());
-    detail::forEachChunk(values.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+    detail::forEachChunk(values.size(), kPointsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
       field.values(std::span(samples.points).subspan(first, count), std::span(values).subspan(first, count));
       for (std::size_t n = first; n < first + count; ++n) values[n] = std::abs(values[n] - samples.distances[n]);
     });

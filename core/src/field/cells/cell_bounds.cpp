@@ -337,7 +337,7 @@ std::vector<int> deepestAround(const FieldData& field, const std::vector<query::
   return deepest;
 }
 
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kLeavesPerStep = 4096;
 
 void report(const Progress& progress, double fraction) { progress.update("finding bounds", fraction); }
 
@@ -346,13 +346,13 @@ void report(const Progress& progress, double fraction) { progress.update("findin
 /// blend zones; the slope by the greatest difference of gradients, and by |fₙ − f₀| times the slope of the weights.
 void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& leaves, const Progress& progress) {
   std::vector<Disagreement> disagreement(field.nodes.size());
-  for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
+  for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, 0.5 + 0.5 * double(begin) / double(leaves.size()));
     struct Pair {
       std::uint32_t node;
       Disagreement disagreement;
     };
-    std::vector<std::vector<Pair>> found(std::min(kChunk, leaves.size() - begin));
+    std::vector<std::vector<Pair>> found(std::min(kLeavesPerStep, leaves.size() - begin));
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
       const query::OctreeNode& leaf = leaves[begin + n];
       forEachPair(field, leaf, [&](const query::OctreeNode& neighbour) {
@@ -388,9 +388,9 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   const std::vector<query::OctreeNode> leaves = query::allLeaves(field);
   const BoundFinder find(field, distance);
   const double share = field.blend > 0 ? 0.5 : 1;  // of the progress
-  for (std::size_t begin = 0; begin < leaves.size(); begin += kChunk) {
+  for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, share * double(begin) / double(leaves.size()));
-    tbb::parallel_for(begin, std::min(begin + kChunk, leaves.size()),
+    tbb::parallel_for(begin, std::min(begin + kLeavesPerStep, leaves.size()),
                       [&](std::size_t n) { bounds[leaves[n].node] = find(leaves[n]); });
   }
   field.bounds = std::move(bounds);

@@ -16,7 +16,7 @@
 namespace hpsdf::continuity {
 namespace {
 
-constexpr std::size_t kChunk = 256;
+constexpr std::size_t kLeavesPerTask = 256;
 
 /// Returns the number of coefficients of a polynomial of total degree p on a face.
 constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
@@ -213,8 +213,8 @@ std::optional<FaceCoupling::Link> FaceCoupling::linkAcross(const FieldData& fiel
 void FaceCoupling::linkLeaves(const FieldData& field) {
   std::vector<std::uint32_t> leafOfNode(field.nodes.size());
   for (std::size_t n = 0; n < leaves_.size(); ++n) leafOfNode[leaves_[n].node] = static_cast<std::uint32_t>(n);
-  std::vector<std::vector<Link>> found(detail::chunksOf(leaves_.size(), kChunk));
-  detail::forEachChunk(leaves_.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  std::vector<std::vector<Link>> found(detail::chunksOf(leaves_.size(), kLeavesPerTask));
+  detail::forEachChunk(leaves_.size(), kLeavesPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n)
       for (int axis = 0; axis < 3; ++axis)
         for (const int step : {-1, 1})
@@ -330,11 +330,11 @@ void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const
 }
 
 double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vector<double>& out) {
-  detail::forEachChunk(links_.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
+  detail::forEachChunk(links_.size(), kLeavesPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n) computeJump(n, x.data());
   });
-  std::vector<double> sums(detail::chunksOf(leaves_.size(), kChunk));
-  detail::forEachChunk(leaves_.size(), kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  std::vector<double> sums(detail::chunksOf(leaves_.size(), kLeavesPerTask));
+  detail::forEachChunk(leaves_.size(), kLeavesPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     const std::size_t last = first + count;
     for (std::size_t c = start_[first]; c < start_[last]; ++c) out[c] = weight * x[c];
     for (std::size_t leaf = first; leaf < last; ++leaf)

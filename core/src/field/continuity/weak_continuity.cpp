@@ -15,14 +15,14 @@
 namespace hpsdf::continuity {
 namespace {
 
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kItemsPerTask = 4096;
 
 /// Calls f(first, last, sums) for chunks of fixed size in parallel and adds up the sums chunk by chunk, so that
 /// rounding does not depend on the number of threads.
 template <std::size_t Sums, typename F>
 std::array<double, Sums> sumChunks(std::size_t items, const F& f) {
-  std::vector<std::array<double, Sums>> parts(detail::chunksOf(items, kChunk));
-  detail::forEachChunk(items, kChunk, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  std::vector<std::array<double, Sums>> parts(detail::chunksOf(items, kItemsPerTask));
+  detail::forEachChunk(items, kItemsPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     f(first, first + count, parts[chunk]);
   });
   std::array<double, Sums> total{};

@@ -24,15 +24,15 @@ static_assert(std::endian::native == std::endian::little,
               "files are little-endian and arrays are written without conversion");
 static_assert(sizeof(double) == 8 && std::numeric_limits<double>::is_iec559);
 
-constexpr std::size_t kChunk = 4096;  // number of points for which the field is queried at once
+constexpr std::size_t kPointsPerQuery = 4096;  // number of points for which the field is queried at once
 constexpr int kNodesOfCell = 32;
 constexpr std::size_t kSizesInFile = 8;  // number of cells, number of fields, and two sizes for each of three lists
 
-using CellIndex = std::array<std::uint64_t, 3>;
+using GridIndex = std::array<std::uint64_t, 3>;
 
 /// A node of the grid, at a cell's corner or on an edge.
 struct Node {
-  CellIndex index;  ///< the corner, or the lower end of the edge, in cells from the domain's lower corner
+  GridIndex index;  ///< the corner, or the lower end of the edge, in cells from the domain's lower corner
   int axis = -1;    ///< axis of the edge; −1 for a corner
   int third = 0;    ///< 0 or 1: the lower or the upper node of the edge
 };
@@ -49,7 +49,7 @@ class Numbering {
   std::uint64_t count() const { return first_[3]; }
 
   std::uint64_t number(const Node& node) const {
-    const CellIndex& at = node.index;
+    const GridIndex& at = node.index;
     if (node.axis < 0) return at[0] + (cells_[0] + 1) * (at[1] + (cells_[1] + 1) * at[2]);
     const int a = node.axis, b = after(a, 1), c = after(a, 2);
     return first_[a] + 2 * (at[a] + cells_[a] * (at[b] + (cells_[b] + 1) * at[c])) + std::uint64_t(node.third);
@@ -78,14 +78,14 @@ class Numbering {
   static int after(int axis, int steps) { return (axis + steps) % 3; }
 
  private:
-  CellIndex cells_;
+  GridIndex cells_;
   std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis, then of all nodes
 };
 
 /// Returns the n-th node of the cell with this lower corner. Nodes 0 to 7 are the corners, n = x + 2y + 4z; then come
 /// those on edges along x, along y and along z. Of the four edges along axis a, those that differ along a+2 (cyclic)
 /// follow each other.
-Node nodeOfCell(CellIndex corner, int n) {
+Node nodeOfCell(GridIndex corner, int n) {
   if (n < 8) {
     for (int axis = 0; axis < 3; ++axis) corner[axis] += n >> axis & 1;
     return {corner};
@@ -148,7 +148,7 @@ void numberRow(const Numbering& numbering, std::uint32_t cells, std::uint64_t y,
 
 double CubicGrid::value(const Vector3& x) const {
   const Vector3 size = cellSize();
-  CellIndex cell;
+  GridIndex cell;
   for (int axis = 0; axis < 3; ++axis) {
     const double at = (x[axis] - domain.min()[axis]) / size[axis];
     cell[axis] = static_cast<std::uint64_t>(std::clamp(at, 0.0, double(resolution[axis] - 1)));
@@ -204,7 +204,7 @@ CubicGrid sampleCubicGrid(const Field& field, const GridResolution& resolution, 
       for (std::size_t n = 0; n < count; ++n) points[n] = positionOf(numbering.node(first + n), lower, cellSize);
       field.values(points, std::span(grid.nodes).subspan(first, count));
     };
-    detail::forEachChunk(grid.nodes.size(), kChunk, progress, "sampling", sample);
+    detail::forEachChunk(grid.nodes.size(), kPointsPerQuery, progress, "sampling", sample);
   });
   return grid;
 }
@@ -215,9 +215,9 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
     detail::Sums everywhere, nearSurface;
   };
   const double near = grid.cellSize().norm();
-  std::vector<Differences> parts(detail::chunksOf(points, kChunk));
+  std::vector<Differences> parts(detail::chunksOf(points, kPointsPerQuery));
   withThreads(threads, [&] {
-    detail::forEachChunk(points, kChunk, progress, "measuring",
+    detail::forEachChunk(points, kPointsPerQuery, progress, "measuring",
                          [&](std::size_t chunk, std::size_t first, std::size_t count) {
                            std::vector<Vector3> at(count);
                            std::vector<double> values(count);
