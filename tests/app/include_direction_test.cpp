@@ -270,6 +270,44 @@ Lines crowdedFolders(const Sources& sources) {
   return result;
 }
 
+/// The units of each folder by their names.
+using UnitsOfFolders = std::map<std::string, std::set<std::string>>;
+
+/// The lists below lines "**core/src/mesh**", whose items are "* `patches`: contents".
+UnitsOfFolders parseUnits(const std::string& design) {
+  static const std::regex heading(R"(^\*\*([^*]+)\*\*$)"), item(R"(^\* `([^`]+)`: .*)");
+  UnitsOfFolders units;
+  std::string folder, line;
+  std::istringstream stream(design);
+  while (std::getline(stream, line)) {
+    std::smatch match;
+    if (std::regex_match(line, match, heading))
+      folder = match[1];
+    else if (line.starts_with("#"))
+      folder.clear();
+    else if (!folder.empty() && std::regex_match(line, match, item))
+      units[folder].insert(match[1]);
+  }
+  return units;
+}
+
+/// The units that the lists lack, and those that they have too many.
+Lines listFaults(const Sources& sources, const Folders& folders, const UnitsOfFolders& listed) {
+  const Units units(sources, folders);
+  UnitsOfFolders found;
+  for (const auto& [file, text] : sources)
+    if (!isUmbrella(file)) found[units.folderOf(file)].insert(fs::path(units.unitOf(file)).filename());
+  Lines result;
+  const auto report = [&](const UnitsOfFolders& some, const UnitsOfFolders& others, const std::string& what) {
+    for (const auto& [folder, names] : some)
+      for (const std::string& name : names)
+        if (!others.contains(folder) || !others.at(folder).contains(name)) result.push_back(folder + "/" + name + what);
+  };
+  report(found, listed, ": is not in the list of docs/design.md");
+  report(listed, found, ": is listed in docs/design.md and does not exist");
+  return result;
+}
+
 TEST(IncludeDirection, runsOneWayInEveryRoom) {
   const fs::path root = HPSDF_SOURCE_DIR;
   const Sources sources = readSources(root);
@@ -287,6 +325,13 @@ TEST(IncludeDirection, followsTheTablesOfTheDesign) {
   EXPECT_GT(folders.size(), 20u) << "the tables of docs/design.md were not found";
   for (const auto& [name, folder] : folders) EXPECT_TRUE(fs::is_directory(root / name)) << name;
   for (const std::string& line : structureFaults(readSources(root), folders)) ADD_FAILURE() << line;
+}
+
+TEST(IncludeDirection, listsEveryUnitInTheDesign) {
+  const fs::path root = HPSDF_SOURCE_DIR;
+  const std::string design = read(root / "docs/design.md");
+  for (const std::string& line : listFaults(readSources(root), parseFolders(design), parseUnits(design)))
+    ADD_FAILURE() << line;
 }
 
 TEST(IncludeDirection, findsNoCrowdedFolder) {
@@ -312,6 +357,15 @@ TEST(IncludeDirection, readsTheTables) {
   ASSERT_EQ(folders.size(), 2u);
   EXPECT_EQ(folders.at("core/src/util").headers, std::set<std::string>{"types.h"});
   EXPECT_EQ(folders.at("core/src/mesh").mayInclude, std::set<std::string>{"core/src/util"});
+}
+
+TEST(IncludeDirection, noticesUnitsThatAreNotListedOrDoNotExist) {
+  const Sources sources = {{"core/include/hpsdf/types.h", ""}, {"core/src/mesh/parts.h", ""}};
+  const UnitsOfFolders listed =
+      parseUnits("**core/src/util**\n* `types`: vectors\n\n**core/src/mesh**\n* `faces`: lists\n");
+  EXPECT_EQ(listFaults(sources, parseFolders(kSampleTables), listed),
+            (Lines{"core/src/mesh/parts: is not in the list of docs/design.md",
+                   "core/src/mesh/faces: is listed in docs/design.md and does not exist"}));
 }
 
 TEST(IncludeDirection, acceptsASoundStructure) {
