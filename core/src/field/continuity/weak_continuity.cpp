@@ -1,40 +1,38 @@
 #include "field/continuity/weak_continuity.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <sstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "field/continuity/face_coupling.h"
 #include "field/nearness.h"
 #include "field/query/evaluate.h"
+#include "field/query/float_coefficients.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
+#include "util/refuse.h"
 
-namespace hpsdf::continuity {
+namespace hpsdf {
+namespace continuity {
 namespace {
 
 constexpr std::size_t kItemsPerTask = 4096;
 
-/// Calls f(first, last, sums) for chunks of fixed size in parallel and adds up the sums chunk by chunk, so that
-/// rounding does not depend on the number of threads.
-template <std::size_t Sums, typename F>
-std::array<double, Sums> sumChunks(std::size_t items, const F& f) {
-  std::vector<std::array<double, Sums>> parts(detail::chunksOf(items, kItemsPerTask));
-  detail::forEachChunk(items, kItemsPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
-    f(first, first + count, parts[chunk]);
-  });
-  std::array<double, Sums> total{};
-  for (const auto& part : parts)
-    for (std::size_t s = 0; s < Sums; ++s) total[s] += part[s];
-  return total;
-}
+struct Sum {
+  double value = 0;
+
+  void add(const Sum& other) { value += other.value; }
+};
 
 double squaredNorm(const std::vector<double>& x) {
-  return sumChunks<1>(x.size(), [&](std::size_t first, std::size_t last, auto& sums) {
-    for (std::size_t i = first; i < last; ++i) sums[0] += x[i] * x[i];
-  })[0];
+  const auto add = [&](Sum& sum, std::size_t first, std::size_t count) {
+    for (std::size_t i = first; i < first + count; ++i) sum.value += x[i] * x[i];
+  };
+  return detail::sumOfChunks<Sum>(x.size(), kItemsPerTask, {}, "", add).value;
 }
 
 void report(const Progress& progress, double fraction) {
@@ -72,11 +70,9 @@ class ConjugateGradients {
       }
       report(progress, std::log(figures.residual) / std::log(options_.tolerance));
     }
-    std::ostringstream message;
-    message << "weak continuity: " << options_.maxIterations << " iterations leave " << figures.residual
-            << " of the residual, more than " << options_.tolerance << "; take a larger weight than " << options_.weight
-            << ", or allow more";
-    throw Error(message.str());
+    detail::refuse("weak continuity: ", options_.maxIterations, " iterations leave ", figures.residual,
+                   " of the residual, more than ", options_.tolerance, "; take a larger weight than ", options_.weight,
+                   ", or allow more");
   }
 
   WeakContinuityFigures figures;
@@ -87,27 +83,32 @@ class ConjugateGradients {
 
   /// Sums over the squares of the residual.
   struct ResidualSquares {
-    double sum;
-    double weighted;  ///< sum with the preconditioner as weights
+    double sum = 0;
+    double weighted = 0;  ///< sum with the preconditioner as weights
+
+    void add(const ResidualSquares& other) {
+      sum += other.sum;
+      weighted += other.weighted;
+    }
   };
 
   /// Moves the solution along the direction and updates the residual.
   ResidualSquares step(double length) {
-    const auto sums = sumChunks<2>(change_.size(), [&](std::size_t first, std::size_t last, auto& part) {
-      for (std::size_t i = first; i < last; ++i) {
+    const auto move = [&](ResidualSquares& squares, std::size_t first, std::size_t count) {
+      for (std::size_t i = first; i < first + count; ++i) {
         change_[i] += length * direction_[i];
         residual_[i] -= length * product_[i];
         const double square = residual_[i] * residual_[i];
-        part[0] += square;
-        part[1] += square * preconditioner_[i];
+        squares.sum += square;
+        squares.weighted += square * preconditioner_[i];
       }
-    });
-    return {sums[0], sums[1]};
+    };
+    return detail::sumOfChunks<ResidualSquares>(change_.size(), kItemsPerTask, {}, "", move);
   }
 
   void updateDirection(double beta) {
-    sumChunks<0>(change_.size(), [&](std::size_t first, std::size_t last, auto&) {
-      for (std::size_t i = first; i < last; ++i)
+    detail::forEachChunk(change_.size(), kItemsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
+      for (std::size_t i = first; i < first + count; ++i)
         direction_[i] = preconditioner_[i] * residual_[i] + beta * direction_[i];
     });
   }
@@ -122,7 +123,7 @@ class ConjugateGradients {
 double weightedChange(const FieldData& field, std::span<const double> x0, std::span<const double> change) {
   const BuildOptions& settings = field.metadata.settings;
   const double volume = field.domain.sizes().prod();
-  const detail::Nearness nearness(settings, field.domain);
+  const detail::Nearness nearness = detail::nearnessOf(settings, field.domain);
   double sum = 0;
   std::size_t at = 0;
   for (const query::OctreeNode& leaf : query::allLeaves(field)) {
@@ -140,14 +141,12 @@ double weightedChange(const FieldData& field, std::span<const double> x0, std::s
 }  // namespace
 
 void checkWeakContinuity(const WeakContinuity& options) {
-  std::ostringstream message;
   if (!(options.weight > 0 && options.weight <= kMaxContinuityWeight))
-    message << "continuity weight " << options.weight << ": expected a number above 0, up to " << kMaxContinuityWeight;
-  else if (!(options.tolerance > 0 && options.tolerance < 1))
-    message << "tolerance " << options.tolerance << ": expected a number between 0 and 1";
-  else if (options.maxIterations < 1)
-    message << "maximum of " << options.maxIterations << " iterations: expected 1 or more";
-  if (!message.str().empty()) throw Error(message.str());
+    detail::refuse("continuity weight ", options.weight, ": expected a number above 0, up to ", kMaxContinuityWeight);
+  if (!(options.tolerance > 0 && options.tolerance < 1))
+    detail::refuse("tolerance ", options.tolerance, ": expected a number between 0 and 1");
+  if (options.maxIterations < 1)
+    detail::refuse("maximum of ", options.maxIterations, " iterations: expected 1 or more");
 }
 
 WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuity& options, const Progress& progress) {
@@ -168,4 +167,31 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   return solver.figures;
 }
 
-}  // namespace hpsdf::continuity
+}  // namespace continuity
+
+WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& options, int threads,
+                                  const Progress& progress) {
+  continuity::checkWeakContinuity(options);
+  if (field.metadata().settings.continuityWeight)
+    throw Error("the field is weakly continuous already: take it as it was before, or build it anew");
+  FieldData data = field.data();
+  query::toDouble(data);
+  const continuity::WeakContinuityFigures figures =
+      withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
+  if (field.singlePrecision()) {
+    data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);
+    query::toFloat(data);
+  }
+  return {Field(std::move(data)), figures.iterations, figures.residual, figures.change};
+}
+
+Field blended(const Field& field, double width) {
+  if (!(width >= 0 && width <= kMaxBlend))
+    throw Error("blend zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
+  FieldData data = field.data();
+  data.blend = width;
+  data.bounds.clear();  // Bounds depend on the leaves that have a weight, which blending changes.
+  return Field(std::move(data));
+}
+
+}  // namespace hpsdf
