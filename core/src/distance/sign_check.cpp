@@ -71,7 +71,8 @@ SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std
         tally.add({.wrong = 1, .worstDistance = away, .worst = i});
     }
   };
-  const auto all = detail::sumOfChunks<Tally>(points, kSignsPerTask, progress, "summing winding numbers", compare);
+  const auto all =
+      detail::unorderedSumOfChunks<Tally>(points, kSignsPerTask, progress, "summing winding numbers", compare);
   check.tooNear = all.tooNear;
   check.wrong = all.wrong;
   check.worstDistance = all.worstDistance;

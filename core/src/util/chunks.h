@@ -93,6 +93,22 @@ Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, s
   return all;
 }
 
+/// Adds up the sums of all chunks as `sumOfChunks` does, but in any order and without keeping them: for sums that do
+/// not depend on the order.
+template <typename Sum, typename Work>
+Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
+                         const Work& work) {
+  Sum all;
+  std::mutex adding;
+  forEachChunk(items, size, progress, task, [&](std::size_t, std::size_t first, std::size_t count) {
+    Sum part;
+    work(part, first, count);
+    const std::lock_guard lock(adding);
+    all.add(part);
+  });
+  return all;
+}
+
 /// Joins the lists of all chunks, to which work(list, first item, number of items) appends in parallel.
 template <typename Item, typename Work>
 std::vector<Item> listOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,

@@ -29,9 +29,4 @@ struct LookupGrid {
   static constexpr int depthOf(std::uint64_t entry) { return static_cast<int>(entry >> 40 & 0xff); }
 };
 
-struct FieldData;
-
-/// Makes the deepest lookup grid that takes no more than a sixteenth of the field's own bytes.
-LookupGrid makeLookupGrid(const FieldData& field);
-
 }  // namespace hpsdf

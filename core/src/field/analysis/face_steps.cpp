@@ -55,7 +55,7 @@ FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces,
     }
   };
   return withThreads(threads, [&] {
-    return detail::sumOfChunks<FaceSteps>(count, kChunk, progress, "querying both sides of faces", step);
+    return detail::unorderedSumOfChunks<FaceSteps>(count, kChunk, progress, "querying both sides of faces", step);
   });
 }
 

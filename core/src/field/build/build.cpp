@@ -13,7 +13,7 @@
 #include "field/build/refiner.h"
 #include "field/cells/cell_bounds.h"
 #include "field/cells/prune.h"
-#include "field/continuity/weak_continuity.h"
+#include "field/continuity/continuity.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"

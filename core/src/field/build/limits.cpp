@@ -160,19 +160,9 @@ ByteBudget::ByteBudget(const BuildOptions& options)
       coefficientBytes_(options.coefficients == CoefficientType::float64 ? sizeof(double) : sizeof(float)),
       limit_(limitWithoutLookup(options)) {}
 
-int ByteBudget::finalDegree(int degree) const {
-  return options_.enrich ? std::max(degree, std::min(degree + 1, options_.maxDegree)) : degree;
-}
-
-std::size_t ByteBudget::finalCoefficients(int degree) const {
-  return std::size_t(coefficientCount(finalDegree(degree)));
-}
-
 double ByteBudget::nodeBytes() const {
   return 8 + (options_.blend > 0 ? 4 : 0) + (options_.bounds ? double(sizeof(CellBound)) : 0);
 }
-
-double ByteBudget::leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }
 
 double ByteBudget::growthLimit() const {
   // Pruning needs refinements to choose from. The factor was measured like `kGrowth` in growth.cpp.

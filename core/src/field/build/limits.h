@@ -1,6 +1,7 @@
 #pragma once
 // Checks of settings, limits of memory and bytes, and figures that follow from the settings.
 
+#include <algorithm>
 #include <cstddef>
 
 #include "field/nearness.h"
@@ -41,12 +42,14 @@ class ByteBudget {
   explicit ByteBudget(const BuildOptions& options);
 
   /// A leaf's degree in the finished field: one higher where leaves are enriched.
-  int finalDegree(int degree) const;
+  int finalDegree(int degree) const {
+    return options_.enrich ? std::max(degree, std::min(degree + 1, options_.maxDegree)) : degree;
+  }
   /// Number of coefficients that the finished field keeps of a leaf.
-  std::size_t finalCoefficients(int degree) const;
+  std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
   /// A node's own bytes with its blend extent and bound.
   double nodeBytes() const;
-  double leafBytes(int degree) const;
+  double leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }
   double bytes(double nodes, double coefficients) const {
     return nodeBytes() * nodes + coefficientBytes_ * coefficients;
   }

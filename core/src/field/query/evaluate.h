@@ -248,6 +248,9 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
   result.gradient += offset / distance;
 }
 
+/// Makes the deepest lookup grid that takes no more than a sixteenth of the field's own bytes.
+LookupGrid makeLookupGrid(const FieldData& field);
+
 /// Evaluates a field at many points. The results equal those of single queries to the bit, on every instruction set.
 void evaluateBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
                    std::span<double> out);

@@ -1,5 +1,3 @@
-#include "hpsdf/detail/lookup_grid.h"
-
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -8,10 +6,7 @@
 
 #include "field/query/evaluate.h"
 
-namespace hpsdf {
-
-using namespace query;
-
+namespace hpsdf::query {
 namespace {
 
 /// Depth of the deepest leaf that touches each face of a leaf, by axis and side.
@@ -101,4 +96,4 @@ LookupGrid makeLookupGrid(const FieldData& field) {
   return lookupGrid;
 }
 
-}  // namespace hpsdf
+}  // namespace hpsdf::query

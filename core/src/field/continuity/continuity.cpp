@@ -1,4 +1,4 @@
-#include "field/continuity/weak_continuity.h"
+#include "field/continuity/continuity.h"
 
 #include <algorithm>
 #include <cmath>
@@ -138,8 +138,7 @@ double weightedChange(const FieldData& field, std::span<const double> x0, std::s
   return sum;
 }
 
-}  // namespace
-
+/// Throws `Error` if an option is out of range.
 void checkWeakContinuity(const WeakContinuity& options) {
   if (!(options.weight > 0 && options.weight <= kMaxContinuityWeight))
     detail::refuse("continuity weight ", options.weight, ": expected a number above 0, up to ", kMaxContinuityWeight);
@@ -148,6 +147,8 @@ void checkWeakContinuity(const WeakContinuity& options) {
   if (options.maxIterations < 1)
     detail::refuse("maximum of ", options.maxIterations, " iterations: expected 1 or more");
 }
+
+}  // namespace
 
 WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuity& options, const Progress& progress) {
   report(progress, 0);
