@@ -16,11 +16,11 @@ namespace {
 
 using support::allocationsOf;
 
-TEST(Allocations, AreCounted) {
+TEST(Allocations, areCounted) {
   EXPECT_GT(allocationsOf([] { std::vector<int>(100).at(3) = 1; }), 0u);
 }
 
-TEST(Allocations, QueriesMakeNone) {
+TEST(Allocations, queriesMakeNone) {
   const TriangleMesh mesh = shapes::mesh("builtin:torus,segments=32,sides=16");
   const ExactDistance distance(mesh);
   const Field field = build(distance, domainAround(mesh), {.targetError = 1e-5}), smooth = blended(field, 0.2);

@@ -142,7 +142,7 @@ Field irregularWithLookupGrid(unsigned seed) {
                             .maxDegree = 8});
 }
 
-TEST(Blend, EqualsItsDefinition) {
+TEST(Blend, equalsItsDefinition) {
   std::size_t most = 0;
   ASSERT_GT(irregularWithLookupGrid(1).lookupGrid().depth, 0);
   for (const unsigned seed : {1u, 2u, 3u, 4u})
@@ -194,7 +194,7 @@ Step greatestStep(const Field& field, const std::vector<Vector3>& points) {
   return step;
 }
 
-TEST(Blend, RemovesJumpsAcrossFacesEdgesAndCorners) {
+TEST(Blend, removesJumpsAcrossFacesEdgesAndCorners) {
   for (const unsigned seed : {4u, 5u, 6u, 7u}) {
     const Field field = seed % 2 == 0 ? irregular(seed) : irregularWithLookupGrid(seed);
     const std::vector<Vector3> points = pointsNearFaces(field, 20'000, seed);
@@ -206,7 +206,7 @@ TEST(Blend, RemovesJumpsAcrossFacesEdgesAndCorners) {
   }
 }
 
-TEST(Blend, GradientIsTheDerivativeEverywhere) {
+TEST(Blend, gradientIsTheDerivativeEverywhere) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
   for (const unsigned seed : {8u, 9u}) {
@@ -228,7 +228,7 @@ TEST(Blend, GradientIsTheDerivativeEverywhere) {
   }
 }
 
-TEST(Blend, ReproducesFunctionsThatAllLeavesShare) {
+TEST(Blend, reproducesFunctionsThatAllLeavesShare) {
   const Field field = irregular(10);
   const Vector3 slope(0.3, -2, 1.5);
   const auto with = [&](const Vector3& gradient) {
@@ -256,7 +256,7 @@ TEST(Blend, ReproducesFunctionsThatAllLeavesShare) {
   }
 }
 
-TEST(Blend, ChangesNothingOutsideBlendZones) {
+TEST(Blend, changesNothingOutsideBlendZones) {
   const double width = 0.1;
   const Field field = irregular(11), smooth = blended(field, width);
   std::size_t inner = 0, changed = 0;
@@ -276,7 +276,7 @@ TEST(Blend, ChangesNothingOutsideBlendZones) {
   EXPECT_GT(changed, 5000u);
 }
 
-TEST(Blend, BatchesEqualSingleQueries) {
+TEST(Blend, batchesEqualSingleQueries) {
   for (const bool single : {false, true}) {
     const Field smooth = blended(randomField(12, {.maxDepth = 5, .maxDegree = 7, .single = single}), 0.15);
     std::vector<Vector3> points = pointsNearFaces(smooth, 5000, 12);
@@ -299,7 +299,7 @@ TEST(Blend, BatchesEqualSingleQueries) {
   }
 }
 
-TEST(Blend, RemovesJumpsOutsideTheDomain) {
+TEST(Blend, removesJumpsOutsideTheDomain) {
   const Field field = irregular(13), smooth = blended(field);
   const auto outside = [&] {
     std::vector<Vector3> points = pointsNearFaces(field, 5000, 13);
@@ -323,7 +323,7 @@ TEST(Blend, RemovesJumpsOutsideTheDomain) {
   EXPECT_LT(none.gradient, 1e-9);
 }
 
-TEST(Blend, IsMeasuredByJumpsAndLines) {
+TEST(Blend, isMeasuredByJumpsAndLines) {
   const Field field = irregular(14), smooth = blended(field);
   const Jumps before = findJumps(field), after = findJumps(smooth);
   EXPECT_EQ(before.interfaces.size(), after.interfaces.size());
@@ -347,7 +347,7 @@ TEST(Blend, IsMeasuredByJumpsAndLines) {
   EXPECT_GT(jumped, 0.01);
 }
 
-TEST(Blend, WorksInVeryDeepCells) {
+TEST(Blend, worksInVeryDeepCells) {
   const Field field = randomField(15, {.refinement = 0, .maxDepth = kMaxDepth, .deepAt = Vector3(0.1, 0.2, 0.3)});
   const Field smooth = blended(field);
   const std::vector<Vector3> points = pointsNearFaces(field, 5000, 15);
@@ -356,7 +356,7 @@ TEST(Blend, WorksInVeryDeepCells) {
 }
 
 /// The zones are so narrow that their width is lost in rounding at the domain's far end.
-TEST(Blend, WorksInZonesWithoutWidth) {
+TEST(Blend, worksInZonesWithoutWidth) {
   const Field field = irregular(20);
   for (const double width : {1e-300, 1e-17, 1e-16, 1e-15, 1e-12}) {
     const Field smooth = blended(field, width);
@@ -373,7 +373,7 @@ TEST(Blend, WorksInZonesWithoutWidth) {
   }
 }
 
-TEST(Blend, IsKeptInFiles) {
+TEST(Blend, isKeptInFiles) {
   const support::TemporaryDirectory folder;
   const std::string file = (folder.path() / "blended.hpsdf").string();
   const Field smooth = blended(irregular(16), 0.07);
@@ -383,20 +383,20 @@ TEST(Blend, IsKeptInFiles) {
   for (const Vector3& x : pointsNearFaces(smooth, 500, 16)) ASSERT_EQ(again.value(x), smooth.value(x));
 }
 
-TEST(Blend, CountsItsMemory) {
+TEST(Blend, countsItsMemory) {
   const Field field = irregular(17);
   EXPECT_EQ(blended(field, 0).bytes(), field.bytes());
   EXPECT_EQ(blended(field, 0.1).bytes(),
             field.bytes() + 4 * (field.data().nodes.size() + field.lookupGrid().entries.size()));
 }
 
-TEST(Blend, RefusesWidthsOutOfRange) {
+TEST(Blend, refusesWidthsOutOfRange) {
   const Field field = irregular(18);
   for (const double width : {-0.01, 0.26, double(NAN)}) EXPECT_THROW(blended(field, width), Error) << width;
 }
 
 /// docs/accuracy.md has these figures for larger meshes.
-TEST(Blend, KeepsTheErrorOfAMeshsField) {
+TEST(Blend, keepsTheErrorOfAMeshsField) {
   const ExactDistance distance(shapes::mesh("torus"));
   const Field field =
       build(distance, Box(Vector3::Constant(-1.2), Vector3::Constant(1.2)), {.targetError = 1e-6, .grid = {4, 4, 4}});

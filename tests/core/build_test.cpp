@@ -52,7 +52,7 @@ Measured measure(const Field& field, Phi phi, int count = 50000) {
   return m;
 }
 
-TEST(Build, SphereAndTorusAreAccurate) {
+TEST(Build, sphereAndTorusAreAccurate) {
   for (const auto phi : {sphere, torus}) {
     const Field field = build(phi, cube(), {.targetError = 1e-8});
     const Measured m = measure(field, phi);
@@ -70,7 +70,7 @@ TEST(Build, SphereAndTorusAreAccurate) {
 /// whole slope, so that h1 counts far more error than is there: a coarser target keeps it small.
 /// The decisions of the construction as counts, by the default settings and by the paper's, on a box, whose kinks want
 /// depth and whose faces want degree.
-TEST(Build, CountsOfAKnownBox) {
+TEST(Build, countsOfAKnownBox) {
   struct Known {
     BuildOptions options;
     double leaves, coefficients, evaluations;
@@ -89,7 +89,7 @@ TEST(Build, CountsOfAKnownBox) {
 }
 
 /// Smooth enough for degree 30 to reach the end of double precision: the running total of the error must not.
-TEST(Build, RoundingEndsNoConstructionLate) {
+TEST(Build, roundingEndsNoConstructionLate) {
   const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()) + 5; };
   const auto coefficients = [&](double target) {
     const Field field = build(smooth, cube(), {.targetError = target, .grid = {1, 1, 1}, .nearness = 0, .maxDepth = 1});
@@ -102,7 +102,7 @@ TEST(Build, RoundingEndsNoConstructionLate) {
   EXPECT_LT(coefficients(1e-17), 2 * coefficients(1e-15));
 }
 
-TEST(Build, OctreeAloneNeedsMoreCoefficients) {
+TEST(Build, octreeAloneNeedsMoreCoefficients) {
   const auto coefficients = [](Strategy strategy, double targetError) {
     BuildOptions options = paperOptions();
     options.strategy = strategy;
@@ -121,7 +121,7 @@ TEST(Build, OctreeAloneNeedsMoreCoefficients) {
   EXPECT_GT(coefficients(Strategy::h1, 1e-2), 3 * coefficients(Strategy::hp, 1e-2));
 }
 
-TEST(Build, TotalErrorIsTheWeightedSumOverTheCells) {
+TEST(Build, totalErrorIsTheWeightedSumOverTheCells) {
   const BuildOptions options{.targetError = 1e-6, .nearness = 3, .coefficients = CoefficientType::float64};
   const Field field = build(torus, cube(), options);
   double sum = 0;
@@ -139,7 +139,7 @@ std::string fileBytes(const Field& field, const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-TEST(Build, SameBytesForAnyNumberOfThreads) {
+TEST(Build, sameBytesForAnyNumberOfThreads) {
   support::TemporaryDirectory folder;
   std::string first;
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);  // more than there are cores
@@ -178,7 +178,7 @@ std::map<std::vector<double>, std::vector<double>> leavesOf(const Field& field) 
 }
 
 /// A construction that is ended early has taken the first steps of one that is not, whatever round they fall into.
-TEST(Build, StepsAreCountedAndLimited) {
+TEST(Build, stepsAreCountedAndLimited) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "field.hpsdf";
   BuildOptions options{.targetError = 1e-5, .grid = {2, 3, 2}, .coefficients = CoefficientType::float64};
@@ -220,7 +220,7 @@ TEST(Build, StepsAreCountedAndLimited) {
   EXPECT_TRUE(fileBytes(after(total / 2), file) == half);
 }
 
-TEST(Build, StagesAreTheFieldsOfLimitedConstructions) {
+TEST(Build, stagesAreTheFieldsOfLimitedConstructions) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "field.hpsdf";
   BuildOptions options{.targetError = 1e-5, .grid = {2, 2, 2}};
@@ -240,7 +240,7 @@ TEST(Build, StagesAreTheFieldsOfLimitedConstructions) {
 }
 
 /// The same τ gives the same cells in any unit; powers of two change no rounding, so that the match is exact.
-TEST(Build, TargetErrorIsMeantAtThePapersScale) {
+TEST(Build, targetErrorIsMeantAtThePapersScale) {
   const Field one = build(DistanceFunction(sphere, Source{.box = cube(1)}), cube(), {.targetError = 1e-6});
   const auto large = [](const Vector3& x) { return x.norm() - 1024; };
   const Field other =
@@ -253,7 +253,7 @@ TEST(Build, TargetErrorIsMeantAtThePapersScale) {
   EXPECT_DOUBLE_EQ(bare.metadata().referenceLength, 2048);
 }
 
-TEST(Build, FloatCoefficientsChangeTheFieldByWhatIsStated) {
+TEST(Build, floatCoefficientsChangeTheFieldByWhatIsStated) {
   const Field exact = build(torus, cube(), {.targetError = 1e-7, .coefficients = CoefficientType::float64});
   const Field rounded = build(torus, cube(), {.targetError = 1e-7, .coefficients = CoefficientType::float32});
   EXPECT_EQ(exact.data().nodes, rounded.data().nodes);
@@ -265,7 +265,7 @@ TEST(Build, FloatCoefficientsChangeTheFieldByWhatIsStated) {
   EXPECT_NEAR(m.rms / rounded.metadata().roundingRms, 1, 0.1);
 }
 
-TEST(Build, AutomaticPrecisionFollowsTheTarget) {
+TEST(Build, automaticPrecisionFollowsTheTarget) {
   EXPECT_TRUE(build(sphere, cube(), {.targetError = 1e-6}).singlePrecision());
   // RMS 1e-9 asked for: float would round by more than 1 % of that
   const auto smooth = [](const Vector3& x) { return 0.1 * x.x() * x.y() * x.z() + std::sin(x.x()) + 10; };
@@ -273,7 +273,7 @@ TEST(Build, AutomaticPrecisionFollowsTheTarget) {
 }
 
 /// Float where its rounding stays below a hundredth of the estimate, double from there on.
-TEST(Build, AutomaticPrecisionComparesRoundingWithTheEstimate) {
+TEST(Build, automaticPrecisionComparesRoundingWithTheEstimate) {
   const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()); };
   int floats = 0, doubles = 0;
   for (double target = 1e-6; target > 1e-17; target /= 10) {
@@ -291,7 +291,7 @@ TEST(Build, AutomaticPrecisionComparesRoundingWithTheEstimate) {
 }
 
 /// By the estimate of build.h: 250 bytes a node, 8 a coefficient.
-TEST(Build, SaysEarlyThatMemoryWillNotDo) {
+TEST(Build, saysEarlyThatMemoryWillNotDo) {
   std::atomic<std::uint64_t> taken = 0;
   const auto counted = [&](const Vector3& x) {
     ++taken;
@@ -317,7 +317,7 @@ TEST(Build, SaysEarlyThatMemoryWillNotDo) {
   EXPECT_THROW(build(counted, cube(), options), Error) << "not even the base grid";
 }
 
-TEST(Build, LimitsHold) {
+TEST(Build, limitsHold) {
   const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
   const FieldStatistics s = statistics(shallow);
   EXPECT_LE(s.depthLeaves.rbegin()->first, 1);
@@ -334,13 +334,13 @@ TEST(Build, LimitsHold) {
 
 /// Φ even about the centre of a single base cell: every odd shell is empty, and the embedded estimate alone would take
 /// the first one for convergence.
-TEST(Build, SymmetryDoesNotLookLikeConvergence) {
+TEST(Build, symmetryDoesNotLookLikeConvergence) {
   const Field field = build(sphere, cube(), {.targetError = 1e-8, .grid = {1, 1, 1}});
   EXPECT_GT(statistics(field).leaves, 50u);
   EXPECT_LT(measure(field, sphere).rms, 1e-4);
 }
 
-TEST(Build, BandLeavesFarCellsAlone) {
+TEST(Build, bandLeavesFarCellsAlone) {
   const BuildOptions everywhere{.targetError = 1e-8, .nearness = 0};
   BuildOptions near = everywhere;
   near.band = 0.1;
@@ -370,7 +370,7 @@ TEST(Build, BandLeavesFarCellsAlone) {
 }
 
 /// A higher θ moves the error away from the surface: at equal τ fewer coefficients, lost far away.
-TEST(Build, NearnessFavoursTheSurface) {
+TEST(Build, nearnessFavoursTheSurface) {
   const auto farOverNear = [](double nearness) {
     const Field field = build(torus, cube(), {.targetError = 1e-6, .nearness = nearness});
     std::mt19937_64 random(6);
@@ -388,14 +388,14 @@ TEST(Build, NearnessFavoursTheSurface) {
   EXPECT_GT(farOverNear(32), 2 * farOverNear(0));
 }
 
-TEST(Build, BoxesAndGridsNeedNotBeCubic) {
+TEST(Build, boxesAndGridsNeedNotBeCubic) {
   const Box domain(Vector3(-1.2, -1.3, -0.5), Vector3(1.1, 1.2, 0.6));
   const Field field = build(torus, domain, {.targetError = 1e-7, .grid = {5, 4, 2}});
   EXPECT_LT(measure(field, torus).rms, 3e-4);
   EXPECT_EQ(field.grid(), (std::array<std::uint32_t, 3>{5, 4, 2}));
 }
 
-TEST(Build, TakesBatchedCallables) {
+TEST(Build, takesBatchedCallables) {
   std::atomic<std::size_t> calls = 0;
   const auto batched = [&](std::span<const Vector3> points, std::span<double> out) {
     calls += points.size();
@@ -406,7 +406,7 @@ TEST(Build, TakesBatchedCallables) {
   EXPECT_EQ(field.metadata().exactEvaluations, calls);
 }
 
-TEST(Build, ProgressRisesAndCancelStops) {
+TEST(Build, progressRisesAndCancelStops) {
   double last = 0;
   std::size_t reports = 0;
   bool rises = true;
@@ -428,7 +428,7 @@ TEST(Build, ProgressRisesAndCancelStops) {
 }
 
 /// One cell of a high degree has many batches of samples: cancelling does not wait for the last.
-TEST(Build, CancelStopsWithinACell) {
+TEST(Build, cancelStopsWithinACell) {
   std::atomic<std::size_t> taken = 0, takenLate = 0;
   std::atomic<bool> cancel = false;
   const auto phi = [&](std::span<const Vector3> points, std::span<double> out) {
@@ -442,7 +442,7 @@ TEST(Build, CancelStopsWithinACell) {
   EXPECT_EQ(takenLate, 0u);
 }
 
-TEST(Build, RefusesBadOptions) {
+TEST(Build, refusesBadOptions) {
   const auto refuses = [](const BuildOptions& options, const std::string& word, const Box& domain = cube()) {
     try {
       build(torus, domain, options);
@@ -471,12 +471,12 @@ TEST(Build, RefusesBadOptions) {
   refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, nan, 1)));
 }
 
-TEST(Build, RefusesDistancesThatAreNotFinite) {
+TEST(Build, refusesDistancesThatAreNotFinite) {
   const auto broken = [](const Vector3& x) { return x.x() > 0.5 ? std::log(-1.0) : x.norm(); };
   EXPECT_THROW(build(broken, cube()), Error);
 }
 
-TEST(DomainAround, EnlargesAsThePaperDoes) {
+TEST(DomainAround, enlargesAsThePaperDoes) {
   const Box surface(Vector3(0, 0, 0), Vector3(4, 2, 1));
   const Box cubic = domainAround(surface);
   EXPECT_TRUE(cubic.sizes().isApprox(Vector3::Constant(4.4)));

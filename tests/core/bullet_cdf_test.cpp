@@ -61,7 +61,7 @@ Differences differencesOfFile(const std::string& bytes, const Field& field) {
   return differences(sdf, field);
 }
 
-TEST(BulletCdf, CubicPolynomialsComeBackWithTheirGradients) {
+TEST(BulletCdf, cubicPolynomialsComeBackWithTheirGradients) {
   const Field field = oneLeafField(1, 3);
   const Differences found = differencesOfFile(fileOf(sampleCubicGrid(field, {2, 3, 4})), field);
   EXPECT_LT(found.greatestValue, kRounding);
@@ -69,7 +69,7 @@ TEST(BulletCdf, CubicPolynomialsComeBackWithTheirGradients) {
 }
 
 /// The test above on wrong files.
-TEST(BulletCdf, WrongFilesAreSeen) {
+TEST(BulletCdf, wrongFilesAreSeen) {
   const Field field = oneLeafField(1, 3);
   const CubicGrid grid = sampleCubicGrid(field, {2, 3, 4});
   const std::string bytes = fileOf(grid);
@@ -87,7 +87,7 @@ TEST(BulletCdf, WrongFilesAreSeen) {
     EXPECT_GT(differencesOfFile(wrong, field).greatestValue, 1e-2);
 }
 
-TEST(BulletCdf, ItIsTheInterpolationThatTheCommandMeasures) {
+TEST(BulletCdf, itIsTheInterpolationThatTheCommandMeasures) {
   const Field field = oneLeafField(2, 6);
   const CubicGrid grid = sampleCubicGrid(field, {3, 2, 2});
   btMiniSDF sdf;
@@ -104,7 +104,7 @@ TEST(BulletCdf, ItIsTheInterpolationThatTheCommandMeasures) {
 }
 
 /// Twice as many cells an axis: a sixteenth for values, an eighth for gradients.
-TEST(BulletCdf, DifferencesShrinkWithTheFourthOrder) {
+TEST(BulletCdf, differencesShrinkWithTheFourthOrder) {
   const Field field = oneLeafField(3, 5);
   const auto found = [&](std::uint32_t n) {
     return differencesOfFile(fileOf(sampleCubicGrid(field, {n, n, n})), field);
@@ -117,7 +117,7 @@ TEST(BulletCdf, DifferencesShrinkWithTheFourthOrder) {
   }
 }
 
-TEST(BulletCdf, TheDomainsBoundaryBelongsToIt) {
+TEST(BulletCdf, theDomainsBoundaryBelongsToIt) {
   const Field field = oneLeafField(4, 3);
   btMiniSDF sdf;
   ASSERT_TRUE(load(sdf, fileOf(sampleCubicGrid(field, {3, 5, 7}))));
@@ -133,7 +133,7 @@ TEST(BulletCdf, TheDomainsBoundaryBelongsToIt) {
   EXPECT_FALSE(sdf.interpolate(0, value, bulletVector(field.domain().max() + Vector3(0.01, 0, 0)), nullptr));
 }
 
-TEST(BulletCdf, AFieldIsACollisionShape) {
+TEST(BulletCdf, aFieldIsACollisionShape) {
   const auto distance = [](const Vector3& x) { return x.norm() - 0.7; };
   const Field field = build(distance, Box(Vector3(-1, -1, -1), Vector3(1, 1, 1)), {.targetError = 1e-8});
   const std::string bytes = fileOf(sampleCubicGrid(field, finestCubicGrid(field.domain(), 2'000'000)));

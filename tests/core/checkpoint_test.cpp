@@ -92,7 +92,7 @@ std::vector<BuildOptions> everyWay() {
 
 /// From the first state to the end, at random moments and with random numbers of threads; more than once. Every state
 /// on the way is, to the byte, one of those of a construction in one go: running sums and lists too.
-TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
+TEST(Checkpoint, whateverIsInterruptedEndsWithTheSameBytes) {
   support::TemporaryDirectory folder;
   std::mt19937_64 random(7);
   constexpr int kResumed = 4, kAttempts = 300;
@@ -131,7 +131,7 @@ TEST(Checkpoint, WhateverIsInterruptedEndsWithTheSameBytes) {
 }
 
 /// Once more after the end: the last state gives the field without a step.
-TEST(Checkpoint, WhatWasDoneIsNotDoneAgain) {
+TEST(Checkpoint, whatWasDoneIsNotDoneAgain) {
   support::TemporaryDirectory folder;
   std::atomic<int> calls = 0;
   const auto counting = [&](const Vector3& x) {
@@ -205,7 +205,7 @@ class Refused : public testing::Test {
 
 bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-TEST_F(Refused, AreOthersStates) {
+TEST_F(Refused, areOthersStates) {
   EXPECT_EQ(refusal(), "");
   BuildOptions other = options_;
   other.threads = 2;
@@ -231,7 +231,7 @@ TEST_F(Refused, AreOthersStates) {
     EXPECT_TRUE(holds(refusal(distance(), cube(), options), "other options; delete it"));
 }
 
-TEST_F(Refused, AreFilesThatAreNoStates) {
+TEST_F(Refused, areFilesThatAreNoStates) {
   EXPECT_TRUE(holds(refusalOf("solid cube\nfacet normal 0 0 1\n"), "is no checkpoint"));
   EXPECT_TRUE(holds(refusalOf(""), "is no checkpoint"));
   std::string bytes = state_;
@@ -245,7 +245,7 @@ TEST_F(Refused, AreFilesThatAreNoStates) {
   EXPECT_TRUE(holds(refusal(), "folder"));
 }
 
-TEST_F(Refused, AreTruncatedAndAlteredStates) {
+TEST_F(Refused, areTruncatedAndAlteredStates) {
   std::size_t count = 0;
   for (std::size_t length = 0; length < state_.size(); length += length < 200 ? 1 : state_.size() / 200, ++count)
     ASSERT_NE(refusalOf(state_.substr(0, length)), "") << length << " of " << state_.size() << " bytes";
@@ -262,7 +262,7 @@ TEST_F(Refused, AreTruncatedAndAlteredStates) {
 }
 
 /// With a right checksum whatever is in it: refused, or a construction that ends in one of the known ways.
-TEST_F(Refused, ForgedStatesDoNoHarm) {
+TEST_F(Refused, forgedStatesDoNoHarm) {
   std::mt19937_64 random(3);
   int refused = 0;
   constexpr int kForged = 200;
@@ -286,7 +286,7 @@ TEST_F(Refused, ForgedStatesDoNoHarm) {
   EXPECT_LT(refused, kForged) << "some get past the checks";
 }
 
-TEST(Checkpoint, TimesOutOfRangeAreRefused) {
+TEST(Checkpoint, timesOutOfRangeAreRefused) {
   support::TemporaryDirectory folder;
   for (const auto& [seconds, share] : {std::pair(-1.0, 0.1), {NAN, 0.1}, {1e10, 0.1}, {1.0, 0.0}, {1.0, 1.5}})
     EXPECT_THROW(buildResumably(spheres, cube(), {.targetError = 1e-3},
@@ -314,7 +314,7 @@ int attempts(const Checkpoint& checkpoint) {
   return failures;
 }
 
-TEST(Checkpoint, StatesAreKeptNoMoreOftenThanAsked) {
+TEST(Checkpoint, statesAreKeptNoMoreOftenThanAsked) {
   support::TemporaryDirectory folder;
   const int always = attempts(alwaysAt(folder / "state"));
   EXPECT_GT(always, 5);
@@ -322,7 +322,7 @@ TEST(Checkpoint, StatesAreKeptNoMoreOftenThanAsked) {
   EXPECT_EQ(attempts({.file = folder / "state", .seconds = 0, .share = 1e-9}), 1);
 }
 
-TEST(Checkpoint, AFullDiskLeavesTheOlderStateAndTheConstruction) {
+TEST(Checkpoint, aFullDiskLeavesTheOlderStateAndTheConstruction) {
   support::TemporaryDirectory folder;
   const fs::path file = folder / "state";
   const BuildOptions options{.targetError = 1e-6};
@@ -356,7 +356,7 @@ pid_t pastProcess() {
   return child;
 }
 
-TEST(OutputFile, LeftoversOfKilledProcessesAreRemoved) {
+TEST(OutputFile, leftoversOfKilledProcessesAreRemoved) {
   support::TemporaryDirectory folder;
   const auto leftover = [&](const std::string& name, pid_t process, const std::string& rest) {
     const std::string whole = name + ".part-" + std::to_string(process) + rest;
@@ -380,7 +380,7 @@ TEST(OutputFile, LeftoversOfKilledProcessesAreRemoved) {
 }
 
 /// A name may have 255 bytes, and leaves no room for more.
-TEST(OutputFile, LongNamesHaveShortTemporaryOnes) {
+TEST(OutputFile, longNamesHaveShortTemporaryOnes) {
   support::TemporaryDirectory folder;
   std::string letters;
   for (int i = 0; i < 127; ++i) letters += "\u00e4";  // two bytes each
@@ -407,7 +407,7 @@ TEST(OutputFile, LongNamesHaveShortTemporaryOnes) {
 }
 
 /// In a container the next process often has the number of the one that was killed.
-TEST(OutputFile, ATakenTemporaryNameIsNoObstacle) {
+TEST(OutputFile, aTakenTemporaryNameIsNoObstacle) {
   support::TemporaryDirectory folder;
   unsigned next = 0;
   {

@@ -43,7 +43,7 @@ class Meter {
   std::vector<double> exact_;
 };
 
-TEST(ContinuityFigures, Bunny) {
+TEST(ContinuityFigures, bunny) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh mesh = importMesh(support::testMesh("paper/bunny_69k.obj")).mesh;
   const ExactDistance distance(mesh);

@@ -114,7 +114,7 @@ int countIntersecting(std::size_t count, std::array<std::uint32_t, 3> second, co
   return intersecting;
 }
 
-TEST(Crossings, OfTrianglesWithoutSharedCornersAreThoseThatNoPlaneSeparates) {
+TEST(Crossings, ofTrianglesWithoutSharedCornersAreThoseThatNoPlaneSeparates) {
   const int intersecting = countIntersecting(6, {3, 4, 5}, [](const auto& x) {
     return !areSeparate({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
   });
@@ -122,7 +122,7 @@ TEST(Crossings, OfTrianglesWithoutSharedCornersAreThoseThatNoPlaneSeparates) {
   EXPECT_LT(intersecting, 16'000);
 }
 
-TEST(Crossings, OfNeighboursAtACornerAreBeyondIt) {
+TEST(Crossings, ofNeighboursAtACornerAreBeyondIt) {
   const int intersecting = countIntersecting(5, {3, 1, 4}, [](const auto& x) {
     return !areSeparate({x[0], x[2]}, {x[3], x[1], x[4]}) || !areSeparate({x[3], x[4]}, {x[0], x[1], x[2]});
   });
@@ -130,7 +130,7 @@ TEST(Crossings, OfNeighboursAtACornerAreBeyondIt) {
   EXPECT_LT(intersecting, 18'000);
 }
 
-TEST(Crossings, OfNeighboursAtAnEdgeAreFoldedFlat) {
+TEST(Crossings, ofNeighboursAtAnEdgeAreFoldedFlat) {
   const int intersecting = countIntersecting(4, {2, 1, 3}, [](const auto& x) {
     const IntegerPoint side = minus(x[2], x[1]), normal = cross(side, minus(x[0], x[1]));
     const bool flat = dot(normal, minus(x[3], x[1])) == 0;
@@ -139,7 +139,7 @@ TEST(Crossings, OfNeighboursAtAnEdgeAreFoldedFlat) {
   EXPECT_GT(intersecting, 200);
 }
 
-TEST(Crossings, AreDecidedWithoutRounding) {
+TEST(Crossings, areDecidedWithoutRounding) {
   // Points far from the origin lie one unit in the last place above a plane, in it and below it.
   const Vector3 a(1e6, 1e6 + 1, 1e6), b(1e6 + 3, 1e6, 1e6 + 1), c(1e6 + 1, 1e6 + 5, 1e6 + 2);
   const Vector3 inPlane = a + 0.5 * (b - a) + 0.25 * (c - a);  // a multiple of 1/4 in each coordinate
@@ -155,7 +155,7 @@ TEST(Crossings, AreDecidedWithoutRounding) {
   EXPECT_EQ(surface::orientation(std::array{0, 1}, a, b, Vector3(a + 0.5 * (b - a))), 0);
 }
 
-TEST(Crossings, DoNotExistInEmbeddedMeshes) {
+TEST(Crossings, doNotExistInEmbeddedMeshes) {
   for (const char* shape : {"builtin:gear", "builtin:torus", "builtin:box", "builtin:sphere"}) {
     const Crossings crossings = findCrossings(shapes::mesh(shape));
     EXPECT_TRUE(crossings.found.empty()) << shape;
@@ -173,7 +173,7 @@ TriangleMesh lens() {
   return mesh;
 }
 
-TEST(Crossings, LieWhereTheSpheresIntersect) {
+TEST(Crossings, lieWhereTheSpheresIntersect) {
   const TriangleMesh mesh = lens();
   const auto half = static_cast<std::uint32_t>(mesh.triangles.size() / 2);
   const Crossings crossings = findCrossings(mesh);
@@ -187,7 +187,7 @@ TEST(Crossings, LieWhereTheSpheresIntersect) {
   EXPECT_TRUE(std::ranges::is_sorted(crossings.found, {}, &Crossing::triangles));
 }
 
-TEST(Crossings, DoNotDependOnThreadsAndObeyTheLimit) {
+TEST(Crossings, doNotDependOnThreadsAndObeyTheLimit) {
   const TriangleMesh mesh = lens();
   const auto trianglesOf = [&](int threads, std::size_t limit) {
     const Crossings crossings = withThreads(threads, [&] { return findCrossings(mesh, limit); });
@@ -207,7 +207,7 @@ TEST(Crossings, DoNotDependOnThreadsAndObeyTheLimit) {
   }
 }
 
-TEST(Crossings, AreFoundAtAnyScale) {
+TEST(Crossings, areFoundAtAnyScale) {
   for (const double scale : {1e-90, 1e-20, 1e20, 1e90}) {
     TriangleMesh mesh = lens();
     const std::size_t count = findCrossings(mesh).found.size();
@@ -217,23 +217,23 @@ TEST(Crossings, AreFoundAtAnyScale) {
   }
 }
 
-TEST(Crossings, OfDuplicateTrianglesAreFoundUnlessDegenerate) {
+TEST(Crossings, ofDuplicateTrianglesAreFoundUnlessDegenerate) {
   EXPECT_TRUE(intersects(meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 2, 1})));
   EXPECT_FALSE(intersects(meshOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 2, 1}))) << "without area";
 }
 
-TEST(Crossings, DoNotExistInASingleTriangle) {
+TEST(Crossings, doNotExistInASingleTriangle) {
   EXPECT_TRUE(findCrossings({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, "one"}).found.empty());
 }
 
-TEST(Crossings, CanBeCancelled) {
+TEST(Crossings, canBeCancelled) {
   std::atomic<int> left = 100;
   EXPECT_THROW(findCrossings(lens(), kMaxCrossings, {{}, [&] { return --left < 0; }}), Cancelled);
 }
 
-TEST(Crossings, RefuseAnEmptyMesh) { EXPECT_THROW(findCrossings({}), Error); }
+TEST(Crossings, refuseAnEmptyMesh) { EXPECT_THROW(findCrossings({}), Error); }
 
-TEST(Crossings, OfMeshFilesAreAsKnown) {
+TEST(Crossings, ofMeshFilesAreAsKnown) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const auto crossings = [](const char* file) { return findCrossings(importMesh(support::testMesh(file)).mesh); };
   EXPECT_TRUE(crossings("paper/bunny_69k.obj").found.empty());

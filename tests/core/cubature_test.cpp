@@ -19,7 +19,7 @@ double integral(const basis::Cubature& rule, int i, int j, int k) {
 /// ∫ x^i over [-1, 1]
 double exact(int i) { return i % 2 == 0 ? 2.0 / (i + 1) : 0; }
 
-TEST(CompactCubature, IntegratesUpToItsOrderAndNoFurther) {
+TEST(CompactCubature, integratesUpToItsOrderAndNoFurther) {
   const std::map<int, std::size_t> points = {{5, 14}, {7, 34}, {9, 58}, {11, 90}, {13, 148}};
   for (const auto& [order, count] : points) {
     const auto rule = basis::compactCubature(order);

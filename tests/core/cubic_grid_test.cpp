@@ -53,7 +53,7 @@ constexpr int kNodePositions[32][3] = {
     {0, 1, 0}, {0, 2, 0}, {3, 1, 0}, {3, 2, 0}, {0, 1, 3}, {0, 2, 3}, {3, 1, 3}, {3, 2, 3},   // along y
     {0, 0, 1}, {0, 0, 2}, {0, 3, 1}, {0, 3, 2}, {3, 0, 1}, {3, 0, 2}, {3, 3, 1}, {3, 3, 2}};  // along z
 
-TEST(CubicGrid, WritesTheNodesOfEachCellInTheOrderOfTheFormat) {
+TEST(CubicGrid, writesTheNodesOfEachCellInTheOrderOfTheFormat) {
   const Field field = oneLeafField(1, 2);
   const CubicGrid grid = sampleCubicGrid(field, {2, 3, 4});
   const std::string bytes = fileOf(grid);
@@ -92,7 +92,7 @@ TEST(CubicGrid, WritesTheNodesOfEachCellInTheOrderOfTheFormat) {
   EXPECT_TRUE(reader.atEnd());
 }
 
-TEST(CubicGrid, ReproducesCubicPolynomials) {
+TEST(CubicGrid, reproducesCubicPolynomials) {
   for (const int degree : {3, 4}) {
     const Field field = oneLeafField(2, degree);
     const CubicGridError error = measureCubicGrid(sampleCubicGrid(field, {2, 1, 3}), field, 1000);
@@ -105,7 +105,7 @@ TEST(CubicGrid, ReproducesCubicPolynomials) {
   }
 }
 
-TEST(CubicGrid, ConvergesWithFourthOrder) {
+TEST(CubicGrid, convergesWithFourthOrder) {
   const Field field = oneLeafField(3, 6);
   const auto rms = [&](std::uint32_t n) {
     return measureCubicGrid(sampleCubicGrid(field, {n, n, n}), field, 20000).everywhere.rms;
@@ -114,7 +114,7 @@ TEST(CubicGrid, ConvergesWithFourthOrder) {
   EXPECT_NEAR(rms(16) / rms(32), 16, 1);
 }
 
-TEST(CubicGrid, ConvergesWithFirstOrderAtACrease) {
+TEST(CubicGrid, convergesWithFirstOrderAtACrease) {
   FieldData data;  // |x|; with odd numbers of cells the crease lies inside a cell
   data.domain = Box(Vector3(-1, 0, 0), Vector3(1, 1, 1));
   data.grid = {2, 1, 1};
@@ -128,7 +128,7 @@ TEST(CubicGrid, ConvergesWithFirstOrderAtACrease) {
   EXPECT_NEAR(max(21) / max(41), 41.0 / 21, 0.02);
 }
 
-TEST(CubicGrid, MeasuresAKnownDifference) {
+TEST(CubicGrid, measuresAKnownDifference) {
   const Field field = oneLeafField(4, 1);
   CubicGrid grid = sampleCubicGrid(field, {3, 3, 3});
   for (double& node : grid.nodes) node += 0.5;
@@ -149,7 +149,7 @@ TEST(CubicGrid, MeasuresAKnownDifference) {
   EXPECT_EQ(none.rms, 0);
 }
 
-TEST(CubicGrid, ChoosesNearlyCubicCells) {
+TEST(CubicGrid, choosesNearlyCubicCells) {
   const Box flat(Vector3(0, 0, 0), Vector3(2, 1, 0.01));
   EXPECT_EQ(cubicGridResolution(flat, 9), (GridResolution{9, 5, 1}));
   const GridResolution finest = finestCubicGrid(flat, 1'000'000);
@@ -159,7 +159,7 @@ TEST(CubicGrid, ChoosesNearlyCubicCells) {
   EXPECT_THROW(finestCubicGrid(flat, 559), Error);
 }
 
-TEST(CubicGrid, RefusesFilesTooLargeForBulletBeforeAllocating) {
+TEST(CubicGrid, refusesFilesTooLargeForBulletBeforeAllocating) {
   const Field field = oneLeafField(5, 1);
   for (const GridResolution& resolution :
        {GridResolution{225, 225, 225}, GridResolution{4'000'000'000, 4'000'000'000, 4'000'000'000},
@@ -168,7 +168,7 @@ TEST(CubicGrid, RefusesFilesTooLargeForBulletBeforeAllocating) {
   EXPECT_LE(cubicGridBytes({224, 224, 224}), double(kMaxCubicGridBytes));
 }
 
-TEST(CubicGrid, RefusesToWriteAGridThatLacksNodes) {
+TEST(CubicGrid, refusesToWriteAGridThatLacksNodes) {
   CubicGrid grid = sampleCubicGrid(oneLeafField(5, 1), {2, 2, 2});
   grid.nodes.pop_back();
   const support::TemporaryDirectory folder;
@@ -176,7 +176,7 @@ TEST(CubicGrid, RefusesToWriteAGridThatLacksNodes) {
   EXPECT_THROW(writeCubicGrid(grid, out), Error);
 }
 
-TEST(CubicGrid, DoesNotDependOnTheNumberOfThreads) {
+TEST(CubicGrid, doesNotDependOnTheNumberOfThreads) {
   const Field field = oneLeafField(6, 5);
   const CubicGrid grid = sampleCubicGrid(field, {20, 20, 20}, 1);
   EXPECT_EQ(sampleCubicGrid(field, {20, 20, 20}, 4).nodes, grid.nodes);
@@ -187,7 +187,7 @@ TEST(CubicGrid, DoesNotDependOnTheNumberOfThreads) {
   EXPECT_NE(one.everywhere.rms, measureCubicGrid(grid, field, 10000, 8).everywhere.rms) << "other points";
 }
 
-TEST(CubicGrid, CanBeCancelled) {
+TEST(CubicGrid, canBeCancelled) {
   const Field field = oneLeafField(6, 3);
   const CubicGrid grid = sampleCubicGrid(field, {3, 3, 3});
   double fraction = 0;

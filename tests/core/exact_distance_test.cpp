@@ -118,13 +118,13 @@ void expectDistancesAround(const Triangle& corners, Random& random) {
   }
 }
 
-TEST(TriangleFrame, MeasuresDistancesToOrdinaryTriangles) {
+TEST(TriangleFrame, measuresDistancesToOrdinaryTriangles) {
   Random random(1);
   for (int i = 0; i < 500; ++i)
     ASSERT_NO_FATAL_FAILURE(expectDistancesAround({random.inCube(1), random.inCube(1), random.inCube(1)}, random));
 }
 
-TEST(TriangleFrame, MeasuresDistancesToSlivers) {
+TEST(TriangleFrame, measuresDistancesToSlivers) {
   Random random(2);
   for (const double thickness : {1e-3, 1e-5, 1e-7, 1e-9, 1e-12})
     for (int i = 0; i < 100; ++i) {
@@ -138,7 +138,7 @@ TEST(TriangleFrame, MeasuresDistancesToSlivers) {
     }
 }
 
-TEST(TriangleFrame, MeasuresDistancesToEdgesOfDegenerateTriangles) {
+TEST(TriangleFrame, measuresDistancesToEdgesOfDegenerateTriangles) {
   Random random(3);
   const Vector3 a(0.25, -0.5, 0.125), b(0.75, 0.5, -0.375);
   for (const Triangle& corners : {Triangle{a, b, (a + b) / 2}, Triangle{a, b, a}, Triangle{a, a, b}, Triangle{b, a, a},
@@ -148,7 +148,7 @@ TEST(TriangleFrame, MeasuresDistancesToEdgesOfDegenerateTriangles) {
   }
 }
 
-TEST(TriangleFrame, IsOrthonormalAndKeepsOrientation) {
+TEST(TriangleFrame, isOrthonormalAndKeepsOrientation) {
   Random random(4);
   for (int i = 0; i < 300; ++i) {
     const Triangle corners{random.inCube(1), random.inCube(1), random.inCube(1)};
@@ -296,13 +296,13 @@ std::vector<Vector3> probes(const TriangleMesh& mesh, std::size_t count, std::ui
   return points;
 }
 
-TEST(ExactDistance, EqualsBruteForceOnASphere) {
+TEST(ExactDistance, equalsBruteForceOnASphere) {
   const TriangleMesh mesh = sphere(4);
   ASSERT_EQ(mesh.triangles.size(), 2048u);
   expectBruteForce(mesh, probes(mesh, 4000, 10));
 }
 
-TEST(ExactDistance, ApproximatesTheAnalyticSphere) {
+TEST(ExactDistance, approximatesTheAnalyticSphere) {
   const ExactDistance distance(sphere(5));
   Random random(11);
   for (int i = 0; i < 2000; ++i) {
@@ -311,7 +311,7 @@ TEST(ExactDistance, ApproximatesTheAnalyticSphere) {
   }
 }
 
-TEST(ExactDistance, EqualsBruteForceOnSoupWithSliversAndCollapsedTriangles) {
+TEST(ExactDistance, equalsBruteForceOnSoupWithSliversAndCollapsedTriangles) {
   Random random(12);
   TriangleMesh mesh;
   for (std::uint32_t t = 0; t < 600; ++t) {
@@ -327,7 +327,7 @@ TEST(ExactDistance, EqualsBruteForceOnSoupWithSliversAndCollapsedTriangles) {
   expectBruteForce(mesh, probes(mesh, 4000, 13));
 }
 
-TEST(ExactDistance, EqualsBruteForceFarFromTheOrigin) {
+TEST(ExactDistance, equalsBruteForceFarFromTheOrigin) {
   TriangleMesh mesh = sphere(3);
   const ExactDistance atOrigin(mesh);
   const Vector3 shift(1e4, -2e4, 1.5e4);
@@ -339,7 +339,7 @@ TEST(ExactDistance, EqualsBruteForceFarFromTheOrigin) {
   for (const Vector3& x : points) EXPECT_NEAR(moved(x), atOrigin(x - shift), 2e-11);
 }
 
-TEST(ExactDistance, EqualsBruteForceAtAnyScale) {
+TEST(ExactDistance, equalsBruteForceAtAnyScale) {
   for (const double scale : {1e-30, 1e-6, 1e6, 1e30}) {
     TriangleMesh mesh = sphere(2);
     for (Vector3& vertex : mesh.vertices) vertex *= scale;
@@ -352,7 +352,7 @@ TEST(ExactDistance, EqualsBruteForceAtAnyScale) {
   }
 }
 
-TEST(ExactDistance, EqualsBruteForceFarAway) {
+TEST(ExactDistance, equalsBruteForceFarAway) {
   const TriangleMesh mesh = sphere(2);
   const ExactDistance distance(mesh);
   Random random(16);
@@ -367,7 +367,7 @@ TEST(ExactDistance, EqualsBruteForceFarAway) {
 
 // Boxes that overlap completely, or shrink by a factor from triangle to triangle, have no good splitting plane. The
 // depth of the hierarchy must stay bounded.
-TEST(ExactDistance, HandlesStacksOfEqualTriangles) {
+TEST(ExactDistance, handlesStacksOfEqualTriangles) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   mesh.triangles.assign(200'000, {0, 1, 2});
@@ -378,7 +378,7 @@ TEST(ExactDistance, HandlesStacksOfEqualTriangles) {
   }
 }
 
-TEST(ExactDistance, HandlesTrianglesThatShrinkByAFactor) {
+TEST(ExactDistance, handlesTrianglesThatShrinkByAFactor) {
   TriangleMesh mesh;
   for (std::uint32_t t = 0; t < 900; ++t) {
     const double size = std::pow(0.7, t);
@@ -391,7 +391,7 @@ TEST(ExactDistance, HandlesTrianglesThatShrinkByAFactor) {
 // --- Signs
 
 /// The centers of many triangles differ by less than the smallest divisor in single precision.
-TEST(ExactDistance, HandlesClustersTooSmallForBinning) {
+TEST(ExactDistance, handlesClustersTooSmallForBinning) {
   for (const double size : {1e-37, 1e-38, 1e-39, 1e-41, 1e-44}) {
     TriangleMesh mesh;
     const auto add = [&](const Vector3& a, double length) {
@@ -408,7 +408,7 @@ TEST(ExactDistance, HandlesClustersTooSmallForBinning) {
   }
 }
 
-TEST(ExactDistance, AcceptsAnyFiniteCoordinates) {
+TEST(ExactDistance, acceptsAnyFiniteCoordinates) {
   for (const double size : {1e-320, 1e-310, 1e300, 1e307})
     for (const double at : {0.0, 1.6e308}) {
       TriangleMesh mesh = sphere(2);
@@ -417,7 +417,7 @@ TEST(ExactDistance, AcceptsAnyFiniteCoordinates) {
     }
 }
 
-TEST(ExactDistance, EqualsTheSignedDistanceOfABox) {
+TEST(ExactDistance, equalsTheSignedDistanceOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const ExactDistance distance(box(half));
   Random random(20);
@@ -427,7 +427,7 @@ TEST(ExactDistance, EqualsTheSignedDistanceOfABox) {
   }
 }
 
-TEST(ExactDistance, HasTheRightSignNearVerticesAndEdgesOfABox) {
+TEST(ExactDistance, hasTheRightSignNearVerticesAndEdgesOfABox) {
   const Vector3 half(1, 0.5, 0.25);
   const TriangleMesh mesh = box(half);
   const ExactDistance distance(mesh);
@@ -442,7 +442,7 @@ TEST(ExactDistance, HasTheRightSignNearVerticesAndEdgesOfABox) {
     }
 }
 
-TEST(ExactDistance, ReportsFeatureAndLowestTriangle) {
+TEST(ExactDistance, reportsFeatureAndLowestTriangle) {
   const ExactDistance distance(box(Vector3(1, 1, 1)));
   const ClosestPoint face = distance.closestPoint({0.5, -0.25, 3});
   EXPECT_EQ(face.feature, Feature::face);
@@ -461,7 +461,7 @@ TEST(ExactDistance, ReportsFeatureAndLowestTriangle) {
   EXPECT_EQ(center.signedDistance, -1);
 }
 
-TEST(ExactDistance, HasTheRightSignForRandomTetrahedra) {
+TEST(ExactDistance, hasTheRightSignForRandomTetrahedra) {
   Random random(22);
   for (int i = 0; i < 200; ++i) {
     const TriangleMesh mesh = tetrahedron({random.inCube(1), random.inCube(1), random.inCube(1), random.inCube(1)});
@@ -486,7 +486,7 @@ TriangleMesh wedge(double angle) {
   return mesh;
 }
 
-TEST(ExactDistance, HasTheRightSignAtDihedralWedges) {
+TEST(ExactDistance, hasTheRightSignAtDihedralWedges) {
   Random random(23);
   for (const double angleDegrees : {2.0, 10.0, 45.0, 90.0, 135.0, 175.0}) {
     const TriangleMesh solid = wedge(angleDegrees * std::numbers::pi / 180);
@@ -506,7 +506,7 @@ TEST(ExactDistance, HasTheRightSignAtDihedralWedges) {
 }
 
 // The apex of a deep notch is reentrant, and its boundary has saddle points. Face normals give wrong signs here.
-TEST(ExactDistance, HasTheRightSignAtANotch) {
+TEST(ExactDistance, hasTheRightSignAtANotch) {
   TriangleMesh mesh = box(Vector3(1, 1, 1));
   mesh.vertices.push_back({0.7, 0.6, -0.9});
   std::erase_if(mesh.triangles, [](const auto& t) { return t[0] == 4 && (t[1] == 5 || (t[1] == 7 && t[2] == 6)); });
@@ -528,7 +528,7 @@ TEST(ExactDistance, HasTheRightSignAtANotch) {
   EXPECT_GT(within, 1000);
 }
 
-TEST(ExactDistance, IsPositiveZeroOnTheSurface) {
+TEST(ExactDistance, isPositiveZeroOnTheSurface) {
   for (const TriangleMesh& mesh : {box(Vector3(1, 0.5, 0.25)), sphere(3), wedge(0.3)}) {
     const ExactDistance distance(mesh);
     for (const Vector3& vertex : mesh.vertices) {
@@ -553,7 +553,7 @@ TEST(ExactDistance, IsPositiveZeroOnTheSurface) {
 }
 
 // A degenerate triangle closes a T-junction, so that the mesh is closed. The triangle must not affect any sign.
-TEST(ExactDistance, IgnoresDegenerateTrianglesForSigns) {
+TEST(ExactDistance, ignoresDegenerateTrianglesForSigns) {
   const Vector3 half(1, 1, 1);
   TriangleMesh mesh = box(half);
   mesh.vertices.push_back({0, 0, 1});  // midpoint of the diagonal 4-7 of the top
@@ -573,7 +573,7 @@ TEST(ExactDistance, IgnoresDegenerateTrianglesForSigns) {
   }
 }
 
-TEST(ExactDistance, HasBothSignsAroundOneTriangle) {
+TEST(ExactDistance, hasBothSignsAroundOneTriangle) {
   const ExactDistance distance(TriangleMesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, ""}, kByNormals);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, 2)), 2);
   EXPECT_EQ(distance(Vector3(0.25, 0.25, -2)), -2);
@@ -588,7 +588,7 @@ void expectSameBits(const std::vector<double>& a, const std::vector<double>& b) 
     ASSERT_EQ(std::bit_cast<std::uint64_t>(a[i]), std::bit_cast<std::uint64_t>(b[i])) << i;
 }
 
-TEST(ExactDistance, SingleBatchedShuffledAndThreadedAgreeBitForBit) {
+TEST(ExactDistance, singleBatchedShuffledAndThreadedAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
   std::vector<Vector3> points = probes(mesh, 6000, 30);
@@ -622,7 +622,7 @@ TEST(ExactDistance, SingleBatchedShuffledAndThreadedAgreeBitForBit) {
 }
 
 /// Tries every instruction set of this processor, down to the scalar fallback.
-TEST(ExactDistance, InstructionSetsAgreeBitForBit) {
+TEST(ExactDistance, instructionSetsAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
   std::vector<Vector3> points = probes(mesh, 3001, 31);
@@ -646,7 +646,7 @@ TEST(ExactDistance, InstructionSetsAgreeBitForBit) {
   EXPECT_GE(names.size(), 2u);
 }
 
-TEST(ExactDistance, DependsOnTheOrderOfTrianglesForTiesOnly) {
+TEST(ExactDistance, dependsOnTheOrderOfTrianglesForTiesOnly) {
   TriangleMesh mesh = sphere(3);
   const std::vector<Vector3> points = probes(mesh, 3000, 31);
   const ExactDistance distance(mesh);
@@ -656,7 +656,7 @@ TEST(ExactDistance, DependsOnTheOrderOfTrianglesForTiesOnly) {
   for (const Vector3& x : points) EXPECT_NEAR(shuffled(x), distance(x), 1e-15);
 }
 
-TEST(ExactDistance, AcceptsNonFinitePoints) {
+TEST(ExactDistance, acceptsNonFinitePoints) {
   const ExactDistance distance(sphere(2));
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::vector<Vector3> points = {{nan, 0, 0}, {2, 0, 0}, {infinity, 0, 0}, {0, -infinity, infinity}, {0, 0, 3}};
@@ -676,7 +676,7 @@ TEST(ExactDistance, AcceptsNonFinitePoints) {
 }
 
 /// Points near the mesh, far away and beyond single precision share packets with points that are not finite.
-TEST(ExactDistance, NonFinitePointsDoNotAffectTheirPacket) {
+TEST(ExactDistance, nonFinitePointsDoNotAffectTheirPacket) {
   const ExactDistance distance(sphere(2));
   std::vector<Vector3> points;
   for (const double far : {1e-3, 1e10, 1e20})
@@ -695,7 +695,7 @@ TEST(ExactDistance, NonFinitePointsDoNotAffectTheirPacket) {
 
 // --- The object
 
-TEST(ExactDistance, KnowsItsSourceAndSizeAndCanBeMoved) {
+TEST(ExactDistance, knowsItsSourceAndSizeAndCanBeMoved) {
   TriangleMesh mesh = sphere(2);
   ExactDistance distance(mesh);
   EXPECT_EQ(distance.source().name, "sphere");
@@ -723,7 +723,7 @@ void expectError(const TriangleMesh& mesh, const std::string& part) {
   }
 }
 
-TEST(ExactDistance, RefusesInvalidMeshes) {
+TEST(ExactDistance, refusesInvalidMeshes) {
   TriangleMesh mesh = sphere(1);
   mesh.triangles.clear();
   expectError(mesh, "no faces");
@@ -741,7 +741,7 @@ TEST(ExactDistance, RefusesInvalidMeshes) {
 
 class ExactDistanceOfMeshes : public testing::TestWithParam<const char*> {};
 
-TEST_P(ExactDistanceOfMeshes, EqualsBruteForce) {
+TEST_P(ExactDistanceOfMeshes, equalsBruteForce) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh mesh = normalized(importMesh(support::testMesh(GetParam())).mesh);
   expectBruteForce(mesh, probes(mesh, 10'000, 40));

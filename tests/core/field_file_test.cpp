@@ -47,7 +47,7 @@ std::string refusal(const std::filesystem::path& file) {
   }
 }
 
-TEST(FieldFile, RoundTripKeepsEveryByteAndValue) {
+TEST(FieldFile, roundTripKeepsEveryByteAndValue) {
   support::TemporaryDirectory folder;
   for (const auto type : {CoefficientType::float32, CoefficientType::float64}) {
     const Field field = small(type);
@@ -74,7 +74,7 @@ TEST(FieldFile, RoundTripKeepsEveryByteAndValue) {
   }
 }
 
-TEST(FieldFile, EveryTruncationIsRefused) {
+TEST(FieldFile, everyTruncationIsRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "cut.hpsdf";
   save(small(), file);
@@ -89,7 +89,7 @@ TEST(FieldFile, EveryTruncationIsRefused) {
   EXPECT_NE(refusal(file).find("too long"), std::string::npos);
 }
 
-TEST(FieldFile, EveryFlippedBitIsRefused) {
+TEST(FieldFile, everyFlippedBitIsRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "flipped.hpsdf";
   save(small(), file);
@@ -126,7 +126,7 @@ std::vector<std::string> everyKind() {
 
 /// Cut off, cut open, or with up to eight other bits, of a few bytes or of all; every place as often as another, and
 /// half of them in the header.
-TEST(FieldFile, TwoThousandDamagedFilesOfEveryKindAreRefused) {
+TEST(FieldFile, twoThousandDamagedFilesOfEveryKindAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "damaged.hpsdf";
   const std::vector<std::string> files = everyKind();
@@ -155,7 +155,7 @@ TEST(FieldFile, TwoThousandDamagedFilesOfEveryKindAreRefused) {
   EXPECT_EQ(refused, 2000);
 }
 
-TEST(FieldFile, OtherFilesAreNamedForWhatTheyAre) {
+TEST(FieldFile, otherFilesAreNamedForWhatTheyAre) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "other.hpsdf";
   EXPECT_NE(refusal(file).find("no such file"), std::string::npos);
@@ -182,7 +182,7 @@ constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8
 
 /// As older programs wrote them: version 3 without the sign, version 2 without what came after the steps, version 1
 /// without these too.
-TEST(FieldFile, FilesOfOlderVersionsAreRead) {
+TEST(FieldFile, filesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
   const Field field = small();
@@ -212,7 +212,7 @@ TEST(FieldFile, FilesOfOlderVersionsAreRead) {
   EXPECT_EQ(load(file).metadata().steps, std::nullopt) << "what is unknown stays so";
 }
 
-TEST(FieldFile, ContinuityAndBoundsAreKept) {
+TEST(FieldFile, continuityAndBoundsAreKept) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "more.hpsdf";
   FieldData data = small().data();
@@ -245,7 +245,7 @@ TEST(FieldFile, ContinuityAndBoundsAreKept) {
 }
 
 /// Blends, bounds and ways to steer that are none, with a right checksum.
-TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
+TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "forged.hpsdf";
   FieldData data = small().data();
@@ -275,7 +275,7 @@ TEST(FieldFile, ForgedContinuityAndBoundsAreRefused) {
 }
 
 /// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
-TEST(FieldFile, ForgedFilesAreRefused) {
+TEST(FieldFile, forgedFilesAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "forged.hpsdf";
   save(small(), file);
@@ -295,7 +295,7 @@ TEST(FieldFile, ForgedFilesAreRefused) {
   EXPECT_NE(forge(header, std::uint32_t{0xffffffff}), "");  // length of the name
 }
 
-TEST(OutputFile, AppearsWholeOrNotAtAll) {
+TEST(OutputFile, appearsWholeOrNotAtAll) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "out.txt";
   writeAll(file, "old");

@@ -47,7 +47,7 @@ FieldData steps() {
   return data;
 }
 
-TEST(Field, CellsAreHalfOpen) {
+TEST(Field, cellsAreHalfOpen) {
   const Field field(steps());
   EXPECT_EQ(field.value({0.9999, 0.5, 0.5}), 100);
   EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // The face belongs to the upper cell.
@@ -58,7 +58,7 @@ TEST(Field, CellsAreHalfOpen) {
   EXPECT_EQ(field.value({1.49, 0.49, 0.49}), 0);
 }
 
-TEST(Field, FindsTheCellOfAPoint) {
+TEST(Field, findsTheCellOfAPoint) {
   const Field field(steps());
   const Cell cell = field.cellAt({1.7, 0.1, 0.8});
   EXPECT_EQ(cell.id, 2u + 5u);
@@ -68,7 +68,7 @@ TEST(Field, FindsTheCellOfAPoint) {
   EXPECT_TRUE(cell.box.max().isApprox(Vector3(2, 0.5, 1)));
 }
 
-TEST(Field, EveryLeafIsVisitedOnceAndFillsTheDomain) {
+TEST(Field, everyLeafIsVisitedOnceAndFillsTheDomain) {
   const Field& field = torusField();
   std::set<std::uint32_t> seen;
   double volume = 0;
@@ -86,7 +86,7 @@ TEST(Field, EveryLeafIsVisitedOnceAndFillsTheDomain) {
   EXPECT_EQ(seen.size(), statistics(field).leaves);
 }
 
-TEST(Field, StatisticsAddUp) {
+TEST(Field, statisticsAddUp) {
   const FieldStatistics s = statistics(torusField());
   double degrees = 0, depths = 0;
   std::size_t coefficients = 0;
@@ -101,7 +101,7 @@ TEST(Field, StatisticsAddUp) {
   EXPECT_LE(s.bytes, (s.nodes * 8 + s.coefficients * 4) * 17 / 16) << "with the lookup grid";
 }
 
-TEST(Field, GradientMatchesCentralDifferencesWithinCells) {
+TEST(Field, gradientMatchesCentralDifferencesWithinCells) {
   const Field field = build(torus, unitDomain(), {.targetError = 1e-8, .coefficients = CoefficientType::float64});
   std::mt19937_64 random(1);
   const double step = 1e-5;
@@ -123,7 +123,7 @@ TEST(Field, GradientMatchesCentralDifferencesWithinCells) {
   EXPECT_GT(compared, 15000);
 }
 
-TEST(Field, ContinuesOutsideWithMatchingGradient) {
+TEST(Field, continuesOutsideWithMatchingGradient) {
   const Field& field = torusField();
   std::mt19937_64 random(2);
   int outside = 0;
@@ -154,7 +154,7 @@ TEST(Field, ContinuesOutsideWithMatchingGradient) {
   }
 }
 
-TEST(Field, EvaluatesAtInfinityAndNan) {
+TEST(Field, evaluatesAtInfinityAndNan) {
   const Field& field = torusField();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
@@ -168,7 +168,7 @@ TEST(Field, EvaluatesAtInfinityAndNan) {
 
 /// The lookup grid leads to the same leaf as the descent from the base cells: on faces and corners of cells, on and
 /// beyond the domain's boundary, at depths above and below its own, for grids of any shape.
-TEST(Field, QueriesEndInTheCellThatHoldsThePoint) {
+TEST(Field, queriesEndInTheCellThatHoldsThePoint) {
   const auto phi = [](const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; };
   const Box domain(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2));
   for (const BuildOptions& options : {BuildOptions{.targetError = 1e-6}, BuildOptions{.grid = {1, 2, 3}},
@@ -197,7 +197,7 @@ TEST(Field, QueriesEndInTheCellThatHoldsThePoint) {
   }
 }
 
-TEST(Field, BatchesAndThreadsGiveTheSameBits) {
+TEST(Field, batchesAndThreadsGiveTheSameBits) {
   const Field& field = torusField();
   std::mt19937_64 random(4);
   std::vector<Vector3> points(5000);
@@ -292,7 +292,7 @@ void expectBatchesEqualSingleQueries(const Field& field, std::span<const Vector3
 }
 
 /// The test runs on every instruction set that the processor has, down to scalar code.
-TEST(Field, BatchesGiveTheSameBitsOnEveryInstructionSet) {
+TEST(Field, batchesGiveTheSameBitsOnEveryInstructionSet) {
   for (const Field& field : {mixedField<double>(), mixedField<float>()}) {
     const FieldStatistics found = statistics(field);
     ASSERT_EQ(found.degreeLeaves.size(), 7u);
@@ -311,7 +311,7 @@ TEST(Field, BatchesGiveTheSameBitsOnEveryInstructionSet) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-TEST(Field, RefusesInvalidArrays) {
+TEST(Field, refusesInvalidArrays) {
   const auto refuses = [](auto&& spoil) {
     FieldData data = steps();
     spoil(data);

@@ -50,7 +50,7 @@ double depthInTwoBalls(const Vector3& x) {
   return depth;
 }
 
-TEST(OuterHull, OfTwoBallsIsTheSurfaceOfTheirUnion) {
+TEST(OuterHull, ofTwoBallsIsTheSurfaceOfTheirUnion) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
   EXPECT_EQ(hull.source().insideTest, InsideTest::outerHull);
@@ -75,14 +75,14 @@ TEST(OuterHull, OfTwoBallsIsTheSurfaceOfTheirUnion) {
   EXPECT_NEAR(withoutHull(Vector3(0.5, 0, 0)), -0.5, 0.01) << "the test has no power";
 }
 
-TEST(OuterHull, OfAMeshWithoutInnerWallsIsTheMesh) {
+TEST(OuterHull, ofAMeshWithoutInnerWallsIsTheMesh) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
   const ExactDistance hull(mesh, kHull), withoutHull(mesh);
   for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_EQ(hull(x), withoutHull(x));
 }
 
 /// Of two coplanar walls the larger one is subdivided along the edges of the smaller one.
-TEST(OuterHull, OmitsTheWallBetweenTouchingBodies) {
+TEST(OuterHull, omitsTheWallBetweenTouchingBodies) {
   const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
   EXPECT_EQ(withoutHull(Vector3(1, 0, 0)), 0);
@@ -93,7 +93,7 @@ TEST(OuterHull, OmitsTheWallBetweenTouchingBodies) {
   EXPECT_EQ(checkSign(mesh, hull, 4000).wrong, 0u);
 }
 
-TEST(OuterHull, OmitsSharedWalls) {
+TEST(OuterHull, omitsSharedWalls) {
   TriangleMesh mesh;
   for (int i = 0; i < 8; ++i) mesh = joined(mesh, moved(boxOfTwo(), 2 * Vector3(i & 1, i >> 1 & 1, i >> 2)));
   mesh = cleaned(mesh).mesh;
@@ -103,7 +103,7 @@ TEST(OuterHull, OmitsSharedWalls) {
 }
 
 /// Where three walls meet, or one ends on another, the smallest pieces remain intersected but are surrounded by inside.
-TEST(OuterHull, OmitsInnerWallsWhereTheyMeet) {
+TEST(OuterHull, omitsInnerWallsWhereTheyMeet) {
   const TriangleMesh mesh = joined(joined(boxBetween({0, 0, 0}, {1, 2, 2}), boxBetween({1, 0, 0}, {2, 2, 2})),
                                    boxBetween({0, 0, 2}, {2, 2, 4}));
   const ExactDistance hull(cleaned(mesh).mesh, kHull), whole(boxBetween({0, 0, 0}, {2, 2, 4})),
@@ -114,7 +114,7 @@ TEST(OuterHull, OmitsInnerWallsWhereTheyMeet) {
 }
 
 /// A triangle that touches only the boundary of another does not subdivide it, however the neighbours are subdivided.
-TEST(OuterHull, OfTouchingBodiesIsExact) {
+TEST(OuterHull, ofTouchingBodiesIsExact) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   for (const bool rotated : {false, true}) {
     TriangleMesh mesh, box = boxBetween({0, 0, 0}, {4, 4, 4});
@@ -141,7 +141,7 @@ TEST(OuterHull, OfTouchingBodiesIsExact) {
 }
 
 /// Between plates and in sharp wedges the outside is nearer to a piece than the piece is long.
-TEST(OuterHull, OutsideDistancesAreThoseToAllTriangles) {
+TEST(OuterHull, outsideDistancesAreThoseToAllTriangles) {
   const TriangleMesh plates =
       joined(joined(boxBetween({0, 0, 0}, {1000, 1000, 100}), boxBetween({0, 0, 100.2}, {1000, 1000, 200})),
              boxBetween({450, 450, -10}, {550, 550, 210}));
@@ -166,7 +166,7 @@ TEST(OuterHull, OutsideDistancesAreThoseToAllTriangles) {
   }
 }
 
-TEST(OuterHull, KeepsTrianglesThatArePartlyOutside) {
+TEST(OuterHull, keepsTrianglesThatArePartlyOutside) {
   // The long faces of the bar pass through the box.
   const TriangleMesh bar = shapes::mesh("box,width=6,height=0.5,depth=0.5");
   const ExactDistance hull(joined(boxOfTwo(), bar), kHull);
@@ -176,7 +176,7 @@ TEST(OuterHull, KeepsTrianglesThatArePartlyOutside) {
   EXPECT_NEAR(hull(Vector3(-1, 0, 0)), -0.25, 0.02) << "the bar leaves the box here";
 }
 
-TEST(OuterHull, OfOpenBodiesHasTheSignOfTheWindingNumber) {
+TEST(OuterHull, ofOpenBodiesHasTheSignOfTheWindingNumber) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(support::openAbove(ball, 0.8), moved(ball, {0.7, 0, 0}));
   const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
@@ -195,7 +195,7 @@ TEST(OuterHull, OfOpenBodiesHasTheSignOfTheWindingNumber) {
 }
 
 /// A face that no other intersects can cross the surface that closes a hole: part of it is outside.
-TEST(OuterHull, KeepsFacesThatPassThroughAHole) {
+TEST(OuterHull, keepsFacesThatPassThroughAHole) {
   const TriangleMesh blade = moved(shapes::mesh("box,width=0.4,height=0.4,depth=2.85"), {0, 0, 0.475});
   const TriangleMesh mesh = joined(support::openBox(), blade);
   const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
@@ -214,7 +214,7 @@ TEST(OuterHull, KeepsFacesThatPassThroughAHole) {
   EXPECT_GT(deeper, 200u);
 }
 
-TEST(OuterHull, ClosestPointsLieOnTheirTriangles) {
+TEST(OuterHull, closestPointsLieOnTheirTriangles) {
   const TriangleMesh mesh = twoBalls();
   const ExactDistance hull(mesh, kHull);
   for (const Vector3& x : placesIn(boundingBox(mesh), 300, 3)) {
@@ -226,7 +226,7 @@ TEST(OuterHull, ClosestPointsLieOnTheirTriangles) {
   }
 }
 
-TEST(OuterHull, SubdividesAlongTheIntersectionOnly) {
+TEST(OuterHull, subdividesAlongTheIntersectionOnly) {
   const TriangleMesh mesh = twoBalls();
   const TriangleMesh surface = ExactDistance(mesh, kHull).surface();
   EXPECT_LT(surface.triangles.size(), 4 * mesh.triangles.size());
@@ -238,7 +238,7 @@ TEST(OuterHull, SubdividesAlongTheIntersectionOnly) {
 }
 
 /// The hull of a mesh with holes asks for cancellation thousands of times: before, during and after the subdivision.
-TEST(OuterHull, ReportsProgressAndCanBeCancelled) {
+TEST(OuterHull, reportsProgressAndCanBeCancelled) {
   TriangleMesh mesh = twoBalls();
   mesh.triangles.pop_back();  // a hole, beside which pieces are refined
   std::map<std::string, double, std::less<>> tasks;

@@ -42,7 +42,7 @@ FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<s
 
 // Coefficients of degree 1 multiply 1, w, v, u, local coordinates that are 2·(world − cell) − 1 in a unit cell.
 
-TEST(Jumps, MeasuresKnownJumpsBetweenEqualCells) {
+TEST(Jumps, measuresKnownJumpsBetweenEqualCells) {
   // The leaves hold 1 + w and 3 + 2v, so that the jump is 2 + 2v − w.
   const Jumps jumps = findJumps(Field(row({{1, 1, 0, 0}, {3, 0, 2, 0}})));
   ASSERT_EQ(jumps.interfaces.size(), 1u);
@@ -63,7 +63,7 @@ TEST(Jumps, MeasuresKnownJumpsBetweenEqualCells) {
   EXPECT_NEAR(jumps.value.rms, face.value.rms, 1e-15);
 }
 
-TEST(Jumps, MeasuresCurvedPolynomialsOfUnequalDegree) {
+TEST(Jumps, measuresCurvedPolynomialsOfUnequalDegree) {
   // The leaves hold L2(v) and 0. ∫ L2²/2 = 1/5; the jump is greatest at the edges; the gradient is (0, 2·3v, 0).
   std::vector<double> quadratic(10, 0.0);
   quadratic[5] = 1;  // the coefficients are 000 001 002 010 011 020 …
@@ -76,7 +76,7 @@ TEST(Jumps, MeasuresCurvedPolynomialsOfUnequalDegree) {
   EXPECT_NEAR(jumps.gradient.max, 6, 1e-13);
 }
 
-TEST(Jumps, MeasuresKnownJumpsOnHangingFaces) {
+TEST(Jumps, measuresKnownJumpsOnHangingFaces) {
   // The left leaf holds 10 + u + v, which is 11 + v on the face; the right ones hold the constants 0 to 7.
   std::vector<std::vector<double>> children;
   for (double child = 0; child < 8; ++child) children.push_back({child});
@@ -159,7 +159,7 @@ std::map<std::array<std::uint32_t, 2>, ReferenceJump> referenceJumps(const Field
   return found;
 }
 
-TEST(Jumps, MeasuresEveryInterfaceOfARandomFieldOnce) {
+TEST(Jumps, measuresEveryInterfaceOfARandomFieldOnce) {
   for (const bool single : {false, true}) {
     RandomFieldOptions options;
     options.domain = Box(Vector3(-1, 2, -3), Vector3(2, 4, 1));
@@ -185,7 +185,7 @@ TEST(Jumps, MeasuresEveryInterfaceOfARandomFieldOnce) {
   }
 }
 
-TEST(Jumps, AreZeroInASmoothField) {
+TEST(Jumps, areZeroInASmoothField) {
   // All cells hold the function 1 + x + 2y + 3z in their local coordinates.
   std::vector<std::vector<double>> cells, children;
   for (int n = 0; n < 2; ++n) cells.push_back({1 + n + 0.5 + 1 + 1.5, 1.5, 1, 0.5});
@@ -197,7 +197,7 @@ TEST(Jumps, AreZeroInASmoothField) {
   EXPECT_LT(jumps.gradient.max, 1e-14);
 }
 
-TEST(Jumps, ThreadsDoNotChangeTheResult) {
+TEST(Jumps, threadsDoNotChangeTheResult) {
   const Field field = randomField(8, {.grid = {4, 4, 4}, .maxDepth = 3});
   const Jumps one = findJumps(field, 1), two = findJumps(field, 2);
   ASSERT_EQ(one.interfaces.size(), two.interfaces.size());
@@ -214,7 +214,7 @@ TEST(Jumps, ThreadsDoNotChangeTheResult) {
   EXPECT_TRUE(same(one.value.rms, two.value.rms));
 }
 
-TEST(Jumps, AreSortedAssignedToCellsAndCounted) {
+TEST(Jumps, areSortedAssignedToCellsAndCounted) {
   const Field field = randomField(9, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
   for (const JumpKind kind : {JumpKind::value, JumpKind::gradient}) {
@@ -250,7 +250,7 @@ Field steppedField() {
   return Field(std::move(data));
 }
 
-TEST(FaceSteps, EqualTheJumpBetweenTheTwoLeaves) {
+TEST(FaceSteps, equalTheJumpBetweenTheTwoLeaves) {
   const Field field = steppedField();
   const Jumps jumps = findJumps(field);
   ASSERT_GT(jumps.hanging, 100u);
@@ -262,7 +262,7 @@ TEST(FaceSteps, EqualTheJumpBetweenTheTwoLeaves) {
   }
 }
 
-TEST(FaceSteps, ApproachTheGreatestJumpFromRandomPoints) {
+TEST(FaceSteps, approachTheGreatestJumpFromRandomPoints) {
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
   const FaceSteps steps = stepsAcrossFaces(field, jumps.interfaces, 50'000);
@@ -281,7 +281,7 @@ TEST(FaceSteps, ApproachTheGreatestJumpFromRandomPoints) {
   EXPECT_NE(one.value, stepsAcrossFaces(field, jumps.interfaces, 9'999, 8).value);
 }
 
-TEST(FaceSteps, AreZeroWithoutFacesAndCanBeCancelled) {
+TEST(FaceSteps, areZeroWithoutFacesAndCanBeCancelled) {
   EXPECT_EQ(stepsAcrossFaces(Field(row({{1}})), {}, 100).points, 0u);
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
@@ -289,14 +289,14 @@ TEST(FaceSteps, AreZeroWithoutFacesAndCanBeCancelled) {
                Cancelled);
 }
 
-TEST(Jumps, OneCellHasNoInterfaces) {
+TEST(Jumps, oneCellHasNoInterfaces) {
   const Jumps jumps = findJumps(Field(row({{1}})));
   EXPECT_TRUE(jumps.interfaces.empty());
   EXPECT_EQ(jumps.value.rms, 0);
   EXPECT_TRUE(worstInterfaces(jumps, JumpKind::value, 3).empty());
 }
 
-TEST(Jumps, CanBeCancelled) {
+TEST(Jumps, canBeCancelled) {
   const Field field = randomField(8, {.grid = {4, 4, 4}, .maxDepth = 3});
   std::atomic<int> asked = 0;
   EXPECT_THROW(findJumps(field, 2, {.report = {}, .cancelled = [&] { return ++asked > 3; }}), Cancelled);

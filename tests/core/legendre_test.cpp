@@ -7,7 +7,7 @@
 namespace hpsdf {
 namespace {
 
-TEST(Legendre, ValuesMatchTheStandardLibrary) {
+TEST(Legendre, valuesMatchTheStandardLibrary) {
   double values[31];
   for (const double t : {-1.0, -0.73, -0.2, 0.0, 0.31, 0.999, 1.0}) {
     basis::legendreValues(t, 30, values);
@@ -15,7 +15,7 @@ TEST(Legendre, ValuesMatchTheStandardLibrary) {
   }
 }
 
-TEST(Legendre, DerivativesMatchCentralDifferencesAndTheEnds) {
+TEST(Legendre, derivativesMatchCentralDifferencesAndTheEnds) {
   double values[31], derivatives[31], above[31], below[31];
   const double step = 1e-6;
   for (const double t : {-0.9, -0.35, 0.0, 0.2, 0.8}) {
@@ -28,7 +28,7 @@ TEST(Legendre, DerivativesMatchCentralDifferencesAndTheEnds) {
   for (int i = 0; i <= 30; ++i) EXPECT_DOUBLE_EQ(derivatives[i], i * (i + 1) / 2.0);  // L_i'(1)
 }
 
-TEST(GaussLegendre, IntegratesUpToItsDegreeAndNoFurther) {
+TEST(GaussLegendre, integratesUpToItsDegreeAndNoFurther) {
   for (int n = 1; n <= 121; ++n) {
     const basis::QuadratureRule rule = basis::gaussLegendre(n);
     ASSERT_EQ(rule.points.size(), std::size_t(n));

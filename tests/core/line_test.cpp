@@ -58,7 +58,7 @@ RandomFieldOptions oblong() {
   return options;
 }
 
-TEST(Line, IsCutAtTheFacesThatItCrosses) {
+TEST(Line, isCutAtTheFacesThatItCrosses) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-0.3, 1.3);
   for (const unsigned seed : {1u, 2u, 3u}) {
@@ -93,7 +93,7 @@ Field lattice(std::uint32_t n) {
   return Field(std::move(data));
 }
 
-TEST(Line, ContinuesInTheOppositeCellAtCornersAndEdges) {
+TEST(Line, continuesInTheOppositeCellAtCornersAndEdges) {
   const Field field = lattice(5);
   const auto cell = [](std::uint32_t x, std::uint32_t y, std::uint32_t z) { return x + 5 * (y + 5 * z); };
   using Cells = std::vector<std::uint32_t>;
@@ -120,7 +120,7 @@ TEST(Line, ContinuesInTheOppositeCellAtCornersAndEdges) {
   }
 }
 
-TEST(Line, RunsThroughCellsOfGreaterCoordinatesAlongFacesAndEdges) {
+TEST(Line, runsThroughCellsOfGreaterCoordinatesAlongFacesAndEdges) {
   const Field field = lattice(3);
   using Cells = std::vector<std::uint32_t>;
   EXPECT_EQ(cellsOf(piecesAlong(field, {0, 1, 0.5}, {3, 1, 0.5})), (Cells{3, 4, 5}));
@@ -136,7 +136,7 @@ TEST(Line, RunsThroughCellsOfGreaterCoordinatesAlongFacesAndEdges) {
   EXPECT_EQ(pieces[1].tLeave, 2 / 3.0);
 }
 
-TEST(Line, HasNoCellOutsideTheDomain) {
+TEST(Line, hasNoCellOutsideTheDomain) {
   const Field field = lattice(3);
   const auto through = piecesAlong(field, {-1, 0.5, 0.5}, {5, 0.5, 0.5});
   ASSERT_EQ(through.size(), 5u);
@@ -151,7 +151,7 @@ TEST(Line, HasNoCellOutsideTheDomain) {
   }
 }
 
-TEST(Line, FindsDeepCellsFromFarAway) {
+TEST(Line, findsDeepCellsFromFarAway) {
   RandomFieldOptions options;
   options.maxDepth = 16;
   options.refinement = 0;
@@ -163,7 +163,7 @@ TEST(Line, FindsDeepCellsFromFarAway) {
   EXPECT_TRUE(std::ranges::any_of(pieces, [](const Piece& piece) { return piece.cell && piece.cell->depth == 16; }));
 }
 
-TEST(Line, SamplesLimitsFromBothLeavesAtFaces) {
+TEST(Line, samplesLimitsFromBothLeavesAtFaces) {
   for (const bool single : {false, true}) {
     RandomFieldOptions options = oblong();
     options.single = single;
@@ -199,7 +199,7 @@ TEST(Line, SamplesLimitsFromBothLeavesAtFaces) {
   }
 }
 
-TEST(Line, FindsKnownJumps) {
+TEST(Line, findsKnownJumps) {
   const Line line = sampleLine(lattice(4), {-1, 0.5, 0.5}, {7, 0.5, 0.5}, 9);
   const auto jumps = jumpsAlong(line);
   ASSERT_EQ(jumps.size(), 3u) << "no jump at the domain's boundary";
@@ -211,7 +211,7 @@ TEST(Line, FindsKnownJumps) {
   EXPECT_EQ(line.samples.size(), 2u * 6 + 2);
 }
 
-TEST(Line, SamplesTheContinuationOutsideTheDomain) {
+TEST(Line, samplesTheContinuationOutsideTheDomain) {
   const Field field = randomField(3);
   const Line line = sampleLine(field, {0.2, 0.1, 2}, {0.2, 0.1, 0.9}, 12);
   ASSERT_FALSE(line.pieces.front().cell);
@@ -223,7 +223,7 @@ TEST(Line, SamplesTheContinuationOutsideTheDomain) {
   }
 }
 
-TEST(Line, RefusesEqualAndInfiniteEnds) {
+TEST(Line, refusesEqualAndInfiniteEnds) {
   const Field field = lattice(2);
   const double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(piecesAlong(field, {1, 1, 1}, {1, 1, 1}), Error);

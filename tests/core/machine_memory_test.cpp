@@ -1,12 +1,11 @@
 // The memory limits of control groups, read from files with the layout of Linux.
-#include "util/machine_memory.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
 #include <string>
 
+#include "hpsdf/detail/memory.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -24,7 +23,7 @@ class ControlGroups : public testing::Test {
   support::TemporaryDirectory root_;
 };
 
-TEST_F(ControlGroups, LimitNothingWhereThereIsNoGroup) {
+TEST_F(ControlGroups, limitNothingWhereThereIsNoGroup) {
   EXPECT_EQ(allowed(), HUGE_VAL);
   write("proc/self/cgroup", "0::/\n");
   EXPECT_EQ(allowed(), HUGE_VAL) << "the group has no memory controller";
@@ -32,7 +31,7 @@ TEST_F(ControlGroups, LimitNothingWhereThereIsNoGroup) {
   EXPECT_EQ(allowed(), HUGE_VAL);
 }
 
-TEST_F(ControlGroups, OfVersion2LimitTheGroupsBelowThem) {
+TEST_F(ControlGroups, ofVersion2LimitTheGroupsBelowThem) {
   write("proc/self/cgroup", "0::/user.slice/job 7\n");
   write("sys/fs/cgroup/user.slice/job 7/memory.max", "max\n");
   EXPECT_EQ(allowed(), HUGE_VAL);
@@ -44,7 +43,7 @@ TEST_F(ControlGroups, OfVersion2LimitTheGroupsBelowThem) {
   EXPECT_EQ(allowed(), 2e9) << "the limit of another group does not count";
 }
 
-TEST_F(ControlGroups, OfVersion1LimitTheirController) {
+TEST_F(ControlGroups, ofVersion1LimitTheirController) {
   write("proc/self/cgroup", "5:cpu,cpuacct:/few\n4:hugetlb,memory:/job\n1:name=memory:/few\n0::/\n");
   write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n");
   write("sys/fs/cgroup/memory/few/memory.limit_in_bytes", "1000\n");
@@ -53,7 +52,7 @@ TEST_F(ControlGroups, OfVersion1LimitTheirController) {
 }
 
 /// Within a container the group's own folder is invisible, and the topmost visible folder is the container's.
-TEST_F(ControlGroups, OfAContainerAreSeenFromWithin) {
+TEST_F(ControlGroups, ofAContainerAreSeenFromWithin) {
   write("sys/fs/cgroup/memory.max", "500000000\n");
   for (const char* group : {"/", "/docker/0123", "/../other"}) {
     write("proc/self/cgroup", std::string("0::") + group + "\n");
@@ -61,7 +60,7 @@ TEST_F(ControlGroups, OfAContainerAreSeenFromWithin) {
   }
 }
 
-TEST(MachineMemory, IsFiniteAndWithinTheGroupsLimit) {
+TEST(MachineMemory, isFiniteAndWithinTheGroupsLimit) {
   EXPECT_GT(detail::machineMemory(), 0);
   EXPECT_LT(detail::machineMemory(), HUGE_VAL);
   EXPECT_LE(detail::machineMemory(), detail::memoryOfControlGroups());

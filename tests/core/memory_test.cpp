@@ -8,7 +8,7 @@
 namespace hpsdf {
 namespace {
 
-TEST(Memory, BytesAreWrittenInASuitableUnit) {
+TEST(Memory, bytesAreWrittenInASuitableUnit) {
   EXPECT_EQ(bytesText(0), "0 bytes");
   EXPECT_EQ(bytesText(999), "999 bytes");
   EXPECT_EQ(bytesText(1e3), "1.00 kB");
@@ -16,7 +16,7 @@ TEST(Memory, BytesAreWrittenInASuitableUnit) {
   EXPECT_EQ(bytesText(2.345e12), "2345.00 GB");
 }
 
-TEST(Memory, RequestsBeyondTheMachineAreRefused) {
+TEST(Memory, requestsBeyondTheMachineAreRefused) {
   EXPECT_NO_THROW(requireMemory("a little", allowedMemory(), "take less"));
   try {
     requireMemory("a cloth", 1.01 * allowedMemory(), "take fewer nodes");

@@ -59,7 +59,7 @@ std::string errorOf(const TriangleMesh& mesh) {
   return "no error";
 }
 
-TEST(MeshCleanup, LeavesACleanMeshAsItIs) {
+TEST(MeshCleanup, leavesACleanMeshAsItIs) {
   const TriangleMesh mesh = cube();
   const auto [clean, report] = cleaned(mesh);
   EXPECT_EQ(clean.vertices, mesh.vertices);
@@ -79,7 +79,7 @@ TEST(MeshCleanup, LeavesACleanMeshAsItIs) {
   EXPECT_EQ(report.box.max(), Vector3(1, 1, 1));
 }
 
-TEST(MeshCleanup, WeldsEqualPositionsInOrderOfFirstUse) {
+TEST(MeshCleanup, weldsEqualPositionsInOrderOfFirstUse) {
   const auto [clean, report] = cleaned(separated(tetrahedron()));
   EXPECT_EQ(report.vertices, 4u);
   EXPECT_EQ(report.weldedVertices, 8u);
@@ -91,7 +91,7 @@ TEST(MeshCleanup, WeldsEqualPositionsInOrderOfFirstUse) {
   EXPECT_EQ(clean.triangles, faces);
 }
 
-TEST(MeshCleanup, WeldsNegativeZeroWithZeroAndNothingElse) {
+TEST(MeshCleanup, weldsNegativeZeroWithZeroAndNothingElse) {
   TriangleMesh mesh = separated(tetrahedron());
   for (std::size_t i = 0; i < mesh.vertices.size(); i += 2)
     for (double& x : mesh.vertices[i])
@@ -105,7 +105,7 @@ TEST(MeshCleanup, WeldsNegativeZeroWithZeroAndNothingElse) {
   EXPECT_EQ(cleaned(mesh).report.vertices, 5u);
 }
 
-TEST(MeshCleanup, DropsFacesWithEqualCornersAndUnusedVertices) {
+TEST(MeshCleanup, dropsFacesWithEqualCornersAndUnusedVertices) {
   TriangleMesh mesh = tetrahedron();
   mesh.vertices.insert(mesh.vertices.begin(), {7, 7, 7});  // No triangle uses this vertex.
   for (Triangle& t : mesh.triangles)
@@ -123,7 +123,7 @@ TEST(MeshCleanup, DropsFacesWithEqualCornersAndUnusedVertices) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, DropsCollinearFaces) {
+TEST(MeshCleanup, dropsCollinearFaces) {
   TriangleMesh mesh = cube();
   mesh.vertices.push_back({-1, -1, 0.3});  // The vertex lies on edge 0-4, which has two triangles already.
   mesh.triangles.push_back({0, 4, 8});
@@ -137,7 +137,7 @@ TEST(MeshCleanup, DropsCollinearFaces) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, KeepsThinTrianglesThatHaveAnArea) {
+TEST(MeshCleanup, keepsThinTrianglesThatHaveAnArea) {
   TriangleMesh mesh = tetrahedron();
   mesh.vertices.push_back({0.5, -1e-12, 0});
   mesh.triangles.push_back({0, 1, 4});
@@ -145,7 +145,7 @@ TEST(MeshCleanup, KeepsThinTrianglesThatHaveAnArea) {
   EXPECT_EQ(cleaned(mesh).report.degenerateFaces, 0u);
 }
 
-TEST(MeshCleanup, FlipsACollinearFaceThatConnectsItsNeighbours) {
+TEST(MeshCleanup, flipsACollinearFaceThatConnectsItsNeighbours) {
   // Vertex 8 lies on the cube's edge 0-4. The triangles of x = -1 use it, those of y = -1 do not, and a collinear
   // triangle connects the two sides. Dropping that triangle would open the mesh.
   TriangleMesh mesh = cube();
@@ -168,7 +168,7 @@ TEST(MeshCleanup, FlipsACollinearFaceThatConnectsItsNeighbours) {
   }
 }
 
-TEST(MeshCleanup, FlipsChainsOfCollinearFaces) {
+TEST(MeshCleanup, flipsChainsOfCollinearFaces) {
   TriangleMesh mesh = cube();
   mesh.vertices.push_back({-1, -1, -0.5});  // vertex 8
   mesh.vertices.push_back({-1, -1, 0});     // vertex 9
@@ -188,7 +188,7 @@ TEST(MeshCleanup, FlipsChainsOfCollinearFaces) {
   EXPECT_DOUBLE_EQ(report.area, 24);
 }
 
-TEST(MeshCleanup, DropsFacesWithTheSameCornersInAnyOrientation) {
+TEST(MeshCleanup, dropsFacesWithTheSameCornersInAnyOrientation) {
   TriangleMesh mesh = tetrahedron();
   mesh.triangles.push_back({2, 1, 0});  // the first triangle with rotated corners
   mesh.triangles.push_back({1, 0, 3});  // the second triangle, reversed
@@ -198,7 +198,7 @@ TEST(MeshCleanup, DropsFacesWithTheSameCornersInAnyOrientation) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, KeepsBothFacesOfASharedWall) {
+TEST(MeshCleanup, keepsBothFacesOfASharedWall) {
   TriangleMesh cubes = joined(cube(), cube(1, {2, 0, 0}));
   for (const Vector3& center : {Vector3(0, 2, 0), Vector3(2, 2, 0), Vector3(0, 0, 2)})
     cubes = joined(cubes, cube(1, center));
@@ -214,7 +214,7 @@ TEST(MeshCleanup, KeepsBothFacesOfASharedWall) {
   EXPECT_EQ(twice.duplicateFaces, 5 * 12u);
 }
 
-TEST(MeshCleanup, KeepsAllFacesThatNestedBodiesShare) {
+TEST(MeshCleanup, keepsAllFacesThatNestedBodiesShare) {
   const TriangleMesh low = support::boxBetween({0, 0, 0}, {1, 1, 1}), high = support::boxBetween({0, 0, 0}, {1, 1, 2});
   const auto [clean, report] = cleaned(joined(low, high));
   EXPECT_EQ(clean.triangles.size(), 24u) << "both bodies keep their bottom";
@@ -239,7 +239,7 @@ TEST(MeshCleanup, KeepsAllFacesThatNestedBodiesShare) {
   }
 }
 
-TEST(MeshCleanup, KeepsTheFirstSideOfASurfaceModelledWithBothSides) {
+TEST(MeshCleanup, keepsTheFirstSideOfASurfaceModelledWithBothSides) {
   for (const TriangleMesh& one : {cube(), reversed(cube())}) {
     const auto [clean, report] = cleaned(joined(one, reversed(one)));
     EXPECT_EQ(clean.triangles, cube().triangles);
@@ -255,17 +255,17 @@ TEST(MeshCleanup, KeepsTheFirstSideOfASurfaceModelledWithBothSides) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshCleanup, DropsTheDuplicateOfOneOfTwoTouchingBodies) {
+TEST(MeshCleanup, dropsTheDuplicateOfOneOfTwoTouchingBodies) {
   const TriangleMesh both = joined(cube(), cube(1, {2, 0, 0}));
   EXPECT_EQ(cleaned(joined(both, cube())).mesh.triangles, cleaned(both).mesh.triangles);
 }
 
-TEST(MeshCleanup, KeepsTheMoreFrequentOrientation) {
+TEST(MeshCleanup, keepsTheMoreFrequentOrientation) {
   EXPECT_EQ(cleaned(joined(joined(reversed(cube()), cube()), cube())).mesh.triangles, cube().triangles);
   EXPECT_FALSE(cleaned(joined(joined(reversed(cube()), cube()), cube())).report.reversed);
 }
 
-TEST(MeshCleanup, DoesNotDependOnTheSize) {
+TEST(MeshCleanup, doesNotDependOnTheSize) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(0.9, 1.1);
   for (const double size : {1e-30, 1e-6, 1.0, 1e6, 1e30}) {
@@ -279,7 +279,7 @@ TEST(MeshCleanup, DoesNotDependOnTheSize) {
   }
 }
 
-TEST(MeshCleanup, ReversesTheWholeMeshWhenItsVolumeIsNegative) {
+TEST(MeshCleanup, reversesTheWholeMeshWhenItsVolumeIsNegative) {
   const auto [clean, report] = cleaned(reversed(cube()));
   EXPECT_TRUE(report.reversed);
   EXPECT_EQ(clean.triangles, cube().triangles);
@@ -287,7 +287,7 @@ TEST(MeshCleanup, ReversesTheWholeMeshWhenItsVolumeIsNegative) {
   EXPECT_DOUBLE_EQ(signedVolume(clean), 8);
 }
 
-TEST(MeshCleanup, ReversesACavityOnlyWithTheWholeMesh) {
+TEST(MeshCleanup, reversesACavityOnlyWithTheWholeMesh) {
   const TriangleMesh hollow = joined(cube(1), reversed(cube(0.5)));
   const auto [clean, report] = cleaned(hollow);
   EXPECT_FALSE(report.reversed);
@@ -301,7 +301,7 @@ TEST(MeshCleanup, ReversesACavityOnlyWithTheWholeMesh) {
   EXPECT_DOUBLE_EQ(mended.volume, 7);
 }
 
-TEST(MeshCleanup, ReversesAnOpenMeshOnlyWhenItsVolumeTellsItsOrientation) {
+TEST(MeshCleanup, reversesAnOpenMeshOnlyWhenItsVolumeTellsItsOrientation) {
   TriangleMesh lidless = cube();
   lidless.triangles.resize(10);
   EXPECT_FALSE(cleaned(lidless).report.reversed);
@@ -315,12 +315,12 @@ TEST(MeshCleanup, ReversesAnOpenMeshOnlyWhenItsVolumeTellsItsOrientation) {
   }
 }
 
-TEST(MeshCleanup, ReversesAMeshFarFromTheOrigin) {
+TEST(MeshCleanup, reversesAMeshFarFromTheOrigin) {
   EXPECT_NEAR(cleaned(cube(1, {1e8, -1e8, 1e8})).report.volume, 8, 1e-12);
   EXPECT_TRUE(cleaned(reversed(cube(1, {1e8, -1e8, 1e8}))).report.reversed);
 }
 
-TEST(MeshCleanup, RefusesMeshesThatAreNoSurface) {
+TEST(MeshCleanup, refusesMeshesThatAreNoSurface) {
   TriangleMesh mesh = tetrahedron();
   mesh.triangles[2][1] = 4;
   EXPECT_THAT(errorOf(mesh), AllOf(HasSubstr("tetrahedron: face 3 refers to vertex 5"), HasSubstr("only 4")));
@@ -335,7 +335,7 @@ TEST(MeshCleanup, RefusesMeshesThatAreNoSurface) {
               AllOf(HasSubstr("line: no face with an area (2 faces are degenerate)"), Not(HasSubstr("\n"))));
 }
 
-TEST(MeshReport, CountsEdgesOfEachKind) {
+TEST(MeshReport, countsEdgesOfEachKind) {
   TriangleMesh open = tetrahedron();
   open.triangles.pop_back();
   MeshReport report = inspect(open);
@@ -359,7 +359,7 @@ TEST(MeshReport, CountsEdgesOfEachKind) {
   EXPECT_EQ(report.components, 1u);
 }
 
-TEST(MeshReport, ComponentsShareEdgesNotOnlyCorners) {
+TEST(MeshReport, componentsShareEdgesNotOnlyCorners) {
   TriangleMesh two = joined(tetrahedron(), cube(1, {5, 0, 0}));
   EXPECT_EQ(inspect(two).components, 2u);
   EXPECT_EQ(inspect(two).vertices, 12u);
@@ -373,7 +373,7 @@ TEST(MeshReport, ComponentsShareEdgesNotOnlyCorners) {
   EXPECT_TRUE(report.closed());
 }
 
-TEST(MeshReport, AnEmptyMeshIsNotClosed) {
+TEST(MeshReport, anEmptyMeshIsNotClosed) {
   const MeshReport report = inspect({});
   EXPECT_EQ(report.faces, 0u);
   EXPECT_EQ(report.components, 0u);
@@ -381,7 +381,7 @@ TEST(MeshReport, AnEmptyMeshIsNotClosed) {
   EXPECT_FALSE(report.closed());
 }
 
-TEST(TriangleMesh, BoxSurroundsTheTrianglesOnly) {
+TEST(TriangleMesh, boxSurroundsTheTrianglesOnly) {
   TriangleMesh mesh = tetrahedron();
   mesh.vertices.push_back({100, 100, 100});
   EXPECT_EQ(boundingBox(mesh).max(), Vector3(1, 1, 1));
@@ -389,13 +389,13 @@ TEST(TriangleMesh, BoxSurroundsTheTrianglesOnly) {
   EXPECT_TRUE(boundingBox({{{1, 2, 3}}, {}, ""}).isEmpty());
 }
 
-TEST(TriangleMesh, HasTheVolumeAndAreaOfASolid) {
+TEST(TriangleMesh, hasTheVolumeAndAreaOfASolid) {
   EXPECT_DOUBLE_EQ(signedVolume(tetrahedron()), 1.0 / 6);
   EXPECT_DOUBLE_EQ(signedVolume(reversed(tetrahedron())), -1.0 / 6);
   EXPECT_DOUBLE_EQ(surfaceArea(tetrahedron()), 1.5 + std::sqrt(3.0) / 2);
 }
 
-TEST(TriangleMesh, FingerprintIsStable) {
+TEST(TriangleMesh, fingerprintIsStable) {
   // The expected value is XXH3 of counts, vertices and triangles as little-endian bytes, computed independently.
   EXPECT_EQ(fingerprint({}), 0xd0a66a65c7528968u);
   EXPECT_EQ(fingerprint(tetrahedron()), 0x83695951d65216dau);
@@ -409,7 +409,7 @@ TEST(TriangleMesh, FingerprintIsStable) {
   EXPECT_NE(fingerprint(reversed(tetrahedron())), fingerprint(tetrahedron()));
 }
 
-TEST(TriangleMesh, NormalizedSpansExactlyTwo) {
+TEST(TriangleMesh, normalizedSpansExactlyTwo) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int trial = 0; trial < 200; ++trial) {
@@ -433,7 +433,7 @@ TEST(TriangleMesh, NormalizedSpansExactlyTwo) {
   }
 }
 
-TEST(TriangleMesh, NormalizedNeedsAnExtent) {
+TEST(TriangleMesh, normalizedNeedsAnExtent) {
   EXPECT_THROW(normalized({}), Error);
   EXPECT_THROW(normalized({{{1, 1, 1}}, {{0, 0, 0}}, "dot"}), Error);
   EXPECT_THROW(normalized({{{1, 1, 1}}, {{0, 0, 1}}, "broken"}), Error);

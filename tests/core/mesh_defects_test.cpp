@@ -59,7 +59,7 @@ TriangleMesh moebiusStrip(int pieces) {
   return mesh;
 }
 
-TEST(MeshDefects, DoNotExistInClosedSurfaces) {
+TEST(MeshDefects, doNotExistInClosedSurfaces) {
   for (const TriangleMesh& mesh : {boxOfTwo(), joined(ball(), ball({3, 0, 0}))}) {
     const MeshDefects defects = defectsOf(mesh);
     EXPECT_TRUE(defects.found.empty());
@@ -67,7 +67,7 @@ TEST(MeshDefects, DoNotExistInClosedSurfaces) {
   }
 }
 
-TEST(MeshDefects, ReportBoundaryEdges) {
+TEST(MeshDefects, reportBoundaryEdges) {
   const MeshDefects defects = defectsOf(openBox());
   EXPECT_THAT(defects.counts, ElementsAre(4, 0, 0, 0, 0));
   for (const Defect& defect : defects.found) {
@@ -79,7 +79,7 @@ TEST(MeshDefects, ReportBoundaryEdges) {
   }
 }
 
-TEST(MeshDefects, ReportThreeInconsistentEdgesOfAReversedFace) {
+TEST(MeshDefects, reportThreeInconsistentEdgesOfAReversedFace) {
   TriangleMesh mesh = boxOfTwo();
   std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);
   const MeshDefects defects = defectsOf(mesh);
@@ -88,7 +88,7 @@ TEST(MeshDefects, ReportThreeInconsistentEdgesOfAReversedFace) {
   for (const Defect& defect : defects.found) EXPECT_TRUE(defect.faces[0] == 5 || defect.faces[1] == 5);
 }
 
-TEST(MeshDefects, ReportWhereBodiesTouchAtAnEdgeOrACorner) {
+TEST(MeshDefects, reportWhereBodiesTouchAtAnEdgeOrACorner) {
   const MeshDefects edge = defectsOf(cleaned(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))).mesh);
   EXPECT_THAT(edge.counts, ElementsAre(0, 1, 0, 0, 0));
   EXPECT_EQ((edge.found[0].ends[0] + edge.found[0].ends[1]) / 2, Vector3(1, 1, 0));
@@ -97,7 +97,7 @@ TEST(MeshDefects, ReportWhereBodiesTouchAtAnEdgeOrACorner) {
   EXPECT_EQ(corner.found[0].ends[0], Vector3(1, 1, 1));
 }
 
-TEST(MeshDefects, CountCrossingsWithinOneComponent) {
+TEST(MeshDefects, countCrossingsWithinOneComponent) {
   const MeshDefects two = defectsOf(joined(ball(), ball({1, 0, 0})));
   EXPECT_GT(two.count(DefectKind::crossing), 10u);
   EXPECT_EQ(two.count(DefectKind::crossing), two.found.size());
@@ -109,7 +109,7 @@ TEST(MeshDefects, CountCrossingsWithinOneComponent) {
   EXPECT_EQ(one.crossingsWithinComponents, one.count(DefectKind::crossing));
 }
 
-TEST(MeshDefects, ReportThatAMoebiusStripIsNotOrientable) {
+TEST(MeshDefects, reportThatAMoebiusStripIsNotOrientable) {
   const MeshDefects defects = defectsOf(moebiusStrip(24));
   EXPECT_FALSE(defects.orientable);
   EXPECT_EQ(defects.count(DefectKind::boundaryEdge), 48u);
@@ -119,7 +119,7 @@ TEST(MeshDefects, ReportThatAMoebiusStripIsNotOrientable) {
   EXPECT_EQ(result.imported.report.inconsistentEdges, 1u);
 }
 
-TEST(MeshRepair, ReversesFacesThatDisagreeWithTheirPatch) {
+TEST(MeshRepair, reversesFacesThatDisagreeWithTheirPatch) {
   TriangleMesh mesh = ball();
   for (std::size_t f = 0; f < mesh.triangles.size(); f += 3) std::swap(mesh.triangles[f][0], mesh.triangles[f][1]);
   const std::size_t wrong = (mesh.triangles.size() + 2) / 3;
@@ -131,14 +131,14 @@ TEST(MeshRepair, ReversesFacesThatDisagreeWithTheirPatch) {
   EXPECT_DOUBLE_EQ(result.imported.report.volume, signedVolume(ball()));
 }
 
-TEST(MeshRepair, ReversesInwardBodies) {
+TEST(MeshRepair, reversesInwardBodies) {
   const RepairedMesh result = repaired(cleaned(joined(ball({0, 0, 0}, 2), support::reversed(ball({5, 0, 0})))));
   EXPECT_EQ(result.reversedPatches, 1u);
   EXPECT_EQ(result.reversedFaces, 0u);
   EXPECT_NEAR(result.imported.report.volume, 9 * signedVolume(ball()), 1e-9);
 }
 
-TEST(MeshRepair, KeepsCavities) {
+TEST(MeshRepair, keepsCavities) {
   const TriangleMesh hollow = joined(ball({0, 0, 0}, 3), support::reversed(ball({0, 0, 0}, 2)));
   const RepairedMesh same = repaired(cleaned(hollow));
   EXPECT_EQ(same.reversedPatches, 0u);
@@ -155,7 +155,7 @@ void expectUnchanged(const TriangleMesh& mesh, const char* what) {
   EXPECT_EQ(result.imported.mesh.triangles, cleaned(mesh).mesh.triangles) << what;
 }
 
-TEST(MeshRepair, KeepsCavitiesThatTouch) {
+TEST(MeshRepair, keepsCavitiesThatTouch) {
   const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2), one = boxBetween({-1, -1, -1}, {0, 0, 1});
   const TriangleMesh inAnEdge = joined(one, boxBetween({0, 0, -1}, {1, 1, 1}));
   expectUnchanged(joined(outer, support::reversed(inAnEdge)), "the cavities touch along an edge");
@@ -183,7 +183,7 @@ TriangleMesh boxWithOtherDiagonal(const Vector3& low, const Vector3& high) {
   return mesh;
 }
 
-TEST(MeshRepair, ReversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
+TEST(MeshRepair, reversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
   const TriangleMesh left = boxWithOtherDiagonal({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {3, 1, 1});
   ASSERT_NEAR(signedVolume(left), 4, 1e-12);
   // The third box makes most faces of the mesh face outward.
@@ -205,7 +205,7 @@ TEST(MeshRepair, ReversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
 
 /// Some of the eight cubes of a larger cube, in all combinations of orientations, beside a body that is oriented
 /// outward.
-TEST(MeshRepair, ReversesTouchingCubesIndependently) {
+TEST(MeshRepair, reversesTouchingCubesIndependently) {
   const auto lowest = [](int at) { return Vector3(at & 1, at >> 1 & 1, at >> 2); };
   for (const std::vector<int>& all :
        {std::vector{0, 1}, std::vector{0, 3}, std::vector{0, 1, 2}, std::vector{0, 4, 2}, std::vector{0, 1, 6}})
@@ -222,7 +222,7 @@ TEST(MeshRepair, ReversesTouchingCubesIndependently) {
     }
 }
 
-TEST(MeshRepair, KeepsCavitiesWithAHole) {
+TEST(MeshRepair, keepsCavitiesWithAHole) {
   const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2);
   TriangleMesh lacking = boxOfTwo();
   for (std::size_t lack = 0; lack < 2; ++lack) {  // a missing triangle, then a missing side
@@ -233,7 +233,7 @@ TEST(MeshRepair, KeepsCavitiesWithAHole) {
                   "the inner wall of a cup");
 }
 
-TEST(MeshRepair, KeepsCavitiesThatOverlapEachOther) {
+TEST(MeshRepair, keepsCavitiesThatOverlapEachOther) {
   const TriangleMesh hollow =
       joined(joined(moved(boxOfTwo(), {0, 0, 0}, 5), support::reversed(moved(boxOfTwo(), {0, 0, 0}, 2))),
              support::reversed(moved(boxOfTwo(), {2.5, 2.5, 2.5}, 2)));
@@ -242,20 +242,20 @@ TEST(MeshRepair, KeepsCavitiesThatOverlapEachOther) {
   EXPECT_EQ(result.imported.mesh.triangles, cleaned(hollow).mesh.triangles);
 }
 
-TEST(MeshRepair, KeepsPocketsThatEndInASide) {
+TEST(MeshRepair, keepsPocketsThatEndInASide) {
   const TriangleMesh block = boxBetween({0, 0, 0}, {10, 10, 10});
   expectUnchanged(joined(block, support::reversed(boxBetween({1, 1, 9.5}, {9, 9, 10}))),
                   "most of the pocket's area lies in the side");
 }
 
-TEST(MeshRepair, ReversesBothSurfacesOfAnInwardHollowBody) {
+TEST(MeshRepair, reversesBothSurfacesOfAnInwardHollowBody) {
   const TriangleMesh shell = joined(ball({0, 0, 0}, 2), support::reversed(ball())), beside = ball({20, 0, 0}, 9);
   const RepairedMesh result = repaired(cleaned(joined(beside, support::reversed(shell))));
   EXPECT_EQ(result.reversedPatches, 2u);
   EXPECT_EQ(result.imported.mesh.triangles, joined(beside, shell).triangles);
 }
 
-TEST(MeshRepair, ReversesABodyAmongTouchingBodies) {
+TEST(MeshRepair, reversesABodyAmongTouchingBodies) {
   TriangleMesh cubes;
   std::size_t middle = 0;
   for (int i = 0; i < 27; ++i) {
@@ -276,7 +276,7 @@ TEST(MeshRepair, ReversesABodyAmongTouchingBodies) {
   EXPECT_NEAR(windingNumber(repaired(cleaned(cubes)).imported.mesh, center), 1, 1e-9);
 }
 
-TEST(MeshRepair, ReversesBodiesThatProtrudeFromAnother) {
+TEST(MeshRepair, reversesBodiesThatProtrudeFromAnother) {
   const TriangleMesh outer = boxOfTwo(), through = boxBetween({0, -0.9, -0.9}, {1.6, 0.9, 0.9});
   for (std::size_t largest = 0; largest < through.triangles.size(); ++largest) {
     TriangleMesh body = through;
@@ -289,7 +289,7 @@ TEST(MeshRepair, ReversesBodiesThatProtrudeFromAnother) {
                   "nine tenths of the body lie within");
 }
 
-TEST(MeshRepair, KeepsOneSidedSurfacesWhateverTheirVolume) {
+TEST(MeshRepair, keepsOneSidedSurfacesWhateverTheirVolume) {
   const TriangleMesh box = boxBetween({-9, -9, -9}, {-5, -5, -5}), strip = moebiusStrip(24);
   const MeshReport report = inspect(strip);
   ASSERT_GT(std::abs(report.volume), 0.01 * report.box.volume())
@@ -301,7 +301,7 @@ TEST(MeshRepair, KeepsOneSidedSurfacesWhateverTheirVolume) {
   }
 }
 
-TEST(MeshRepair, ReversesOpenBodies) {
+TEST(MeshRepair, reversesOpenBodies) {
   const TriangleMesh open = support::openAbove(ball(), 0.7);
   const RepairedMesh result = repaired(cleaned(joined(ball({5, 0, 0}, 2), support::reversed(open))));
   EXPECT_EQ(result.reversedPatches, 1u);
@@ -314,7 +314,7 @@ Vector3 middleOf(const TriangleMesh& mesh, std::size_t face) {
   return (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
 }
 
-TEST(MeshRepair, KeepsTheReportOfCleaning) {
+TEST(MeshRepair, keepsTheReportOfCleaning) {
   TriangleMesh mesh = boxOfTwo();
   mesh.triangles.push_back(mesh.triangles[3]);
   mesh.triangles.push_back({0, 0, 1});
@@ -326,7 +326,7 @@ TEST(MeshRepair, KeepsTheReportOfCleaning) {
   EXPECT_TRUE(result.imported.report.reversed);
 }
 
-TEST(MeshExport, IsReadBackUnchanged) {
+TEST(MeshExport, isReadBackUnchanged) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = moved(boxOfTwo(), {0.125, -3, 1e-3});
   for (const char* name : {"box.obj", "box.PLY"}) {
@@ -342,7 +342,7 @@ TEST(MeshExport, IsReadBackUnchanged) {
 }
 
 /// assimp mistakes a line feed at the beginning of the data for a part of the header.
-TEST(MeshExport, IsReadBackWhateverByteThePlyDataBeginWith) {
+TEST(MeshExport, isReadBackWhateverByteThePlyDataBeginWith) {
   const support::TemporaryDirectory folder;
   const std::filesystem::path file = folder.path() / "box.ply";
   for (std::uint64_t byte = 0; byte < 256; ++byte) {
@@ -361,7 +361,7 @@ TEST(MeshExport, IsReadBackWhateverByteThePlyDataBeginWith) {
   }
 }
 
-TEST(MeshExport, WritesDoublesExactly) {
+TEST(MeshExport, writesDoublesExactly) {
   const support::TemporaryDirectory folder;
   TriangleMesh mesh = boxOfTwo();
   mesh.vertices[0].x() = -1.0000000000000002;
@@ -374,7 +374,7 @@ TEST(MeshExport, WritesDoublesExactly) {
   EXPECT_EQ(x, -1.0000000000000002);
 }
 
-TEST(MeshExport, RefusesOtherFormats) {
+TEST(MeshExport, refusesOtherFormats) {
   const support::TemporaryDirectory folder;
   const std::filesystem::path file = folder.path() / "a.fbx";
   EXPECT_THROW(saveMesh(boxOfTwo(), file), Error);

@@ -96,14 +96,14 @@ class MeshImport : public ::testing::Test {
 // ---------------------------------------------------------------------------------------------------------------------
 // Formats
 
-TEST_F(MeshImport, Obj) {
+TEST_F(MeshImport, obj) {
   expectTetrahedron(import("t.obj",
                            "mtllib missing.mtl\nv 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nvn 0 0 1\nvt 0 0\n"
                            "f 1 3 2\nf 1/1/1 2/1/1 4/1/1\nf 1//1 4//1 3//1\nf -3 -2 -1\n"),
                     "t.obj");
 }
 
-TEST_F(MeshImport, TakesExtensionsInAnyCase) {
+TEST_F(MeshImport, takesExtensionsInAnyCase) {
   expectTetrahedron(import("T.OBJ", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
                     "T.OBJ");
 }
@@ -114,7 +114,7 @@ std::string plyAscii() {
          "5 6 7\n6 6 7\n5 8 7\n5 6 10\n0 0 0\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 }
 
-TEST_F(MeshImport, PlyAscii) { expectTetrahedron(import("t.ply", plyAscii()), "t.ply"); }
+TEST_F(MeshImport, plyAscii) { expectTetrahedron(import("t.ply", plyAscii()), "t.ply"); }
 
 template <typename Coordinate>
 Bytes plyBinary(const std::string& type) {
@@ -129,12 +129,12 @@ Bytes plyBinary(const std::string& type) {
   return file;
 }
 
-TEST_F(MeshImport, PlyBinary) {
+TEST_F(MeshImport, plyBinary) {
   expectTetrahedron(import("t.ply", plyBinary<double>("double").data), "t.ply");
   expectTetrahedron(import("t.ply", plyBinary<float>("float").data), "t.ply");
 }
 
-TEST_F(MeshImport, Off) {
+TEST_F(MeshImport, off) {
   expectTetrahedron(import("t.off", "OFF\n4 4 0\n5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
                     "t.off");
 }
@@ -151,7 +151,7 @@ std::string stlAscii() {
   return file + "endsolid t\n";
 }
 
-TEST_F(MeshImport, StlAscii) {
+TEST_F(MeshImport, stlAscii) {
   const ImportedMesh imported = import("t.stl", stlAscii());
   expectTetrahedron(imported, "t.stl");
   EXPECT_EQ(imported.report.weldedVertices, 8u);
@@ -169,13 +169,13 @@ Bytes stlBinary() {
   return file;
 }
 
-TEST_F(MeshImport, StlBinary) { expectTetrahedron(import("t.stl", stlBinary().data), "t.stl"); }
+TEST_F(MeshImport, stlBinary) { expectTetrahedron(import("t.stl", stlBinary().data), "t.stl"); }
 
 Bytes chunk3ds(std::uint16_t id, const Bytes& content) {
   return Bytes().add(id).add(static_cast<std::uint32_t>(content.data.size() + 6)).add(content);
 }
 
-TEST_F(MeshImport, Discreet3dsKeepsTheFilesCoordinates) {
+TEST_F(MeshImport, discreet3dsKeepsTheFilesCoordinates) {
   Bytes vertices, faces;
   vertices.add(std::uint16_t{4});
   for (const auto& corner : kCorners)
@@ -190,7 +190,7 @@ TEST_F(MeshImport, Discreet3dsKeepsTheFilesCoordinates) {
   expectTetrahedron(import("t.3ds", chunk3ds(0x4d4d, chunk3ds(0x3d3d, object)).data), "t.3ds");
 }
 
-TEST_F(MeshImport, Installed3dsFile) {
+TEST_F(MeshImport, installed3dsFile) {
   const fs::path file = "/usr/share/glmark2/models/cube.3ds";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not installed (package glmark2-data)";
   const MeshReport report = importMesh(file).report;
@@ -221,12 +221,12 @@ std::string gltfScene(const std::string& nodes, const std::string& roots, const 
          (uri.empty() ? "" : R"(,"uri":")" + uri + R"(")") + "}]}";
 }
 
-TEST_F(MeshImport, Gltf) {
+TEST_F(MeshImport, gltf) {
   write("t.bin", gltfBuffer().data);
   expectTetrahedron(import("t.gltf", gltfScene(R"({"mesh":0})", "0", "t.bin")), "t.gltf");
 }
 
-TEST_F(MeshImport, Glb) {
+TEST_F(MeshImport, glb) {
   std::string json = gltfScene(R"({"mesh":0})", "0");
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const Bytes buffer = gltfBuffer();
@@ -240,7 +240,7 @@ TEST_F(MeshImport, Glb) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Scenes
 
-TEST_F(MeshImport, NodeTransformsAreAppliedAndInstancesRepeated) {
+TEST_F(MeshImport, nodeTransformsAreAppliedAndInstancesRepeated) {
   write("t.bin", gltfBuffer().data);
   // The parent scales by 2 and translates; its child rotates by 90° about z: (x, y, z) → (-y, x, z).
   const auto [mesh, report] =
@@ -255,7 +255,7 @@ TEST_F(MeshImport, NodeTransformsAreAppliedAndInstancesRepeated) {
   EXPECT_TRUE(report.box.max().isApprox(Vector3(100 - 12, 12, 20), 1e-6)) << report.box.max().transpose();
 }
 
-TEST_F(MeshImport, MirroringNodesKeepFacesOutward) {
+TEST_F(MeshImport, mirroringNodesKeepFacesOutward) {
   write("t.bin", gltfBuffer().data);
   const auto [mesh, report] = import("t.gltf", gltfScene(R"({"mesh":0},{"mesh":0,"scale":[-2,1,1]})", "0,1", "t.bin"));
   EXPECT_FALSE(report.reversed);
@@ -264,7 +264,7 @@ TEST_F(MeshImport, MirroringNodesKeepFacesOutward) {
   EXPECT_EQ(report.box.min(), Vector3(-12, 6, 7));
 }
 
-TEST_F(MeshImport, AllMeshesOfASceneAreJoinedAndWelded) {
+TEST_F(MeshImport, allMeshesOfASceneAreJoinedAndWelded) {
   const auto [mesh, report] = import("two.obj",
                                      "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
                                      "o b\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 5 6 7\n");
@@ -281,7 +281,7 @@ const std::string kPrismCorners =
     "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1\nv 0 0 1\n";
 const std::string kPrismSides = "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n";
 
-TEST_F(MeshImport, ConcavePolygons) {
+TEST_F(MeshImport, concavePolygons) {
   const auto [mesh, report] =
       import("l.obj", kPrismCorners + kPrismSides + "f 6 1 7 12\nf 7 8 9 10 11 12\nf 6 5 4 3 2 1\n");
   EXPECT_EQ(report.faces, 4u + 4 + 12);
@@ -290,7 +290,7 @@ TEST_F(MeshImport, ConcavePolygons) {
   EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);  // Triangles outside the L would add to the area.
 }
 
-TEST_F(MeshImport, PolygonsWithCornersOnAStraightSideStayClosed) {
+TEST_F(MeshImport, polygonsWithCornersOnAStraightSideStayClosed) {
   // The caps and the two faces at the side from 6 to 1 have two more corners on that side.
   const auto [mesh, report] =
       import("l.obj", kPrismCorners + "v 1 0 0\nv 1 0 1\nv 1.5 0 0\nv 1.5 0 1\n" + kPrismSides +
@@ -302,7 +302,7 @@ TEST_F(MeshImport, PolygonsWithCornersOnAStraightSideStayClosed) {
   EXPECT_DOUBLE_EQ(report.area, 3 + 3 + 8);
 }
 
-TEST_F(MeshImport, PointsAndLinesAreLeftOut) {
+TEST_F(MeshImport, pointsAndLinesAreLeftOut) {
   const auto [mesh, report] = import(
       "t.obj", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nv 50 0 0\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nl 1 5\np 5\n");
   EXPECT_EQ(report.faces, 4u);
@@ -310,7 +310,7 @@ TEST_F(MeshImport, PointsAndLinesAreLeftOut) {
   EXPECT_EQ(report.box.max(), Vector3(6, 8, 10));
 }
 
-TEST_F(MeshImport, PositionsPassThroughFloat) {
+TEST_F(MeshImport, positionsPassThroughFloat) {
   const TriangleMesh mesh =
       import(
           "t.obj",
@@ -331,7 +331,7 @@ std::string tetrahedronObj(double size, double offset) {
   return text.str();
 }
 
-TEST_F(MeshImport, CoordinateSpacingBoundsTheRounding) {
+TEST_F(MeshImport, coordinateSpacingBoundsTheRounding) {
   std::mt19937 random(7);
   for (const double at : {1.0, 1000.0, 1e6, 3e20, 1e38, 2e-38, 1e-41}) {
     std::uniform_real_distribution<double> near(at, 1.5 * at);
@@ -356,7 +356,7 @@ TEST_F(MeshImport, CoordinateSpacingBoundsTheRounding) {
   }
 }
 
-TEST_F(MeshImport, FilesThatHoldFloatsLoseNothing) {
+TEST_F(MeshImport, filesThatHoldFloatsLoseNothing) {
   const auto spacing = [&](const std::string& name, const std::string& content) {
     const fs::path file = write(name, content);
     return coordinateSpacing(file, importMesh(file).mesh);
@@ -374,7 +374,7 @@ TEST_F(MeshImport, FilesThatHoldFloatsLoseNothing) {
   EXPECT_EQ(coordinateSpacing("builtin:box", loadMesh("builtin:box")), 0);
 }
 
-TEST_F(MeshImport, TakesAnySizeInTheRangeOfFloat) {
+TEST_F(MeshImport, takesAnySizeInTheRangeOfFloat) {
   for (const double size : {1e-40, 1e-20, 1e-6, 1e6, 1e20, 3e37}) {
     const auto [mesh, report] = import("t.obj", tetrahedronObj(size, 0));
     EXPECT_TRUE(report.closed()) << size;
@@ -396,7 +396,7 @@ TEST_F(MeshImport, TakesAnySizeInTheRangeOfFloat) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Refused files
 
-TEST_F(MeshImport, RefusesPathsThatAreNoRegularFiles) {
+TEST_F(MeshImport, refusesPathsThatAreNoRegularFiles) {
   EXPECT_EQ(errorOf(directory_ / "mesh.obj"), (directory_ / "mesh.obj").string() + ": no such file; check the path");
   fs::create_directory(directory_ / "folder.obj");
   EXPECT_THAT(errorOf(directory_ / "folder.obj"), HasSubstr("folder.obj: a directory, not a file"));
@@ -406,21 +406,21 @@ TEST_F(MeshImport, RefusesPathsThatAreNoRegularFiles) {
   EXPECT_THAT(errorOf(fs::path()), HasSubstr("the mesh file's name is empty"));
 }
 
-TEST_F(MeshImport, RefusesUnreadableFiles) {
+TEST_F(MeshImport, refusesUnreadableFiles) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may read every file";
   const fs::path file = write("secret.obj", "v 0 0 0\n");
   fs::permissions(file, fs::perms::none);
   EXPECT_THAT(errorOf(file), HasSubstr("secret.obj: cannot be read; check its permissions"));
 }
 
-TEST_F(MeshImport, UnknownFormatsNameTheKnownOnes) {
+TEST_F(MeshImport, unknownFormatsNameTheKnownOnes) {
   for (const std::string name : {"mesh.fbx", "mesh", "mesh.obj.gz", "mesh.hpsdf"})
     EXPECT_THAT(
         errorOf(name, "v 0 0 0\n"),
         AllOf(HasSubstr("/" + name + ": "), HasSubstr("ends in one of .obj, .ply, .stl, .off, .3ds, .gltf, .glb")));
 }
 
-TEST_F(MeshImport, RefusesContentThatIsNoMesh) {
+TEST_F(MeshImport, refusesContentThatIsNoMesh) {
   for (const std::string extension : {"obj", "ply", "stl", "off", "3ds", "gltf", "glb"})
     for (const std::string& content :
          {std::string("Dear diary,\nnothing happened.\n"), std::string(1, '\0'), std::string(1000, '\xff')}) {
@@ -429,7 +429,7 @@ TEST_F(MeshImport, RefusesContentThatIsNoMesh) {
     }
 }
 
-TEST_F(MeshImport, RefusesTruncatedFiles) {
+TEST_F(MeshImport, refusesTruncatedFiles) {
   Bytes stl{std::string(80, ' ')};
   stl.add(std::uint32_t{1000}).add(0.0f);
   EXPECT_THAT(errorOf("cut.stl", stl.data), HasSubstr("/cut.stl: cannot be read as a mesh"));
@@ -452,7 +452,7 @@ TEST_F(MeshImport, RefusesTruncatedFiles) {
   EXPECT_THAT(errorOf("alone.gltf", gltfScene(R"({"mesh":0})", "0", "missing.bin")), HasSubstr("/alone.gltf: "));
 }
 
-TEST_F(MeshImport, RefusesFilesWithoutFaces) {
+TEST_F(MeshImport, refusesFilesWithoutFaces) {
   EXPECT_THAT(errorOf("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), HasSubstr("/points.obj: "));
   EXPECT_THAT(errorOf("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), HasSubstr("/lines.obj: no faces"));
   write("t.bin", gltfBuffer().data);
@@ -463,18 +463,18 @@ TEST_F(MeshImport, RefusesFilesWithoutFaces) {
               HasSubstr("/flat.obj: no face with an area (2 faces are degenerate)"));
 }
 
-TEST_F(MeshImport, RefusesAMeshThatItsNodeFlattens) {
+TEST_F(MeshImport, refusesAMeshThatItsNodeFlattens) {
   write("t.bin", gltfBuffer().data);
   EXPECT_THAT(errorOf("t.gltf", gltfScene(R"({"mesh":0,"scale":[1,0,0]})", "0", "t.bin")),
               HasSubstr("/t.gltf: no face with an area (4 faces are degenerate)"));
 }
 
-TEST_F(MeshImport, RefusesIndicesOutOfRange) {
+TEST_F(MeshImport, refusesIndicesOutOfRange) {
   EXPECT_THAT(errorOf("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), HasSubstr("/far.obj: "));
 }
 
 // assimp 5.2 corrects indices out of range in some formats, so that the importer cannot detect them.
-TEST_F(MeshImport, TakesIndicesThatAssimpCorrects) {
+TEST_F(MeshImport, takesIndicesThatAssimpCorrects) {
   Bytes buffer = gltfBuffer();
   buffer.data[buffer.data.size() - 2] = 9;
   write("t.bin", buffer.data);
@@ -483,7 +483,7 @@ TEST_F(MeshImport, TakesIndicesThatAssimpCorrects) {
   EXPECT_EQ(import("far.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 77\n").report.faces, 1u);
 }
 
-TEST_F(MeshImport, RefusesNonFiniteCoordinates) {
+TEST_F(MeshImport, refusesNonFiniteCoordinates) {
   for (const std::string bad : {"nan", "inf", "-inf"}) {
     EXPECT_THAT(errorOf("bad.obj", "v 0 0 0\nv 1 0 " + bad + "\nv 0 1 0\nf 1 2 3\n"),
                 HasSubstr("/bad.obj: vertex 2 has a coordinate that is not a finite number"));
@@ -496,7 +496,7 @@ TEST_F(MeshImport, RefusesNonFiniteCoordinates) {
   }
 }
 
-TEST_F(MeshImport, PrintsNothing) {
+TEST_F(MeshImport, printsNothing) {
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   errorOf("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\nfoo\n");
@@ -508,7 +508,7 @@ TEST_F(MeshImport, PrintsNothing) {
 
 // ---------------------------------------------------------------------------------------------------------------------
 
-TEST_F(MeshImport, LoadMeshTakesFilesAndShapes) {
+TEST_F(MeshImport, loadMeshTakesFilesAndShapes) {
   const fs::path file = write("t.obj", "v 5 6 7\nv 6 6 7\nv 5 8 7\nv 5 6 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
   EXPECT_EQ(loadMesh(file.string()).triangles.size(), 4u);
   EXPECT_EQ(loadMesh("builtin:box,width=3").name, "builtin:box,width=3");
@@ -542,7 +542,7 @@ TriangulationArea areaOf(const std::vector<Vector3>& polygon, const Vector3& nor
   return area;
 }
 
-TEST(Triangulate, TriangulatesConcavePolygonsInAnyPlane) {
+TEST(Triangulate, triangulatesConcavePolygonsInAnyPlane) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int trial = 0; trial < 300; ++trial) {
@@ -567,7 +567,7 @@ TEST(Triangulate, TriangulatesConcavePolygonsInAnyPlane) {
   }
 }
 
-TEST(Triangulate, CornersOnStraightSidesGetTrianglesWithAnArea) {
+TEST(Triangulate, cornersOnStraightSidesGetTrianglesWithAnArea) {
   // Each side of the square has nine more corners at thirds of a unit, which float rounds away from the straight side.
   std::vector<Vector3> polygon;
   const Vector3 corners[4] = {{0, 0, 0}, {1, 0.3, 0}, {0.7, 1.3, 0}, {-0.3, 1, 0}};
@@ -580,7 +580,7 @@ TEST(Triangulate, CornersOnStraightSidesGetTrianglesWithAnArea) {
   EXPECT_GT(area.least, 1e-3);
 }
 
-TEST(Triangulate, DoesNotFillTheGapsOfAComb) {
+TEST(Triangulate, doesNotFillTheGapsOfAComb) {
   std::vector<Vector3> polygon;
   for (int tooth = 0; tooth < 20; ++tooth)
     for (const double y : {5.0, 1.0}) {
@@ -596,7 +596,7 @@ TEST(Triangulate, DoesNotFillTheGapsOfAComb) {
 
 /// The spiral winds around twice and returns at a distance of a thousandth of its radius. An algorithm that tests all
 /// pairs of its corners would take minutes.
-TEST(Triangulate, TriangulatesASpiralOfManyCornersQuickly) {
+TEST(Triangulate, triangulatesASpiralOfManyCornersQuickly) {
   constexpr int kAlong = 50000;
   std::vector<Vector3> polygon;
   const auto add = [&](int i, double radius) {
@@ -615,7 +615,7 @@ TEST(Triangulate, TriangulatesASpiralOfManyCornersQuickly) {
   EXPECT_GT(area.least, 0);
 }
 
-TEST(Triangulate, TriangulatesAPolygonWithASlitToItsHole) {
+TEST(Triangulate, triangulatesAPolygonWithASlitToItsHole) {
   const std::vector<Vector3> polygon = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0},
                                         {1, 1, 0}, {1, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}};
   const auto area = areaOf(polygon, Vector3::UnitZ());
@@ -623,7 +623,7 @@ TEST(Triangulate, TriangulatesAPolygonWithASlitToItsHole) {
   EXPECT_GE(area.least, 0);
 }
 
-TEST(Triangulate, YieldsTrianglesForDegeneratePolygons) {
+TEST(Triangulate, yieldsTrianglesForDegeneratePolygons) {
   areaOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {1.5, 0, 0}}, Vector3::UnitZ());
   areaOf(std::vector<Vector3>(6, Vector3::Zero()), Vector3::UnitZ());
   areaOf({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}, {1, 3, 0}}, Vector3::UnitZ());
@@ -646,7 +646,7 @@ struct KnownMesh {
 
 class KnownMeshes : public ::testing::TestWithParam<KnownMesh> {};
 
-TEST_P(KnownMeshes, HaveTheKnownCounts) {
+TEST_P(KnownMeshes, haveTheKnownCounts) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const KnownMesh& known = GetParam();
   const MeshReport report = importMesh(support::testMesh(known.file)).report;
@@ -694,7 +694,7 @@ INSTANTIATE_TEST_SUITE_P(
                       KnownMesh{"broken/assimp_spider.obj", 722, 1368, false, 18, 72, 0, 56, 0, 0, false},
                       KnownMesh{"broken/soup.stl", 300, 100, false, 100, 300, 0, 0, 0, 0, true}));
 
-TEST_F(MeshImport, RefusedMeshes) {
+TEST_F(MeshImport, refusedMeshes) {
   HPSDF_SKIP_WITHOUT_MESHES();
   EXPECT_THAT(errorOf(support::testMesh("broken/assimp_pond.0.ply")), HasSubstr("not a finite number"));
   EXPECT_THAT(errorOf(support::testMesh("broken/assimp_invalid.off")), HasSubstr("no face with an area"));

@@ -53,7 +53,7 @@ TrueError measure(const Field& field, const ExactDistance& distance, double near
   return result;
 }
 
-TEST(PaperFigures, Bunny) {
+TEST(PaperFigures, bunny) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh mesh = paperMesh("bunny_69k.obj");
   const ExactDistance distance(mesh);
@@ -79,7 +79,7 @@ TEST(PaperFigures, Bunny) {
   EXPECT_NEAR(measure(single, distance, options.nearness).rms, error.rms, 1e-3 * error.rms);
 }
 
-TEST(PaperFigures, BunnyByProductsOfGaussRules) {
+TEST(PaperFigures, bunnyByProductsOfGaussRules) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("bunny_69k.obj"));
   const Field field = build(distance, paperDomain(), {.targetError = 1e-6, .cubature = CubatureKind::product});
@@ -87,7 +87,7 @@ TEST(PaperFigures, BunnyByProductsOfGaussRules) {
   EXPECT_LE(field.metadata().exactEvaluations, 11'000'000u);
 }
 
-TEST(PaperFigures, BunnyByThePapersSettings) {
+TEST(PaperFigures, bunnyByThePapersSettings) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("bunny_69k.obj"));
   BuildOptions options = paperOptions();
@@ -97,7 +97,7 @@ TEST(PaperFigures, BunnyByThePapersSettings) {
   EXPECT_LE(measure(field, distance, options.nearness).weighted, 1.3e-5);
 }
 
-TEST(PaperFigures, Dragon) {
+TEST(PaperFigures, dragon) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("dragon_80k.obj"));
   const Field field =

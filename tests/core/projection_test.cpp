@@ -36,7 +36,7 @@ void expectNear(const std::vector<double>& a, const std::vector<double>& b, doub
   for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], tolerance) << "coefficient " << i;
 }
 
-TEST(Projection, ReproducesEveryPolynomialOfItsDegree) {
+TEST(Projection, reproducesEveryPolynomialOfItsDegree) {
   for (const int degree : {1, 2, 3, 5, 9, 17, 30}) {
     const auto c = randomCoefficients(degree, 7);
     const auto project = basis::productProjection(basis::gaussLegendre(degree + 1), degree);
@@ -49,7 +49,7 @@ TEST(Projection, ReproducesEveryPolynomialOfItsDegree) {
   }
 }
 
-TEST(Projection, LowerCoefficientsDoNotDependOnHigherOnes) {
+TEST(Projection, lowerCoefficientsDoNotDependOnHigherOnes) {
   const auto c = randomCoefficients(5, 3);
   for (const auto& project :
        {basis::productProjection(basis::gaussLegendre(6), 3),
@@ -65,7 +65,7 @@ TEST(Projection, LowerCoefficientsDoNotDependOnHigherOnes) {
   }
 }
 
-TEST(Projection, MeanSquareSatisfiesParsevalsIdentity) {
+TEST(Projection, meanSquareSatisfiesParsevalsIdentity) {
   const auto c = randomCoefficients(4, 11);
   double parseval = 0;
   basis::forEachCoefficient(
@@ -75,7 +75,7 @@ TEST(Projection, MeanSquareSatisfiesParsevalsIdentity) {
     EXPECT_NEAR(project->meanSquare(sampled(c, 4, project->points())), parseval, 1e-13);
 }
 
-TEST(Projection, JoinedChildrenAreTheParent) {
+TEST(Projection, joinedChildrenAreTheParent) {
   for (const int degree : {0, 1, 2, 5, 31}) {
     const auto c = randomCoefficients(std::min(degree, kMaxDegree), 13);
     const auto project = basis::productProjection(basis::gaussLegendre(degree + 1), degree);
@@ -93,7 +93,7 @@ TEST(Projection, JoinedChildrenAreTheParent) {
 }
 
 /// No rule integrates a function with a kink exactly, so that the result must equal the projection of all samples.
-TEST(Projection, JoinedChildrenAreTheProjectionOfAllSamples) {
+TEST(Projection, joinedChildrenAreTheProjectionOfAllSamples) {
   const auto kink = [](const Vector3& x) { return std::abs(x.x() + 0.3 * x.y() - 0.2) + x.z() * x.x(); };
   constexpr int kDegree = 4;
   const auto project = basis::matrixProjection(*basis::compactCubature(9), kDegree);
@@ -119,7 +119,7 @@ TEST(Projection, JoinedChildrenAreTheProjectionOfAllSamples) {
   expectNear(basis::joined(children, kDegree), ofAllSamples, 1e-14);
 }
 
-TEST(Projection, TopDegreeErrorIsTheNormOfTheTopDegreeTerms) {
+TEST(Projection, topDegreeErrorIsTheNormOfTheTopDegreeTerms) {
   const auto c = randomCoefficients(6, 5);
   double shell = 0;
   basis::forEachCoefficient(6, [&](int i, int j, int k, int index) {
@@ -128,7 +128,7 @@ TEST(Projection, TopDegreeErrorIsTheNormOfTheTopDegreeTerms) {
   EXPECT_NEAR(basis::topDegreeError(c.data(), 6, 2.5), 2.5 * shell, 1e-14);
 }
 
-TEST(Projection, AppendingKeepsTheLowerCoefficients) {
+TEST(Projection, appendingKeepsTheLowerCoefficients) {
   const auto lower = randomCoefficients(3, 1);
   const auto raised = randomCoefficients(4, 2);
   const auto both = basis::appendTopDegree(lower, raised, 4);
@@ -138,12 +138,12 @@ TEST(Projection, AppendingKeepsTheLowerCoefficients) {
   });
 }
 
-TEST(Projection, DroppingTheTopKeepsTheRest) {
+TEST(Projection, droppingTheTopKeepsTheRest) {
   const auto c = randomCoefficients(5, 4);
   expectNear(basis::appendTopDegree(basis::truncated(c, 5, 4), c, 5), c, 0);
 }
 
-TEST(Evaluate, GradientMatchesCentralDifferences) {
+TEST(Evaluate, gradientMatchesCentralDifferences) {
   for (const int degree : {1, 2, 4, 12}) {
     const auto c = randomCoefficients(degree, 9);
     const std::array<double, 3> at = {0.3, -0.55, 0.81};

@@ -60,7 +60,7 @@ BoundCheck checkBounds(const Field& field, const Phi& phi) {
   return check;
 }
 
-TEST(SafeDistance, BoundsHoldAndAreTight) {
+TEST(SafeDistance, boundsHoldAndAreTight) {
   const ExactDistance gear(shapes::mesh("gear"));
   for (const Phi& phi : {Phi(spheres), Phi(box)})
     for (const double target : {1e-5, 1e-7}) {
@@ -73,7 +73,7 @@ TEST(SafeDistance, BoundsHoldAndAreTight) {
   EXPECT_LT(found.medianBound, 20 * found.medianWorst);
 }
 
-TEST(SafeDistance, CheckFindsBoundsThatAreTooLow) {
+TEST(SafeDistance, checkFindsBoundsThatAreTooLow) {
   FieldData data = build(spheres, cube(), {.targetError = 1e-5, .bounds = true}).data();
   for (CellBound& bound : data.bounds) bound.error /= 100;
   EXPECT_GT(checkBounds(Field(data), spheres).violations, 100);
@@ -82,7 +82,7 @@ TEST(SafeDistance, CheckFindsBoundsThatAreTooLow) {
   EXPECT_GT(checkBounds(Field(data), spheres).violations, 100);
 }
 
-TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
+TEST(SafeDistance, boundsHoldForContinuousFieldsToo) {
   const Field weak = build(spheres, cube(), {.targetError = 1e-5, .continuityWeight = 0.5, .bounds = true});
   EXPECT_EQ(checkBounds(weak, spheres).violations, 0);
   for (const double blend : {0.04, 0.25}) {
@@ -95,7 +95,7 @@ TEST(SafeDistance, BoundsHoldForContinuousFieldsToo) {
   EXPECT_TRUE(blended(weak).data().bounds.empty()) << "the bounds do not hold for the blended field";
 }
 
-TEST(SafeDistance, BoundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
+TEST(SafeDistance, boundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
   const BuildOptions unbounded{.targetError = 1e-6};
   BuildOptions bounded = unbounded;
   bounded.bounds = true;
@@ -114,7 +114,7 @@ TEST(SafeDistance, BoundsTakeFewDistancesAndAreTheSameForAnyNumberOfThreads) {
   EXPECT_FALSE(same(withBounds(before, box))) << "another surface has other bounds";
 }
 
-TEST(SafeDistance, NeverExceedsTheDistanceToTheSurface) {
+TEST(SafeDistance, neverExceedsTheDistanceToTheSurface) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> coordinate(-1.5, 1.5);
@@ -128,7 +128,7 @@ TEST(SafeDistance, NeverExceedsTheDistanceToTheSurface) {
   EXPECT_GT(useful, 8000);
 }
 
-TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
+TEST(SafeDistance, raysNeverPassThroughTheSurface) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
@@ -150,7 +150,7 @@ TEST(SafeDistance, RaysNeverPassThroughTheSurface) {
 }
 
 /// Far away, rounding may swallow a step, and the error of a point may exceed the slack.
-TEST(SafeDistance, RaysFromFarAwayEnd) {
+TEST(SafeDistance, raysFromFarAwayEnd) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   const auto from = [&](double far) { return safeTrace(field, {far, 0.5, 0.5}, {-1, 0, 0}, 1e-3); };
   EXPECT_FALSE(from(1e6).mayTouch);
@@ -160,7 +160,7 @@ TEST(SafeDistance, RaysFromFarAwayEnd) {
 }
 
 /// The bound is that of the leaf that holds the point, with and without blending.
-TEST(SafeDistance, IsTheValueLessTheBound) {
+TEST(SafeDistance, isTheValueLessTheBound) {
   for (const double blend : {0.0, 0.1}) {
     const Field field =
         build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .blend = blend, .bounds = true});
@@ -174,7 +174,7 @@ TEST(SafeDistance, IsTheValueLessTheBound) {
   }
 }
 
-TEST(SafeDistance, RefusesFieldsWithoutBoundsAndBadArguments) {
+TEST(SafeDistance, refusesFieldsWithoutBoundsAndBadArguments) {
   const Field field = build(spheres, cube(), {.targetError = 1e-4});
   EXPECT_FALSE(boundAt(field, {0, 0, 0}));
   EXPECT_THROW(safeDistance(field, {0, 0, 0}), Error);

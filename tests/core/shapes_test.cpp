@@ -63,7 +63,7 @@ double surfaceDeviation(const TriangleMesh& mesh, const DistanceFunction& smooth
   return std::sqrt(sum / total);
 }
 
-TEST(Shapes, CatalogueListsShapesInOrder) {
+TEST(Shapes, catalogueListsShapesInOrder) {
   EXPECT_THAT(shapeNames(),
               ::testing::ElementsAre("sphere", "torus", "box", "gear", "helix-bowl", "marble-run", "structured-bowl"));
   for (const auto& shape : shapes::catalogue()) {
@@ -76,7 +76,7 @@ TEST(Shapes, CatalogueListsShapesInOrder) {
   }
 }
 
-TEST(Shapes, DefaultsAreClosedOutwardCleanAndAboutTwoUnitsLong) {
+TEST(Shapes, defaultsAreClosedOutwardCleanAndAboutTwoUnitsLong) {
   for (const std::string& name : shapeNames()) {
     const TriangleMesh mesh = shapes::mesh(name);
     EXPECT_EQ(mesh.name, "builtin:" + name);
@@ -92,7 +92,7 @@ TEST(Shapes, DefaultsAreClosedOutwardCleanAndAboutTwoUnitsLong) {
   }
 }
 
-TEST(Shapes, SphereHasTheSmoothSpheresVolume) {
+TEST(Shapes, sphereHasTheSmoothSpheresVolume) {
   const MeshReport report = inspect(shapes::mesh("sphere,radius=2.5,subdivisions=3"));
   EXPECT_EQ(report.faces, 1280u);
   EXPECT_NEAR(report.volume, 4 * kPi / 3 * 15.625, 1e-11);
@@ -100,14 +100,14 @@ TEST(Shapes, SphereHasTheSmoothSpheresVolume) {
   EXPECT_EQ(inspect(shapes::mesh("sphere,subdivisions=0")).faces, 20u);
 }
 
-TEST(Shapes, TorusHasTheSmoothTorusVolume) {
+TEST(Shapes, torusHasTheSmoothTorusVolume) {
   const MeshReport report = inspect(shapes::mesh("torus,major=2,minor=0.5,segments=31,sides=9"));
   EXPECT_EQ(report.vertices, 31u * 9);
   EXPECT_EQ(report.faces, 2u * 31 * 9);
   EXPECT_NEAR(report.volume, 2 * kPi * kPi * 2 * 0.25, 1e-11);
 }
 
-TEST(Shapes, CurvedMeshesFollowTheSmoothSurface) {
+TEST(Shapes, curvedMeshesFollowTheSmoothSurface) {
   for (const std::string name : {"sphere", "torus"}) {
     const double deviation = surfaceDeviation(shapes::mesh(name), shapes::analytic(name));
     EXPECT_LT(deviation / 2, 5e-5) << name;
@@ -117,7 +117,7 @@ TEST(Shapes, CurvedMeshesFollowTheSmoothSurface) {
   }
 }
 
-TEST(Shapes, BoxHasTwelveTrianglesAndItsSize) {
+TEST(Shapes, boxHasTwelveTrianglesAndItsSize) {
   const TriangleMesh mesh = shapes::mesh("box,width=4,height=0.5,depth=3");
   const MeshReport report = inspect(mesh);
   EXPECT_EQ(report.faces, 12u);
@@ -127,7 +127,7 @@ TEST(Shapes, BoxHasTwelveTrianglesAndItsSize) {
   EXPECT_EQ(report.box.min(), Vector3(-2, -0.25, -1.5));
 }
 
-TEST(Shapes, GearHasItsSizeAndOneHole) {
+TEST(Shapes, gearHasItsSizeAndOneHole) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=20,radius=3,tooth-depth=0.4,hole=1,thickness=0.8,segments=2");
   const MeshReport report = inspect(mesh);
   EXPECT_TRUE(report.closed());
@@ -149,7 +149,7 @@ TEST(Shapes, GearHasItsSizeAndOneHole) {
 }
 
 /// Top and bottom must not fold over themselves.
-TEST(Shapes, GearCapsFaceOutward) {
+TEST(Shapes, gearCapsFaceOutward) {
   for (const std::string spec :
        {"gear", "gear,teeth=3,segments=1,tooth-depth=0.6,hole=0.39", "gear,teeth=3,hole=0.779"}) {
     const TriangleMesh mesh = shapes::mesh(spec);
@@ -181,7 +181,7 @@ std::vector<double> crossings(const TriangleMesh& mesh, double x, double y) {
   return heights;
 }
 
-TEST(Shapes, BowlsAreOneWallOpenTowardsPositiveZ) {
+TEST(Shapes, bowlsAreOneWallOpenTowardsPositiveZ) {
   for (const std::string name : {"helix-bowl", "structured-bowl"}) {
     const TriangleMesh mesh = shapes::mesh(name);
     const Box box = boundingBox(mesh);
@@ -203,7 +203,7 @@ TEST(Shapes, BowlsAreOneWallOpenTowardsPositiveZ) {
   }
 }
 
-TEST(Shapes, TheHelixBowlsGrooveWindsOutwards) {
+TEST(Shapes, theHelixBowlsGrooveWindsOutwards) {
   // Along a ray from the axis the wall is thinnest once a turn. A rotation of the ray by a quarter turn moves these
   // positions outwards by a quarter of their spacing.
   const TriangleMesh mesh = shapes::mesh("helix-bowl,cells=96,height=0.1");
@@ -219,7 +219,7 @@ TEST(Shapes, TheHelixBowlsGrooveWindsOutwards) {
   }
 }
 
-TEST(Shapes, TheMarbleRunFillsLittleOfItsBoxAndDescends) {
+TEST(Shapes, theMarbleRunFillsLittleOfItsBoxAndDescends) {
   const TriangleMesh mesh = shapes::mesh("marble-run");
   const MeshReport report = inspect(mesh);
   EXPECT_EQ(report.faces, 2u * 18 * 4 * 96 + 4 * 8);
@@ -236,13 +236,13 @@ TEST(Shapes, TheMarbleRunFillsLittleOfItsBoxAndDescends) {
   EXPECT_NEAR(std::abs(opposite[0] - floors[0]), 0.125, 2e-3);
 }
 
-TEST(Shapes, BowlsAndMarbleRunReachThePapersNumbersOfFaces) {
+TEST(Shapes, bowlsAndMarbleRunReachThePapersNumbersOfFaces) {
   EXPECT_NEAR(double(shapes::mesh("helix-bowl,cells=143").triangles.size()), 329'800, 1000);
   EXPECT_NEAR(double(shapes::mesh("marble-run,steps=255,sides=12").triangles.size()), 53'000, 200);
   EXPECT_NEAR(double(shapes::mesh("structured-bowl,cells=506,bumps=40").triangles.size()), 4'100'000, 10'000);
 }
 
-TEST(Shapes, ExtremeParametersStayClosed) {
+TEST(Shapes, extremeParametersStayClosed) {
   for (const std::string spec :
        {"sphere,radius=0.001,subdivisions=0", "sphere,radius=1000,subdivisions=4", "torus,segments=3,sides=3",
         "torus,major=1000,minor=0.001,segments=4096,sides=3", "torus,major=1,minor=0.9999,sides=1024,segments=5",
@@ -262,7 +262,7 @@ TEST(Shapes, ExtremeParametersStayClosed) {
   }
 }
 
-TEST(Shapes, SpecsMayHaveBlanksAndAPrefix) {
+TEST(Shapes, specsMayHaveBlanksAndAPrefix) {
   const TriangleMesh mesh = shapes::mesh(" builtin:torus , major = 1.5 , sides=12 ");
   EXPECT_EQ(mesh.vertices.size(), 256u * 12);
   EXPECT_EQ(mesh.name, "builtin:torus , major = 1.5 , sides=12");
@@ -270,7 +270,7 @@ TEST(Shapes, SpecsMayHaveBlanksAndAPrefix) {
   EXPECT_EQ(shapes::mesh("torus,sides=1.2e1").vertices.size(), 256u * 12);
 }
 
-TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
+TEST(Shapes, badSpecsAreRefusedWithTheNearestName) {
   EXPECT_THAT(errorOf("toras"), HasSubstr("toras: there is no shape 'toras'; did you mean 'torus'?"));
   EXPECT_THAT(errorOf("builtin:gera"), HasSubstr("did you mean 'gear'?"));
   EXPECT_THAT(errorOf("dodecahedron"), HasSubstr("known: sphere, torus, box, gear"));
@@ -302,7 +302,7 @@ TEST(Shapes, BadSpecsAreRefusedWithTheNearestName) {
   EXPECT_THAT(errorOf("analytic:shpere", true), HasSubstr("did you mean 'sphere'?"));
 }
 
-TEST(Shapes, AnalyticDistancesKnowTheirSource) {
+TEST(Shapes, analyticDistancesKnowTheirSource) {
   for (const auto& shape : shapes::catalogue()) {
     if (!shape.analytic) continue;
     const DistanceFunction distance = shapes::analytic("analytic:" + shape.name);
@@ -313,7 +313,7 @@ TEST(Shapes, AnalyticDistancesKnowTheirSource) {
   EXPECT_EQ(shapes::analytic("torus,major=2,minor=0.5").source().box.max(), Vector3(2.5, 2.5, 0.5));
 }
 
-TEST(Shapes, AnalyticDistancesAreExact) {
+TEST(Shapes, analyticDistancesAreExact) {
   EXPECT_DOUBLE_EQ(shapes::sphereDistance({0, 3, 4}, 2), 3);
   EXPECT_DOUBLE_EQ(shapes::sphereDistance({0, 0, 0}, 2), -2);
   EXPECT_DOUBLE_EQ(shapes::torusDistance({0, 0, 0}, 2, 0.5), 1.5);
@@ -327,7 +327,7 @@ TEST(Shapes, AnalyticDistancesAreExact) {
   EXPECT_DOUBLE_EQ(shapes::boxDistance({2, 4, -5}, half), 3);
 }
 
-TEST(Shapes, AnalyticDistancesHaveUnitGradients) {
+TEST(Shapes, analyticDistancesHaveUnitGradients) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1.5, 1.5);
   for (const auto& shape : shapes::catalogue()) {
@@ -350,7 +350,7 @@ TEST(Shapes, AnalyticDistancesHaveUnitGradients) {
   }
 }
 
-TEST(NearestName, FindsMisspellingsAndBeginnings) {
+TEST(NearestName, findsMisspellingsAndBeginnings) {
   const std::vector<std::string> known = {"build", "info", "query", "slice", "render", "target-error"};
   EXPECT_EQ(nearestName("biuld", known), "build");
   EXPECT_EQ(nearestName("Render", known), "render");
@@ -366,7 +366,7 @@ TEST(NearestName, FindsMisspellingsAndBeginnings) {
   EXPECT_EQ(nearestName("x", std::vector<std::string>{"y", "z"}), "");
 }
 
-TEST(NearestName, CountsEditedLetters) {
+TEST(NearestName, countsEditedLetters) {
   EXPECT_EQ(editDistance("", "abc"), 3u);
   EXPECT_EQ(editDistance("abc", ""), 3u);
   EXPECT_EQ(editDistance("kitten", "sitting"), 3u);

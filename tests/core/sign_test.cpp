@@ -61,7 +61,7 @@ const DistanceOptions kAutomatic{.insideTest = InsideTest::automatic};
 
 double value(const ExactDistance& distance, const Vector3& x) { return distance(x); }
 
-TEST(WindingNumber, EstimatesAreWithinTheirErrorBounds) {
+TEST(WindingNumber, estimatesAreWithinTheirErrorBounds) {
   for (const TriangleMesh& mesh :
        {shapes::mesh("builtin:gear"), openBox(), shapes::mesh("builtin:torus,segments=48,sides=24")}) {
     const Hierarchy hierarchy(mesh, boundingBox(mesh));
@@ -91,7 +91,7 @@ TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
   return mesh;
 }
 
-TEST(BoundaryEdges, GradientsAreWithinTheirErrorBounds) {
+TEST(BoundaryEdges, gradientsAreWithinTheirErrorBounds) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const Hierarchy hierarchy(withHoles(sphere, 7), boundingBox(sphere));
   const BoundaryEdges edges(hierarchy);
@@ -119,7 +119,7 @@ TEST(BoundaryEdges, GradientsAreWithinTheirErrorBounds) {
   EXPECT_GT(greatest, 1e-6) << "no cluster was replaced by its series";
 }
 
-TEST(BoundaryEdges, GradientsEqualDifferenceQuotients) {
+TEST(BoundaryEdges, gradientsEqualDifferenceQuotients) {
   const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
   const TriangleMesh mesh = withHoles(sphere, 7);
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
@@ -139,7 +139,7 @@ TEST(BoundaryEdges, GradientsEqualDifferenceQuotients) {
   EXPECT_GT(tried, 5);
 }
 
-TEST(BoundaryEdges, GradientsOfFewEdgesAreExactWhateverErrorIsAllowed) {
+TEST(BoundaryEdges, gradientsOfFewEdgesAreExactWhateverErrorIsAllowed) {
   const TriangleMesh mesh = openBox();
   const Hierarchy hierarchy(mesh, boundingBox(mesh));
   const BoundaryEdges edges(hierarchy);
@@ -148,7 +148,7 @@ TEST(BoundaryEdges, GradientsOfFewEdgesAreExactWhateverErrorIsAllowed) {
   EXPECT_EQ(found.terms, edges.size());
 }
 
-TEST(InsideTest, IsThePseudonormalForClosedMeshes) {
+TEST(InsideTest, isThePseudonormalForClosedMeshes) {
   const TriangleMesh mesh = shapes::mesh("builtin:gear");
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
@@ -157,14 +157,14 @@ TEST(InsideTest, IsThePseudonormalForClosedMeshes) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(InsideTest, AgreesWithTheWindingNumberForInwardMeshes) {
+TEST(InsideTest, agreesWithTheWindingNumberForInwardMeshes) {
   const TriangleMesh mesh = reversed(shapes::mesh("builtin:torus,segments=48,sides=24"));
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::pseudonormal);
   for (const Vector3& x : placesIn(boundingBox(mesh), 1000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-TEST(InsideTest, OfOverlappingBodiesIsThatOfTheirUnion) {
+TEST(InsideTest, ofOverlappingBodiesIsThatOfTheirUnion) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance distance(joined(ball, moved(ball, {1, 0, 0})), kAutomatic);
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
@@ -174,7 +174,7 @@ TEST(InsideTest, OfOverlappingBodiesIsThatOfTheirUnion) {
   EXPECT_GT(value(distance, {2.5, 0, 0}), 0);
 }
 
-TEST(InsideTest, OfNestedBodiesIsThatOfTheOuterBody) {
+TEST(InsideTest, ofNestedBodiesIsThatOfTheOuterBody) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const ExactDistance solid(joined(ball, moved(ball, Vector3::Zero(), 0.5)), kAutomatic);
   EXPECT_EQ(solid.insideTestChoice().insideTest, InsideTest::winding);
@@ -185,7 +185,7 @@ TEST(InsideTest, OfNestedBodiesIsThatOfTheOuterBody) {
   EXPECT_GT(value(hollow, {0.3, 0, 0}), 0);
 }
 
-TEST(InsideTest, IsThePseudonormalForSeparateBodies) {
+TEST(InsideTest, isThePseudonormalForSeparateBodies) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=2");
   const TriangleMesh mesh = joined(ball, joined(moved(ball, {3, 0, 0}), moved(ball, {0, 3, 0}, 0.1)));
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
@@ -194,7 +194,7 @@ TEST(InsideTest, IsThePseudonormalForSeparateBodies) {
 }
 
 /// At the welded common edge of two boxes the normals of four faces cancel.
-TEST(InsideTest, IsTheWindingNumberForBodiesThatShareAnEdge) {
+TEST(InsideTest, isTheWindingNumberForBodiesThatShareAnEdge) {
   const TriangleMesh box = shapes::mesh("box,width=2,height=2,depth=2");
   const TriangleMesh mesh = cleaned(joined(box, moved(box, {2, 2, 0}))).mesh;
   const ExactDistance distance(mesh, kAutomatic), byWinding(mesh, {.insideTest = InsideTest::winding});
@@ -204,7 +204,7 @@ TEST(InsideTest, IsTheWindingNumberForBodiesThatShareAnEdge) {
 }
 
 /// A vertex is pushed through the opposite side of a ball. The spike there is inside out and misleads pseudonormals.
-TEST(InsideTest, IsRightWhereAClosedMeshFoldsIntoItself) {
+TEST(InsideTest, isRightWhereAClosedMeshFoldsIntoItself) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
   const std::uint32_t vertex = mesh.triangles[100][0];
   mesh.vertices[vertex] *= -1.5;
@@ -224,7 +224,7 @@ TEST(InsideTest, IsRightWhereAClosedMeshFoldsIntoItself) {
   EXPECT_GT(misled, 0) << "the test has no power";
 }
 
-TEST(InsideTest, HolesAreClosedWithoutAJump) {
+TEST(InsideTest, holesAreClosedWithoutAJump) {
   const TriangleMesh mesh = openBox();
   const ExactDistance distance(mesh, kAutomatic);
   EXPECT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
@@ -251,7 +251,7 @@ TEST(InsideTest, HolesAreClosedWithoutAJump) {
   EXPECT_LT(least, -0.5);
 }
 
-TEST(InsideTest, FieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
+TEST(InsideTest, fieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
   const TriangleMesh mesh = openBox();
   const BuildOptions options{.targetError = 1e-5};
   const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
@@ -269,7 +269,7 @@ TEST(InsideTest, FieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
   EXPECT_EQ(field.metadata().source.insideTest, InsideTest::winding);
 }
 
-TEST(InsideTest, SingleAndBatchedQueriesAgreeBitForBit) {
+TEST(InsideTest, singleAndBatchedQueriesAgreeBitForBit) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh torn = withHoles(shapes::mesh("builtin:sphere,subdivisions=4"), 7);
   for (const TriangleMesh& mesh : {openBox(), torn, joined(ball, moved(ball, {1, 0, 0}))}) {
@@ -290,7 +290,7 @@ TEST(InsideTest, SingleAndBatchedQueriesAgreeBitForBit) {
   }
 }
 
-TEST(InsideTest, OfAShellIsNegativeOnlyWithinTheWall) {
+TEST(InsideTest, ofAShellIsNegativeOnlyWithinTheWall) {
   TriangleMesh sheet;
   sheet.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -306,7 +306,7 @@ TEST(InsideTest, OfAShellIsNegativeOnlyWithinTheWall) {
   EXPECT_THROW(ExactDistance(sheet, {.insideTest = InsideTest::shell, .thickness = HUGE_VAL}), Error);
 }
 
-TEST(InsideTest, IsTheSameAtAnyScale) {
+TEST(InsideTest, isTheSameAtAnyScale) {
   const TriangleMesh mesh = openBox();
   const std::vector<Vector3> points = placesIn(boundingBox(mesh), 300);
   const ExactDistance unscaled(mesh, kAutomatic);
@@ -316,7 +316,7 @@ TEST(InsideTest, IsTheSameAtAnyScale) {
   }
 }
 
-TEST(SignCheck, ComparesWithTheSumOverAllTriangles) {
+TEST(SignCheck, comparesWithTheSumOverAllTriangles) {
   const TriangleMesh ball = shapes::mesh("builtin:sphere,subdivisions=3");
   const TriangleMesh mesh = joined(ball, moved(ball, {1, 0, 0}));
   for (const Vector3& x : placesIn(boundingBox(mesh), 50))
@@ -340,7 +340,7 @@ TEST(SignCheck, ComparesWithTheSumOverAllTriangles) {
   EXPECT_THROW(checkSign(ball, ExactDistance(ball), 1'000'000'000'000'000, 1, {{}, [] { return true; }}), Cancelled);
 }
 
-TEST(SignCheck, AcceptsInwardMeshes) {
+TEST(SignCheck, acceptsInwardMeshes) {
   const TriangleMesh mesh = reversed(shapes::mesh("builtin:torus,segments=48,sides=24"));
   EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 2000).wrong, 0u);
 }
@@ -353,7 +353,7 @@ TriangleMesh partBeforeWall(double gap) {
   return joined(moved(boxOfTwo(), {1, 0, 0}), part);
 }
 
-TEST(InsideTest, IsRightForWallsAtAnyDistance) {
+TEST(InsideTest, isRightForWallsAtAnyDistance) {
   int misled = 0;
   for (const double gap : {1e-6, 1e-10, 1e-12, 1e-14, 1e-15, 1e-16, 1e-17, 1e-20}) {
     const TriangleMesh nested = partBeforeWall(gap);
@@ -369,7 +369,7 @@ TEST(InsideTest, IsRightForWallsAtAnyDistance) {
   EXPECT_GT(misled, 8) << "the test has no power";
 }
 
-TEST(InsideTest, IsRightBesideFacesThinnerThanRounding) {
+TEST(InsideTest, isRightBesideFacesThinnerThanRounding) {
   TriangleMesh needle;
   needle.vertices = {{0.5, 0, 0}, {0.5 + 6e-8, 0, 0}, {0.5, 1e-16, 0}, {0.5, 0, 1e-16}};
   needle.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
@@ -382,7 +382,7 @@ TEST(InsideTest, IsRightBesideFacesThinnerThanRounding) {
 }
 
 /// The edge of a blade along z is at x = 1. All points beyond it are outside, however near.
-TEST(InsideTest, IsRightBesideBlades) {
+TEST(InsideTest, isRightBesideBlades) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(-1, 1), exponent(-18, -1);
   for (const double half : {1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3}) {
@@ -402,7 +402,7 @@ TEST(InsideTest, IsRightBesideBlades) {
   }
 }
 
-TEST(InsideTest, OfInwardBodiesThatShareAnEdgeIsCorrectedOnImport) {
+TEST(InsideTest, ofInwardBodiesThatShareAnEdgeIsCorrectedOnImport) {
   const ImportedMesh inward = cleaned(reversed(joined(boxOfTwo(), moved(boxOfTwo(), {2, 2, 0}))));
   EXPECT_TRUE(inward.report.reversed);
   EXPECT_EQ(inward.report.unbalancedEdges, 0u);
@@ -411,7 +411,7 @@ TEST(InsideTest, OfInwardBodiesThatShareAnEdgeIsCorrectedOnImport) {
   EXPECT_GT(value(ExactDistance(inward.mesh), {3, 0, 0}), 0);
 }
 
-TEST(AngleSum, CountsTurns) {
+TEST(AngleSum, countsTurns) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> u(-1, 1);
   sign::AngleSum sum;
@@ -427,7 +427,7 @@ TEST(AngleSum, CountsTurns) {
 }
 
 /// Meshes of files, closed and broken, at fewer points than `hpsdf mesh --check-sign` takes.
-TEST(InsideTest, OfMeshFilesEqualsTheWindingNumber) {
+TEST(InsideTest, ofMeshFilesEqualsTheWindingNumber) {
   HPSDF_SKIP_WITHOUT_MESHES();
   for (const char* name : {"cad/cube_12.obj", "cad/fandisk.obj", "cad/wingnut.obj", "cad/1002_tray_bottom.STL",
                            "paper/finger_skeletonhand_part.ply", "broken/self_intersectA.obj", "broken/teapot.obj",

@@ -56,7 +56,7 @@ std::string refusal(const BuildOptions& options) {
   return "";
 }
 
-TEST(Steering, OptimalNeedsFewerCoefficientsForTheSameError) {
+TEST(Steering, optimalNeedsFewerCoefficientsForTheSameError) {
   const BuildOptions paper{.targetError = 1e-7, .grid = {3, 3, 3}};
   BuildOptions optimal = paper;
   optimal.criterion = Criterion::optimal;
@@ -69,7 +69,7 @@ TEST(Steering, OptimalNeedsFewerCoefficientsForTheSameError) {
   EXPECT_EQ(before.metadata().settings.criterion, Criterion::paper);
 }
 
-TEST(Steering, OptimalKeepsToItsStrategyAndLimits) {
+TEST(Steering, optimalKeepsToItsStrategyAndLimits) {
   for (const Strategy strategy : {Strategy::h1, Strategy::h2}) {
     const double target = strategy == Strategy::h1 ? 0.1 : 1e-5;  // the embedded estimate of degree 1 is its slope
     const Field field =
@@ -86,7 +86,7 @@ TEST(Steering, OptimalKeepsToItsStrategyAndLimits) {
 }
 
 /// Also at the ends that are no goals: steps, and limits of degree and depth.
-TEST(Steering, OptimalTakesBackWhateverEndedTheConstruction) {
+TEST(Steering, optimalTakesBackWhateverEndedTheConstruction) {
   const BuildOptions options{.targetError = 1e-9, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .maxSteps = 100};
   BuildOptions paper = options;
   paper.criterion = Criterion::paper;
@@ -100,7 +100,7 @@ TEST(Steering, OptimalTakesBackWhateverEndedTheConstruction) {
   EXPECT_LT(statistics(build(spheres, cube(), limited)).leaves, 27u * 64u);
 }
 
-TEST(Steering, EveryWayIsTheSameForAnyNumberOfThreads) {
+TEST(Steering, everyWayIsTheSameForAnyNumberOfThreads) {
   const std::vector<BuildOptions> ways = {
       {.targetError = 1e-6, .criterion = Criterion::optimal},
       {.targetError = NearFarError{1e-3, 4e-3}},
@@ -119,7 +119,7 @@ TEST(Steering, EveryWayIsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Steering, StagesOfAnOptimalConstructionAreThoseOfShorterOnes) {
+TEST(Steering, stagesOfAnOptimalConstructionAreThoseOfShorterOnes) {
   BuildOptions options{.targetError = 1e-7, .grid = {3, 3, 3}, .criterion = Criterion::optimal};
   const std::vector<std::uint64_t> steps = {0, 40, 90};
   std::size_t stage = 0;
@@ -133,7 +133,7 @@ TEST(Steering, StagesOfAnOptimalConstructionAreThoseOfShorterOnes) {
   EXPECT_EQ(stage, steps.size());
 }
 
-TEST(Steering, BytesAreALimitThatIsMadeUseOf) {
+TEST(Steering, bytesAreALimitThatIsMadeUseOf) {
   for (const Criterion criterion : {Criterion::paper, Criterion::optimal}) {
     double lastRms = HUGE_VAL;
     for (const std::uint64_t bytes : {100000u, 400000u, 1600000u}) {
@@ -157,7 +157,7 @@ TEST(Steering, BytesAreALimitThatIsMadeUseOf) {
 }
 
 /// With whatever is done to the cells or kept beside them at the end, and for hardly more than the base cells.
-TEST(Steering, BytesAreNeverExceeded) {
+TEST(Steering, bytesAreNeverExceeded) {
   std::vector<BuildOptions> ways(1);
   const auto both = [&](const auto& change) {
     const std::vector<BuildOptions> before = ways;
@@ -185,7 +185,7 @@ TEST(Steering, BytesAreNeverExceeded) {
   EXPECT_GT(refused, 40);
 }
 
-TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
+TEST(Steering, noSampleIsWorseThanTheMaximumError) {
   const Field field = build(spheres, cube(), {.targetError = 0, .maxError = 0.01});
   const Measured m = measure(field);
   EXPECT_LE(m.largest, 0.01);
@@ -211,7 +211,7 @@ TEST(Steering, NoSampleIsWorseThanTheMaximumError) {
   EXPECT_LE(after.metadata().totalError, 1e-4);
 }
 
-TEST(Steering, WhatIsLeftOfTheMaximumErrorIsSaid) {
+TEST(Steering, whatIsLeftOfTheMaximumErrorIsSaid) {
   for (const BuildOptions& options : {BuildOptions{.targetError = 0, .maxError = 1e-3, .maxDegree = 2, .maxDepth = 1},
                                       BuildOptions{.targetError = 0, .maxError = 1e-3, .maxSteps = 5},
                                       BuildOptions{.targetError = 0, .maxError = 1e-3, .maxBytes = 60000}}) {
@@ -223,7 +223,7 @@ TEST(Steering, WhatIsLeftOfTheMaximumErrorIsSaid) {
   }
 }
 
-TEST(Steering, NearAndFarErrorsAreReached) {
+TEST(Steering, nearAndFarErrorsAreReached) {
   for (const Criterion criterion : {Criterion::paper, Criterion::optimal}) {
     const Field field = build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-3}, .criterion = criterion});
     const Measured m = measure(field);
@@ -241,7 +241,7 @@ TEST(Steering, NearAndFarErrorsAreReached) {
 }
 
 /// What lies outside of it neither counts as exact nor as wrong.
-TEST(Steering, NearAndFarErrorsLookAtTheBandAlone) {
+TEST(Steering, nearAndFarErrorsLookAtTheBandAlone) {
   const auto made = [](Criterion criterion) {
     return build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-3}, .criterion = criterion, .band = kBand});
   };
@@ -251,7 +251,7 @@ TEST(Steering, NearAndFarErrorsLookAtTheBandAlone) {
   EXPECT_LT(measure(paper).near, 1.2 * 3e-4);
 }
 
-TEST(Steering, RoundingCountsForTheMaximumError) {
+TEST(Steering, roundingCountsForTheMaximumError) {
   const auto far = [](const Vector3& x) { return x.norm() + 10000; };
   const Box domain(Vector3::Constant(1), Vector3::Constant(2));
   const auto made = [&](CoefficientType type, double maxError) {
@@ -271,7 +271,7 @@ TEST(Steering, RoundingCountsForTheMaximumError) {
   EXPECT_GE(field.metadata().measuredError, worst);
 }
 
-TEST(Steering, ResidualIsTheErrorItself) {
+TEST(Steering, residualIsTheErrorItself) {
   for (const Estimator estimator : {Estimator::embedded, Estimator::residual}) {
     const Field field = build(spheres, cube(), {.targetError = 1e-7, .nearness = 0, .estimator = estimator});
     EXPECT_NEAR(measure(field).rms / field.metadata().rmsEstimate(field.domain()), 1.1, 0.2);
@@ -279,7 +279,7 @@ TEST(Steering, ResidualIsTheErrorItself) {
   }
 }
 
-TEST(Steering, NearnessWeighs) {
+TEST(Steering, nearnessWeighs) {
   const detail::Nearness polynomial{NearnessKind::polynomial, 4, 2}, exponential{NearnessKind::exponential, 4, 2};
   EXPECT_EQ(polynomial.weight(0), 1);
   EXPECT_EQ(exponential.weight(0), 1);
@@ -293,7 +293,7 @@ TEST(Steering, NearnessWeighs) {
   EXPECT_LT(statistics(build(spheres, cube(), weighed)).leaves, statistics(build(spheres, cube(), even)).leaves);
 }
 
-TEST(Steering, RefusesWhatDoesNotGoTogether) {
+TEST(Steering, refusesWhatDoesNotGoTogether) {
   EXPECT_NE(refusal({.targetError = 0}).find("target error 0"), std::string::npos);
   EXPECT_NE(refusal({.targetError = NearFarError{.near = 1e-3}}).find("give both"), std::string::npos);
   EXPECT_NE(refusal({.targetError = NearFarError{1e-3, 1e-4}}).find("above far error"), std::string::npos);

@@ -44,7 +44,7 @@ Verification verifyAgainstPlane(const Field& field, VerifyOptions options = {.po
   return verify(field, {distance, [](const Vector3&, double) { return Vector3(0, 0, 1); }, plane()}, options);
 }
 
-TEST(Verify, MeasuresAConstantError) {
+TEST(Verify, measuresAConstantError) {
   for (const double offset : {0.01, 0.25}) {
     const Verification found = verifyAgainstPlane(twoPlanes({offset, offset}, {0, 0, 1}));
     for (const SampleFigures* figures : {&found.uniform, &found.nearSurface}) {
@@ -62,7 +62,7 @@ TEST(Verify, MeasuresAConstantError) {
   }
 }
 
-TEST(Verify, ComputesPercentilesOfTheErrors) {
+TEST(Verify, computesPercentilesOfTheErrors) {
   // |f − Φ| = |x| is distributed uniformly between 0 and 1.
   const Verification found = verifyAgainstPlane(twoPlanes({0, 0}, {1, 0, 1}), {.points = 200'000});
   for (const double percent : {50.0, 90.0, 99.0, 99.9})
@@ -71,7 +71,7 @@ TEST(Verify, ComputesPercentilesOfTheErrors) {
   EXPECT_NEAR(found.uniform.error.mean, 0.5, 0.005);
 }
 
-TEST(Verify, FindsWrongSignsBetweenTheSurfaceAndTheZeroOfTheField) {
+TEST(Verify, findsWrongSignsBetweenTheSurfaceAndTheZeroOfTheField) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.1, 0.1}, {0, 0, 1}), {.points = 40'000});
   EXPECT_NEAR(double(found.uniform.signs.mismatches), 20'000 * 0.05, 150);
   EXPECT_NEAR(found.uniform.signs.farthest, 0.1, 2e-3);
@@ -83,7 +83,7 @@ TEST(Verify, FindsWrongSignsBetweenTheSurfaceAndTheZeroOfTheField) {
   EXPECT_EQ(verifyAgainstPlane(twoPlanes({0, 0}, {0, 0, 1})).uniform.signs.mismatches, 0u);
 }
 
-TEST(Verify, ComparesGradientsByAngleAndLength) {
+TEST(Verify, comparesGradientsByAngleAndLength) {
   const Verification found = verifyAgainstPlane(twoPlanes({0, 0}, {0.5, 0, 1}));
   const double length = std::sqrt(1.25), angle = std::atan(0.5) * 180 / M_PI;
   EXPECT_NEAR(found.uniform.gradient.meanLength, length, 1e-12);
@@ -95,7 +95,7 @@ TEST(Verify, ComparesGradientsByAngleAndLength) {
     EXPECT_NEAR(figure, angle, 1e-9);
 }
 
-TEST(Verify, ListsTheWorstPointOfEachCellWorstFirst) {
+TEST(Verify, listsTheWorstPointOfEachCellWorstFirst) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.3, 0.1}, {0, 0, 1}));
   ASSERT_EQ(found.worst.size(), 2u);  // The field has two cells.
   EXPECT_EQ(found.worst[0].cell, 0u);
@@ -108,13 +108,13 @@ TEST(Verify, ListsTheWorstPointOfEachCellWorstFirst) {
   EXPECT_GT(found.worst[1].point.x(), 0);
 }
 
-TEST(Verify, MeasuresJumpsAsSlopesBetweenSamples) {
+TEST(Verify, measuresJumpsAsSlopesBetweenSamples) {
   const Verification found = verifyAgainstPlane(twoPlanes({5, 0}, {0, 0, 1}));
   EXPECT_NEAR(found.uniform.gradient.maxLength, 1, 1e-12);
   EXPECT_GT(found.uniform.gradient.maxPairSlope, 3);
 }
 
-TEST(Verify, FiguresDoNotDependOnTheThreads) {
+TEST(Verify, figuresDoNotDependOnTheThreads) {
   const TriangleMesh mesh = shapes::mesh("torus,segments=64,sides=32");
   const ExactDistance exact(mesh);
   const Field field = build(exact, domainAround(mesh), {.targetError = 1e-3});
@@ -147,7 +147,7 @@ TEST(Verify, FiguresDoNotDependOnTheThreads) {
   EXPECT_LT(one.nearSurface.gradient.meanAngleDegrees, 10);
 }
 
-TEST(Verify, DrawsUniformSamplesInTheDomainAndInTheBand) {
+TEST(Verify, drawsUniformSamplesInTheDomainAndInTheBand) {
   const Box domain(Vector3(-1, -2, -1), Vector3(1, 2, 3));
   const ExactSamples samples = sampleUniform(height, domain, 0, {.count = 80'000});
   ASSERT_EQ(samples.points.size(), 80'000u);
@@ -176,7 +176,7 @@ TEST(Verify, DrawsUniformSamplesInTheDomainAndInTheBand) {
   EXPECT_NEAR(right, 10'000, 400);
 }
 
-TEST(Verify, DrawsNearSamplesCloseToTheSurfaceAndInTheDomain) {
+TEST(Verify, drawsNearSamplesCloseToTheSurfaceAndInTheDomain) {
   const Box half(Vector3(-1, -1, -1), Vector3(0, 1, 1));  // contains half of the plane
   const ExactSamples samples = sampleNear(height, plane(), half, 0.1, {.count = 20'000});
   ASSERT_EQ(samples.points.size(), 20'000u);
@@ -203,7 +203,7 @@ std::string errorOf(const std::function<void()>& work) {
   return "no error";
 }
 
-TEST(Verify, RefusesImpossibleSamples) {
+TEST(Verify, refusesImpossibleSamples) {
   const Box domain(Vector3(-1, -1, 1), Vector3(1, 1, 2));
   EXPECT_NE(errorOf([&] { sampleUniform(height, domain, 0.05); }).find("within the band"), std::string::npos);
   EXPECT_NE(errorOf([&] { sampleNear(height, plane(), domain, 0.1, {.count = 100}); }).find("misses the surface"),
@@ -222,7 +222,7 @@ TEST(Verify, RefusesImpossibleSamples) {
 }
 
 /// The check comes before a thousand candidates for each wanted point have been drawn.
-TEST(Verify, RefusesImpossibleSamplesSoon) {
+TEST(Verify, refusesImpossibleSamplesSoon) {
   std::atomic<std::size_t> calls = 0;
   const auto counting = [&](const Vector3& x) {
     ++calls;
@@ -234,12 +234,12 @@ TEST(Verify, RefusesImpossibleSamplesSoon) {
   EXPECT_LT(calls, 500'000u);
 }
 
-TEST(Verify, CanBeCancelled) {
+TEST(Verify, canBeCancelled) {
   const Progress progress{.report = {}, .cancelled = [] { return true; }};
   EXPECT_THROW(sampleUniform(height, Box(Vector3(-1, -1, -1), Vector3(1, 1, 1)), 0, {}, progress), Cancelled);
 }
 
-TEST(Verify, MeasureErrorAgreesWithVerify) {
+TEST(Verify, measureErrorAgreesWithVerify) {
   const Field field = twoPlanes({0.3, 0.1}, {0, 0, 1});
   const ExactSamples samples = sampleUniform(height, field.domain(), 0, {.count = 10'000});
   const ErrorFigures figures = measureError(field, samples);

@@ -119,7 +119,7 @@ Field hangingCells() {
                          .maxDegree = 2});
 }
 
-TEST(FaceCoupling, EqualsTheMatrixOfTheFunctional) {
+TEST(FaceCoupling, equalsTheMatrixOfTheFunctional) {
   for (const Field& field : {twoCells(), hangingCells()}) {
     continuity::FaceCoupling coupling(field.data());
     const std::size_t size = coupling.toUnknowns(field.data()).size();
@@ -134,7 +134,7 @@ TEST(FaceCoupling, EqualsTheMatrixOfTheFunctional) {
   }
 }
 
-TEST(FaceCoupling, ReadsAndWritesCoefficients) {
+TEST(FaceCoupling, readsAndWritesCoefficients) {
   const Field field = hangingCells();
   const continuity::FaceCoupling coupling(field.data());
   const std::vector<double> x = coupling.toUnknowns(field.data());
@@ -152,7 +152,7 @@ TEST(FaceCoupling, ReadsAndWritesCoefficients) {
   }
 }
 
-TEST(WeakContinuity, SolvesTheDenseSystem) {
+TEST(WeakContinuity, solvesTheDenseSystem) {
   for (const Field& field : {twoCells(), hangingCells()})
     for (const double weight : {0.01, 1.0}) {
       continuity::FaceCoupling coupling(field.data());
@@ -172,7 +172,7 @@ TEST(WeakContinuity, SolvesTheDenseSystem) {
     }
 }
 
-TEST(WeakContinuity, IsAMinimumOfTheFunctional) {
+TEST(WeakContinuity, isAMinimumOfTheFunctional) {
   const Field field = hangingCells();
   constexpr double kWeight = 0.3, kStep = 1e-3;
   const Field made = weaklyContinuous(field, {.weight = kWeight, .tolerance = 1e-13}).field;
@@ -191,7 +191,7 @@ TEST(WeakContinuity, IsAMinimumOfTheFunctional) {
   }
 }
 
-TEST(WeakContinuity, TradesJumpForChange) {
+TEST(WeakContinuity, tradesJumpForChange) {
   const Field field = randomField(5, {.maxDepth = 3, .maxDegree = 4});
   double jump = findJumps(field).value.rms, change = 0;
   for (const double weight : {100.0, 10.0, 1.0, 0.1, 0.01}) {
@@ -204,7 +204,7 @@ TEST(WeakContinuity, TradesJumpForChange) {
   }
 }
 
-TEST(WeakContinuity, LeavesAContinuousFieldAlone) {
+TEST(WeakContinuity, leavesAContinuousFieldAlone) {
   // All leaves hold the cubic x³ − x·y + z.
   const Field pattern = randomField(11, {.minDegree = 3, .maxDegree = 5});
   FieldData data = pattern.data();
@@ -227,14 +227,14 @@ TEST(WeakContinuity, LeavesAContinuousFieldAlone) {
   EXPECT_EQ(coefficientsOf(made.field), coefficientsOf(field));
 }
 
-TEST(WeakContinuity, GivesTheSameBytesForAnyNumberOfThreads) {
+TEST(WeakContinuity, givesTheSameBytesForAnyNumberOfThreads) {
   const Field field = randomField(7, {.grid = {4, 4, 4}, .refinement = 0.4, .maxDepth = 2, .maxDegree = 7});
   ASSERT_GT(statistics(field).leaves, 500u) << "more than one chunk";
   EXPECT_EQ(coefficientsOf(weaklyContinuous(field, {.weight = 0.1}, 1).field),
             coefficientsOf(weaklyContinuous(field, {.weight = 0.1}, 2).field));
 }
 
-TEST(WeakContinuity, DoesNotDependOnTheUnit) {
+TEST(WeakContinuity, doesNotDependOnTheUnit) {
   const Field field = randomField(9);
   FieldData scaled = field.data();
   constexpr double kScale = 1024;  // a power of two, which scales exactly
@@ -268,7 +268,7 @@ double measuredRms(const Field& field) {
   return std::sqrt(squares / double(points.size()));
 }
 
-TEST(WeakContinuity, AddsItsChangeToTheErrorOfAProjection) {
+TEST(WeakContinuity, addsItsChangeToTheErrorOfAProjection) {
   const Field field = sphereField({.targetError = 1e-5, .quadrature = 6, .coefficients = CoefficientType::float64});
   const WeaklyContinuous made = weaklyContinuous(field, {.weight = 0.2});
   const double before = measuredRms(field), after = measuredRms(made.field);
@@ -282,7 +282,7 @@ TEST(WeakContinuity, AddsItsChangeToTheErrorOfAProjection) {
   EXPECT_LT(grown, unweighted);
 }
 
-TEST(WeakContinuity, KeepsFloatsAsFloats) {
+TEST(WeakContinuity, keepsFloatsAsFloats) {
   const Field field = sphereField({.targetError = 1e-6, .coefficients = CoefficientType::float32});
   const Field made = weaklyContinuous(field).field;
   EXPECT_TRUE(made.singlePrecision());
@@ -294,25 +294,25 @@ TEST(WeakContinuity, KeepsFloatsAsFloats) {
   EXPECT_EQ(rounded.coefficients, made.data().coefficients);
 }
 
-TEST(WeakContinuity, ChangesNothingWithTheGreatestWeight) {
+TEST(WeakContinuity, changesNothingWithTheGreatestWeight) {
   const WeaklyContinuous made = weaklyContinuous(randomField(5), {.weight = kMaxContinuityWeight});
   EXPECT_LE(made.residual, 1e-3);
   EXPECT_LT(made.change, 1e-6);
 }
 
-TEST(WeakContinuity, DropsTheMeasuredMaximum) {
+TEST(WeakContinuity, dropsTheMeasuredMaximum) {
   const Field made = weaklyContinuous(sphereField({.targetError = 0, .maxError = 0.1})).field;
   EXPECT_EQ(made.metadata().settings.maxError, 0);
   EXPECT_EQ(made.metadata().measuredError, 0);
 }
 
-TEST(WeakContinuity, DropsBounds) {
+TEST(WeakContinuity, dropsBounds) {
   FieldData data = randomField(2).data();
   data.bounds.resize(data.nodes.size());
   EXPECT_TRUE(weaklyContinuous(Field(std::move(data))).field.data().bounds.empty());
 }
 
-TEST(WeakContinuity, RefusesBadSettings) {
+TEST(WeakContinuity, refusesBadSettings) {
   const Field field = randomField(1);
   for (const double weight :
        {0.0, -1.0, std::nan(""), 1.01 * kMaxContinuityWeight, std::numeric_limits<double>::infinity()})
@@ -330,7 +330,7 @@ TEST(WeakContinuity, RefusesBadSettings) {
   }
 }
 
-TEST(WeakContinuity, ReportsAndStops) {
+TEST(WeakContinuity, reportsAndStops) {
   const Field field = randomField(1);
   std::atomic<int> reports = 0;
   double last = 0;
@@ -350,7 +350,7 @@ TEST(WeakContinuity, ReportsAndStops) {
   EXPECT_THROW(weaklyContinuous(field, {}, 0, progress), Cancelled) << "during the iterations";
 }
 
-TEST(Build, EnrichesEveryLeaf) {
+TEST(Build, enrichesEveryLeaf) {
   const BuildOptions usual{.targetError = 1e-4, .maxDegree = 3, .coefficients = CoefficientType::float64};
   BuildOptions enriching = usual;
   enriching.enrich = true;
@@ -370,14 +370,14 @@ TEST(Build, EnrichesEveryLeaf) {
   EXPECT_LT(after.metadata().totalError, before.metadata().totalError);
 }
 
-TEST(Build, EnrichedFieldsAreMoreExact) {
+TEST(Build, enrichedFieldsAreMoreExact) {
   BuildOptions options{.targetError = 1e-5};
   const double before = measuredRms(sphereField(options));
   options.enrich = true;
   EXPECT_LT(measuredRms(sphereField(options)), 0.6 * before);
 }
 
-TEST(Build, IsWeaklyContinuousBeforeItRounds) {
+TEST(Build, isWeaklyContinuousBeforeItRounds) {
   BuildOptions options{.targetError = 1e-5, .coefficients = CoefficientType::float64};
   const Field before = sphereField(options);
   options.continuityWeight = 0.1;
@@ -393,7 +393,7 @@ TEST(Build, IsWeaklyContinuousBeforeItRounds) {
   EXPECT_THROW(sphereField(options), Error);
 }
 
-TEST(Build, AppliesContinuityToEveryStage) {
+TEST(Build, appliesContinuityToEveryStage) {
   const DistanceFunction sphere = shapes::analytic("analytic:sphere");
   BuildOptions options{.targetError = 1e-5, .enrich = true, .continuityWeight = 0.5};
   const std::array<std::uint64_t, 3> steps{0, 4, 9};

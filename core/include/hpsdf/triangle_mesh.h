@@ -13,12 +13,20 @@ namespace hpsdf {
 /// The greatest absolute coordinate of a mesh: beyond it, squares and volumes leave the range of double.
 constexpr double kLargestCoordinate = 1e100;
 
-/// Vertices in mesh units, and triangles that index them counter-clockwise as seen from outside.
+/// The vertices of a triangle, counter-clockwise as seen from outside.
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// Vertices in mesh units, and triangles that index them.
 struct TriangleMesh {
   std::vector<Vector3> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<Triangle> triangles;
   std::string name;  ///< the file's name without its path, or the shape's spec; for messages and metadata
 };
+
+/// The positions of a triangle's vertices.
+inline std::array<Vector3, 3> cornersOf(const TriangleMesh& mesh, const Triangle& triangle) {
+  return {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]};
+}
 
 /// Throws `Error` (mesh) for the first triangle that refers to a vertex which does not exist.
 void requireValidIndices(const TriangleMesh& mesh);

@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "hpsdf/types.h"
+
 namespace hpsdf::basis {
 
 /// The ratios i/(i+1) of the recurrence, up to the highest degree that a quadrature rule needs.
@@ -16,6 +18,10 @@ constexpr auto kLegendreRatio = [] {
 }();
 
 #include "basis/legendre-inl.h"
+
+/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
+using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
+LegendreRows legendreOnPart(double shift, double scale, int degree);
 
 /// Points and weights of a quadrature rule on [-1, 1].
 struct QuadratureRule {

@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <utility>
 
-#include "basis/half_shares.h"
-
 namespace hpsdf::basis {
 namespace {
 
@@ -139,7 +137,7 @@ int indexOf(int i, int j, int k, int degree) {
 /// Joins the projections of two halves of a box along an axis into the projection of the box.
 std::vector<double> joinedAlong(int axis, const std::vector<double>& below, const std::vector<double>& above,
                                 int degree) {
-  static const HalfShares shares;
+  static const std::array<LegendreRows, 2> shares = halfShares();
   std::vector<double> whole(below.size(), 0.0);
   forEachCoefficient(degree, [&](int i, int j, int k, int index) {
     std::array<int, 3> at{i, j, k};
@@ -147,7 +145,7 @@ std::vector<double> joinedAlong(int axis, const std::vector<double>& below, cons
     for (int a = 0; a <= top; ++a) {
       at[axis] = a;
       const int ofHalf = indexOf(at[0], at[1], at[2], degree);
-      whole[index] += shares.below(top, a) * below[ofHalf] + shares.above(top, a) * above[ofHalf];
+      whole[index] += shares[0][top][a] * below[ofHalf] + shares[1][top][a] * above[ofHalf];
     }
   });
   return whole;
@@ -186,6 +184,18 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
     if (i + j + k <= to) result.push_back(coefficients[index]);
   });
   return result;
+}
+
+std::array<LegendreRows, 2> halfShares() {
+  // On the upper half L_i((t+1)/2) = Σ_a r_ia L_a(t), so that the share is r_ia ‖L_a‖² / ‖L_i‖² / 2.
+  const LegendreRows r = legendreOnPart(0.5, 0.5, kMaxDegree + 1);
+  std::array<LegendreRows, 2> shares;
+  for (int i = 0; i <= kMaxDegree + 1; ++i)
+    for (int a = 0; a <= i; ++a) {
+      shares[1][i][a] = r[i][a] * (2 * i + 1) / (2 * a + 1) / 2;
+      shares[0][i][a] = (i + a) % 2 == 0 ? shares[1][i][a] : -shares[1][i][a];
+    }
+  return shares;
 }
 
 std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree) {

@@ -79,6 +79,10 @@ std::vector<double> appendTopDegree(std::span<const double> lower, std::span<con
 /// The coefficients of total degree `to` at most, out of those of `degree`.
 std::vector<double> truncated(std::span<const double> coefficients, int degree, int to);
 
+/// The matrices that join the projections of an interval's lower [0] and upper [1] half into the projection of the
+/// whole interval: element (i, a) is the contribution of a half's coefficient a ≤ i to coefficient i of the whole.
+std::array<LegendreRows, 2> halfShares();
+
 /// The cell's projection from those of its eight children (number x + 2y + 4z), all of one degree. The result equals
 /// the projection of all the children's samples.
 std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree);

@@ -8,12 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <string>
 #include <utility>
 
-#include "bvh/float_box.h"
-#include "hpsdf/error.h"
-#include "mesh/mesh_error.h"
+#include "util/refuse.h"
 
 namespace hpsdf::bvh {
 namespace {
@@ -157,17 +154,15 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::v
 }  // namespace
 
 void requireSurface(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) throw mesh::meshError(mesh.name, "no faces; a distance needs at least one triangle");
+  if (mesh.triangles.empty()) detail::refuseMesh(mesh.name, "no faces; a distance needs at least one triangle");
   if (mesh.triangles.size() > Hierarchy::kMaxTriangles)
-    throw mesh::meshError(mesh.name, std::to_string(mesh.triangles.size()) + " faces are more than the " +
-                                         std::to_string(Hierarchy::kMaxTriangles) +
-                                         " that a distance takes; simplify the mesh first");
+    detail::refuseMesh(mesh.name, mesh.triangles.size(), " faces are more than the ", Hierarchy::kMaxTriangles,
+                       " that a distance takes; simplify the mesh first");
   requireValidIndices(mesh);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     if (!mesh.vertices[v].allFinite())
-      throw mesh::meshError(mesh.name,
-                            "vertex " + std::to_string(v + 1) +
-                                " has a coordinate that is not a finite number; repair or export the mesh again");
+      detail::refuseMesh(mesh.name, "vertex ", v + 1,
+                         " has a coordinate that is not a finite number; repair or export the mesh again");
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
@@ -177,7 +172,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
 
   const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
-  frames_ = detail::Array<TriangleFrame>(mesh.triangles.size());
+  frames_ = Array<TriangleFrame>(mesh.triangles.size());
   Numbered numbered;
   tbb::parallel_invoke(
       [&] {
@@ -186,19 +181,18 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
       },
       [&] {
         tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t slot) {
-          const auto& [a, b, c] = mesh.triangles[tree.order[slot]];
-          frames_[slot] = makeFrame({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, tree.order[slot]);
+          frames_[slot] = makeFrame(cornersOf(mesh, mesh.triangles[tree.order[slot]]), tree.order[slot]);
         });
       });
 
   const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
   const BoxFitter fitter(triangles_, points);
-  nodes_ = detail::Array<Node>(numbered.nodes.size());
+  nodes_ = Array<Node>(numbered.nodes.size());
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) {
     fitter.fit(nodes_[n], *numbered.nodes[n]);
     std::copy(numbered.children[n].begin(), numbered.children[n].end(), nodes_[n].child);
   });
-  blocks_ = detail::Array<Block>(numbered.blocks.size());
+  blocks_ = Array<Block>(numbered.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks_.size(),
                     [&](std::size_t b) { fill(blocks_[b], numbered.blocks[b]->begin, numbered.blocks[b]->end); });
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -10,7 +11,6 @@
 #include "bvh/triangle_tree.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
-#include "util/array.h"
 
 namespace hpsdf::bvh {
 
@@ -59,6 +59,24 @@ struct alignas(32) Block {
   std::uint32_t count;
 };
 
+/// An array without initial values. Each thread touches memory first where it fills it, so that pages are placed near
+/// that thread and no single thread has to clear them beforehand.
+template <typename T>
+class Array {
+ public:
+  Array() = default;
+  explicit Array(std::size_t size) : elements_(std::make_unique_for_overwrite<T[]>(size)), size_(size) {}
+
+  std::size_t size() const { return size_; }
+  T& operator[](std::size_t i) { return elements_[i]; }
+  const T& operator[](std::size_t i) const { return elements_[i]; }
+  operator std::span<const T>() const { return {elements_.get(), size_}; }
+
+ private:
+  std::unique_ptr<T[]> elements_;
+  std::size_t size_ = 0;
+};
+
 /// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children a node.
 ///
 /// Nodes and blocks only decide which triangles to skip. They are single precision, and every bound allows for its
@@ -87,8 +105,8 @@ class Hierarchy {
 
   // Frames and triangles are indexed by slot: most neighbours on the surface are neighbours in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
-  std::span<const std::array<std::uint32_t, 3>> triangles() const { return triangles_; }  ///< as indices of `vertices`
-  std::span<const Vector3> vertices() const { return vertices_; }  ///< vertices in use, in the order of first use
+  std::span<const Triangle> triangles() const { return triangles_; }  ///< as indices of `vertices`
+  std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use
 
   std::size_t bytes() const;
 
@@ -102,10 +120,10 @@ class Hierarchy {
   /// Fills a block with the triangles of slots [begin, end).
   void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
 
-  detail::Array<TriangleFrame> frames_;
-  detail::Array<Node> nodes_;
-  detail::Array<Block> blocks_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  Array<TriangleFrame> frames_;
+  Array<Node> nodes_;
+  Array<Block> blocks_;
+  std::vector<Triangle> triangles_;
   std::vector<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_
   double scale_ = 1;  ///< 2 / longest side of the mesh's box

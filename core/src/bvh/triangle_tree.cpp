@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "bvh/float_box.h"
-
 namespace hpsdf::bvh {
 namespace {
 
@@ -193,8 +191,7 @@ class Builder {
 
 }  // namespace
 
-TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points,
-                              const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points, const std::vector<Triangle>& triangles) {
   std::vector<Item> items(triangles.size());
   tbb::parallel_for(std::size_t{0}, items.size(), [&](std::size_t t) {
     items[t].triangle = static_cast<std::uint32_t>(t);

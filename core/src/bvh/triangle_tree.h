@@ -4,12 +4,35 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
+
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::bvh {
 
 constexpr int kWidth = 4;  ///< children of a node, triangles of a block
+
+/// Axis-aligned box of points with four lanes, the fourth of which is unused. A new box is empty.
+struct FloatBox {
+  Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
+
+  void extend(const FloatBox& other) {
+    lower = lower.min(other.lower);
+    upper = upper.max(other.upper);
+  }
+  void extend(const Eigen::Array4f& point) {
+    lower = lower.min(point);
+    upper = upper.max(point);
+  }
+  /// Half of the surface area, as the surface-area heuristic needs it.
+  float area() const {
+    const Eigen::Array4f size = upper - lower;
+    return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+  }
+};
 
 /// A node with up to four children. Each child covers a range of `TriangleTree::order` and is a node itself or a block.
 struct Branch {
@@ -28,7 +51,6 @@ struct TriangleTree {
 
 /// Builds the tree of triangles whose vertices are `points`, in coordinates of order 1 and with a fourth lane of 0. No
 /// input makes the tree deeper than 64 levels, and the number of threads does not change it.
-TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points,
-                              const std::vector<std::array<std::uint32_t, 3>>& triangles);
+TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points, const std::vector<Triangle>& triangles);
 
 }  // namespace hpsdf::bvh

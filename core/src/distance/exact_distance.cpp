@@ -1,9 +1,11 @@
 #include "hpsdf/exact_distance.h"
 
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <utility>
@@ -11,11 +13,10 @@
 
 #include "bvh/hierarchy.h"
 #include "bvh/search.h"
-#include "bvh/segment.h"
 #include "bvh/triangle_frame.h"
-#include "distance/inside_test.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
+#include "mesh/connectivity.h"
 #include "sign/boundary_edges.h"
 #include "sign/pseudonormals.h"
 #include "sign/winding_sign.h"
@@ -23,7 +24,143 @@
 #include "surface/outer_hull.h"
 
 namespace hpsdf {
+namespace distance {
+
+/// An inside test with the data that it needs; the data of other tests are empty.
+struct ChosenInsideTest {
+  InsideTestChoice choice;
+  sign::WindingSign winding = {};
+  sign::Pseudonormals normals = {};
+};
+
+}  // namespace distance
+
 namespace {
+
+using bvh::Hierarchy;
+using distance::ChosenInsideTest;
+using sign::BoundaryEdges;
+using sign::Pseudonormals;
+using sign::WindingSign;
+
+constexpr int kLattice = 16;  // points along each axis
+/// Distance, for coordinates of order 1, of two triangles to which the distances from a point may round to the same.
+constexpr double kTooNear = 0x1p-44;
+/// Least length of a pseudonormal. At an edge it is the angle between the two faces. The dot product that decides the
+/// sign beside such an edge is half the square of the angle, which has to be far above rounding errors.
+constexpr double kSharp = 1e-6;
+
+/// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the box, which may be
+/// flat.
+bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
+  const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
+  const Box box(mesh.min() - beyond, mesh.max() + beyond);
+  const Vector3 size = box.sizes();
+  std::atomic<bool> any = false;
+  tbb::parallel_for(0, kLattice * kLattice * kLattice, [&](int i) {
+    const Vector3 index(i % kLattice, i / kLattice % kLattice, i / (kLattice * kLattice));
+    if (!any && winding.isInside(box.min() + size.cwiseProduct((index + Vector3::Constant(0.5)) / kLattice)))
+      any = true;
+  });
+  return any;
+}
+
+/// Returns the slot of the largest triangle of each component that is connected by edges of two consistent triangles.
+std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
+                                               const std::vector<mesh::DirectedEdge>& sides) {
+  const auto frames = hierarchy.frames();
+  mesh::DisjointSets components(frames.size());
+  mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> edge) {
+    if (edge.size() == 2 && edge[0].rising != edge[1].rising) components.join(edge[0].face, edge[1].face);
+  });
+  const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
+  std::vector<std::uint32_t> largest(frames.size());  // by the lowest slot of the component, which comes first
+  for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
+    const std::uint32_t first = components.first(slot);
+    if (first == slot || area(slot) > area(largest[first])) largest[first] = slot;
+  }
+  std::vector<std::uint32_t> slots;
+  for (std::uint32_t slot = 0; slot < frames.size(); ++slot)
+    if (components.first(slot) == slot) slots.push_back(largest[slot]);
+  return slots;
+}
+
+/// Returns the lowest of `count` indices for which test(index) holds, if there is one. Tests them in parallel.
+template <typename Test>
+std::optional<std::size_t> firstWhere(std::size_t count, const Test& test) {
+  std::vector<char> holds(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { holds[i] = test(i); });
+  const auto first = std::ranges::find(holds, 1);
+  if (first == holds.end()) return std::nullopt;
+  return static_cast<std::size_t>(first - holds.begin());
+}
+
+/// Returns true if the pseudonormal of a vertex or edge of a triangle is dominated by rounding errors.
+bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot) {
+  bool sharp = false;
+  for (std::uint32_t k = 0; k < 3; ++k)
+    sharp |= normals.ofVertex(hierarchy.triangles()[slot][k]).norm() < kSharp ||
+             normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
+  return sharp;
+}
+/// Chooses pseudonormals where their sign is certain to be that of the winding number, which is more expensive.
+///
+/// It is certain (Bærentzen & Aanæs 2005) if
+/// * every edge is balanced, so that the mesh has no holes;
+/// * the mesh neither intersects itself nor comes so near itself that distances to two triangles may round to the same;
+/// * each component, connected by edges of two consistent triangles, has the outside in front and the inside behind it,
+///   which one triangle tells for all of it;
+/// * no edge or vertex is so sharp that its pseudonormal is dominated by rounding errors.
+///
+/// Throws `Cancelled`.
+ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
+  const auto byWinding = [](std::string reason, std::optional<Vector3> position, WindingSign winding) {
+    return ChosenInsideTest{.choice = {InsideTest::winding, std::move(reason), position},
+                            .winding = std::move(winding)};
+  };
+  const auto frames = hierarchy.frames();
+
+  // Holes need the winding number.
+  const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(hierarchy.triangles());
+  BoundaryEdges edges(hierarchy, sides);
+  if (const std::size_t unbalanced = edges.size(); unbalanced > 0) {
+    WindingSign winding(hierarchy, mesh, std::move(edges));
+    std::string reason = std::to_string(unbalanced);
+    reason += unbalanced == 1 ? " edge is" : " edges are";
+    reason += " unbalanced (holes or reversed faces), and ";
+    reason += enclosesAnyPoint(winding, boundingBox(mesh))
+                  ? "holes are closed where the winding number is 1/2"
+                  : "the faces enclose nothing: a shell would give them a thickness";
+    return byWinding(std::move(reason), std::nullopt, std::move(winding));
+  }
+
+  // Rounding errors, and surfaces nearer than these, would make pseudonormals those of another surface.
+  const auto thin = std::ranges::find_if_not(frames, bvh::hasArea);
+  if (thin != frames.end())
+    return byWinding("a face is thinner than the rounding errors of its corners", thin->origin,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+  const Crossings crossings = surface::findCrossings(hierarchy, 1, kTooNear, progress);
+  if (!crossings.found.empty())
+    return byWinding("the mesh intersects itself, so that normals may mislead", crossings.found[0].position,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+
+  // Components must be nested and oriented like solids and their cavities.
+  const std::vector<std::uint32_t> largest = largestOfComponents(hierarchy, sides);
+  if (largest.size() > 1) {
+    WindingSign winding(hierarchy, mesh, std::move(edges));
+    const auto isWrong = [&](std::size_t i) { return !winding.separatesOutsideFromInside(largest[i]); };
+    if (const auto wrong = firstWhere(largest.size(), isWrong))
+      return byWinding("a component is oriented the wrong way, or lies within another", frames[largest[*wrong]].origin,
+                       std::move(winding));
+  }
+  Pseudonormals normals(hierarchy);
+  const auto tooSharp = [&](std::size_t slot) { return isSharp(hierarchy, normals, static_cast<std::uint32_t>(slot)); };
+  if (const auto sharp = firstWhere(frames.size(), tooSharp))
+    return byWinding("an edge or corner is too sharp for normals", frames[*sharp].origin,
+                     WindingSign(hierarchy, mesh, std::move(edges)));
+  return {.choice = {InsideTest::pseudonormal, "the mesh has no holes and does not intersect itself"},
+          .normals = std::move(normals)};
+}
 
 void check(const DistanceOptions& options) {
   const bool isShell = options.insideTest == InsideTest::shell;
@@ -42,34 +179,31 @@ struct ExactDistance::Data {
                .box = boundingBox(mesh),
                .thickness = options.thickness} {
     tbb::parallel_invoke([&] { source.fingerprint = fingerprint(mesh); },
-                         [&] { hierarchy = bvh::Hierarchy(mesh, source.box); });
-    choice.insideTest = options.insideTest;
+                         [&] { hierarchy = Hierarchy(mesh, source.box); });
+    inside.choice.insideTest = options.insideTest;
     if (options.insideTest == InsideTest::automatic) {
-      distance::ChosenInsideTest chosen = distance::chooseInsideTest(hierarchy, mesh, progress);
-      choice = std::move(chosen.choice);
-      winding = std::move(chosen.winding);
-      normals = std::move(chosen.normals);
+      inside = chooseInsideTest(hierarchy, mesh, progress);
     } else if (options.insideTest == InsideTest::pseudonormal) {
-      normals = sign::Pseudonormals(hierarchy);
+      inside.normals = Pseudonormals(hierarchy);
     } else if (options.insideTest == InsideTest::winding) {
-      winding = sign::WindingSign(hierarchy, mesh, sign::BoundaryEdges(hierarchy));
+      inside.winding = WindingSign(hierarchy, mesh, BoundaryEdges(hierarchy));
     } else if (options.insideTest == InsideTest::outerHull) {
       reduceToOuterHull(mesh, progress);
     }
-    source.insideTest = choice.insideTest;
+    source.insideTest = inside.choice.insideTest;
   }
 
   void reduceToOuterHull(const TriangleMesh& mesh, const Progress& progress) {
     wholeMesh = std::move(hierarchy);
-    winding = sign::WindingSign(wholeMesh, mesh, sign::BoundaryEdges(wholeMesh));
-    surface::OuterHull hull = surface::makeOuterHull(wholeMesh, mesh, winding, progress);
-    hierarchy = bvh::Hierarchy(hull.mesh, source.box);
+    inside.winding = WindingSign(wholeMesh, mesh, BoundaryEdges(wholeMesh));
+    surface::OuterHull hull = surface::makeOuterHull(wholeMesh, mesh, inside.winding, progress);
+    hierarchy = Hierarchy(hull.mesh, source.box);
     hullSources = std::move(hull.sourceTriangles);
   }
 
   /// Returns the closest point on a nearest triangle. It is computed from the mesh's own vertices, so that a point on a
   /// vertex has distance 0. The distance has the pseudonormal's sign if that is the inside test.
-  ClosestPoint resolve(const bvh::Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
+  ClosestPoint resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
     const std::uint32_t slot = triangles.slotAt(nearest.triangleRef);
     const bvh::TriangleFrame& frame = triangles.frames()[slot];
     const bvh::FramePoint& point = nearest.point;
@@ -92,7 +226,7 @@ struct ExactDistance::Data {
   }
 
   /// Computes distances to the nearest triangles of a hierarchy, with the signs of `resolve`.
-  void toTriangles(const bvh::Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
+  void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
     using bvh::kPacket;
     std::array<bvh::Nearest, kPacket> nearest{};  // those of the previous packet bound the next search from its start
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
@@ -106,16 +240,16 @@ struct ExactDistance::Data {
 
   /// Replaces the results of `toTriangles` by signed distances according to the inside test.
   void applyInsideTest(std::span<const Vector3> points, std::span<double> distances) const {
-    if (choice.insideTest == InsideTest::pseudonormal) return;
+    if (inside.choice.insideTest == InsideTest::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
-    if (choice.insideTest == InsideTest::outerHull) {
+    if (inside.choice.insideTest == InsideTest::outerHull) {
       // Outside, a triangle nearer than the hull belongs to the hull and was removed only by its limited resolution.
       std::vector<double> clearances(points.size());
       toTriangles(wholeMesh, points, clearances);
       for (double& clearance : clearances) clearance = std::abs(clearance);
-      winding.applyTo(distances, points, clearances);
-    } else if (choice.insideTest == InsideTest::winding) {
-      winding.applyTo(distances, points);
+      inside.winding.applyTo(distances, points, clearances);
+    } else if (inside.choice.insideTest == InsideTest::winding) {
+      inside.winding.applyTo(distances, points);
     }
   }
 
@@ -124,19 +258,18 @@ struct ExactDistance::Data {
   }
 
   Source source;
-  bvh::Hierarchy hierarchy;                ///< the triangles to which distances are measured
-  bvh::Hierarchy wholeMesh;                ///< all triangles; only for an outer hull
+  Hierarchy hierarchy;                     ///< the triangles to which distances are measured
+  Hierarchy wholeMesh;                     ///< all triangles; only for an outer hull
   std::vector<std::uint32_t> hullSources;  ///< `OuterHull::sourceTriangles`; only for an outer hull
-  sign::Pseudonormals normals;             ///< empty for other inside tests
-  sign::WindingSign winding;               ///< empty for other inside tests
-  InsideTestChoice choice;
+  ChosenInsideTest inside;
 
  private:
   Vector3 normalOfVertex(std::uint32_t vertex) const {
-    return choice.insideTest == InsideTest::pseudonormal ? normals.ofVertex(vertex) : Vector3::Zero();
+    return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofVertex(vertex) : Vector3::Zero();
   }
   Vector3 normalOfEdge(std::uint32_t slot, std::uint32_t from) const {
-    return choice.insideTest == InsideTest::pseudonormal ? normals.ofEdge(hierarchy, slot, from) : Vector3::Zero();
+    return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofEdge(hierarchy, slot, from)
+                                                                : Vector3::Zero();
   }
 
   /// `difference` is x − closest. The caller computes it without rounding to `closest`, which is coarse far from the
@@ -173,7 +306,7 @@ ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
   return closest;
 }
 
-const InsideTestChoice& ExactDistance::insideTestChoice() const { return data_->choice; }
+const InsideTestChoice& ExactDistance::insideTestChoice() const { return data_->inside.choice; }
 
 TriangleMesh ExactDistance::surface() const {
   const auto vertices = data_->hierarchy.vertices();
@@ -191,7 +324,7 @@ const Source& ExactDistance::source() const { return data_->source; }
 
 std::size_t ExactDistance::bytes() const {
   return data_->hierarchy.bytes() + data_->wholeMesh.bytes() + data_->hullSources.size() * sizeof(std::uint32_t) +
-         data_->normals.bytes() + data_->winding.bytes();
+         data_->inside.normals.bytes() + data_->inside.winding.bytes();
 }
 
 }  // namespace hpsdf

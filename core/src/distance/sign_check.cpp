@@ -1,7 +1,6 @@
 #include "hpsdf/detail/sign_check.h"
 
 #include <cmath>
-#include <mutex>
 #include <numbers>
 
 #include "hpsdf/error.h"
@@ -19,14 +18,14 @@ constexpr std::size_t kSignsPerTask = 16;  // points of one parallel task
 Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
   if (number % 2 == 0) return random.inBox(box);
   const auto count = static_cast<double>(mesh.triangles.size());
-  const auto& [a, b, c] = mesh.triangles[static_cast<std::size_t>(random.unit() * count)];
+  const auto [a, b, c] = cornersOf(mesh, mesh.triangles[static_cast<std::size_t>(random.unit() * count)]);
   double u = random.unit(), v = random.unit();
   if (u + v > 1) u = 1 - u, v = 1 - v;
-  const Vector3 foot = (1 - u - v) * mesh.vertices[a] + u * mesh.vertices[b] + v * mesh.vertices[c];
+  const Vector3 foot = (1 - u - v) * a + u * b + v * c;
   return foot + random.inBall(0.01 * box.sizes().maxCoeff());
 }
 
-/// Counts over a set of points. The sum of several tallies does not depend on their order.
+/// Counts over a set of points.
 struct Tally {
   std::size_t tooNear = 0;
   std::size_t wrong = 0;
@@ -46,8 +45,10 @@ struct Tally {
 
 double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
   sign::AngleSum angles;
-  for (const auto& [a, b, c] : mesh.triangles)
-    addHalfSolidAngle(mesh.vertices[a] - x, mesh.vertices[b] - x, mesh.vertices[c] - x, angles);
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    addHalfSolidAngle(a - x, b - x, c - x, angles);
+  }
   return angles.value() / (2 * std::numbers::pi);
 }
 
@@ -60,22 +61,18 @@ SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std
   const Vector3 beyond = Vector3::Constant(0.1 * size);
   const Box box(surface.min() - beyond, surface.max() + beyond);
   SignCheck check{.points = points, .tolerance = 1e-6 * size};
-  Tally all;
-  std::mutex adding;
-  detail::forEachChunk(points, kSignsPerTask, progress, "summing winding numbers",
-                       [&](std::size_t, std::size_t first, std::size_t count) {
-                         Tally tally;
-                         for (std::size_t i = first; i < first + count; ++i) {
-                           const Vector3 x = randomPoint(mesh, box, detail::Random(seed, i), i);
-                           const double found = distance(x), away = std::abs(found);
-                           if (!(away > check.tolerance))
-                             tally.add({.tooNear = 1});
-                           else if ((found < 0) != (windingNumber(mesh, x) > level))
-                             tally.add({.wrong = 1, .worstDistance = away, .worst = i});
-                         }
-                         const std::lock_guard lock(adding);
-                         all.add(tally);
-                       });
+  const auto compare = [&](Tally& tally, std::size_t first, std::size_t count) {
+    for (std::size_t i = first; i < first + count; ++i) {
+      const Vector3 x = randomPoint(mesh, box, detail::Random(seed, i), i);
+      const double found = distance(x), away = std::abs(found);
+      if (!(away > check.tolerance))
+        tally.add({.tooNear = 1});
+      else if ((found < 0) != (windingNumber(mesh, x) > level))
+        tally.add({.wrong = 1, .worstDistance = away, .worst = i});
+    }
+  };
+  const auto all =
+      detail::unorderedSumOfChunks<Tally>(points, kSignsPerTask, progress, "summing winding numbers", compare);
   check.tooNear = all.tooNear;
   check.wrong = all.wrong;
   check.worstDistance = all.worstDistance;

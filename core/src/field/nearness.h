@@ -14,29 +14,16 @@ struct Nearness {
   double exponent = 0;  ///< θ
   double diagonal = 1;  ///< d, length of the domain's diagonal
 
-  Nearness() = default;
-  Nearness(NearnessKind theKind, double theExponent, double theDiagonal)
-      : kind(theKind), exponent(theExponent), diagonal(theDiagonal) {}
-  Nearness(const BuildOptions& settings, const Box& domain)
-      : Nearness(settings.nearnessKind, settings.nearness, domain.diagonal().norm()) {}
-
   double weight(double mean) const {
     const double distance = std::abs(mean) / diagonal;
     if (kind == NearnessKind::exponential) return std::exp(-exponent * distance);
     return std::pow(std::clamp(1 - distance, 0.0, 1.0), exponent);
   }
-
-  void becomeExponential(double theta) {
-    kind = NearnessKind::exponential;
-    exponent = theta;
-  }
-  /// False for a kind that a damaged file holds.
-  bool isKnown() const { return kind <= NearnessKind::exponential; }
-  void storeIn(BuildOptions& settings) const {
-    settings.nearness = exponent;
-    settings.nearnessKind = kind;
-  }
 };
+
+inline Nearness nearnessOf(const BuildOptions& settings, const Box& domain) {
+  return {settings.nearnessKind, settings.nearness, domain.diagonal().norm()};
+}
 
 /// The contribution of a cell to the totals: nothing where it lies outside the narrow band.
 struct CellError {

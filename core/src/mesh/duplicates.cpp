@@ -4,13 +4,10 @@
 #include <cstddef>
 #include <cstdlib>
 
-#include "mesh/directed_edges.h"
-#include "mesh/disjoint_sets.h"
+#include "mesh/connectivity.h"
 
 namespace hpsdf::mesh {
 namespace {
-
-using Triangle = std::array<std::uint32_t, 3>;
 
 Triangle sorted(Triangle t) {
   std::ranges::sort(t);

@@ -1,14 +1,14 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
+
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::mesh {
 
 /// Returns true for triangles with the same corners, whatever their orientation.
-bool haveSameCorners(const std::array<std::uint32_t, 3>& one, const std::array<std::uint32_t, 3>& other);
+bool haveSameCorners(const Triangle& one, const Triangle& other);
 
 /// Marks the triangles to drop, with 1, where several triangles have the same corners.
 ///
@@ -20,6 +20,6 @@ bool haveSameCorners(const std::array<std::uint32_t, 3>& one, const std::array<s
 ///   so that each body is closed;
 /// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle stays: the first with
 ///   the more frequent orientation.
-std::vector<char> redundantFaces(std::span<const std::array<std::uint32_t, 3>> triangles);
+std::vector<char> redundantFaces(std::span<const Triangle> triangles);
 
 }  // namespace hpsdf::mesh

@@ -6,10 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "mesh/directed_edges.h"
-#include "mesh/disjoint_sets.h"
+#include "mesh/connectivity.h"
 #include "mesh/duplicates.h"
-#include "mesh/patches.h"
 
 namespace hpsdf {
 namespace {

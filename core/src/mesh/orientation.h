@@ -16,9 +16,4 @@ inline bool hasReliableVolumeSign(double volume, double area, const Box& box, bo
   return closed || (std::abs(volume) > 0.01 * size.prod() && std::abs(volume) > 1e-9 * area * size.norm());
 }
 
-/// Returns true if a surface with this signed volume, area and box faces inward.
-inline bool facesInward(double volume, double area, const Box& box, bool closed) {
-  return volume < 0 && hasReliableVolumeSign(volume, area, box, closed);
-}
-
 }  // namespace hpsdf::mesh

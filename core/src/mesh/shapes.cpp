@@ -398,21 +398,15 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
       addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
       addQuad(mesh, sheet + corner(0), sheet + corner(3), sheet + corner(2), sheet + corner(1));
     }
-  const auto boundary = [&](std::uint32_t k) {  // Vertex k of the boundary, counter-clockwise from (-1, -1).
-    const std::uint32_t along = k % n;
-    switch (k / n % 4) {
-      case 0:
-        return along;
-      case 1:
-        return along * row + n;
-      case 2:
-        return n * row + n - along;
-      default:
-        return (n - along) * row;
-    }
-  };
-  for (std::uint32_t k = 0; k < 4 * n; ++k)
-    addQuad(mesh, boundary(k + 1), boundary(k), sheet + boundary(k), sheet + boundary(k + 1));
+  std::vector<std::uint32_t> boundary;  // the boundary's vertices, counter-clockwise from (-1, -1)
+  for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(k);
+  for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(k * row + n);
+  for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(n * row + n - k);
+  for (std::uint32_t k = 0; k < n; ++k) boundary.push_back((n - k) * row);
+  for (std::uint32_t k = 0; k < 4 * n; ++k) {
+    const std::uint32_t here = boundary[k], next = boundary[(k + 1) % (4 * n)];
+    addQuad(mesh, next, here, sheet + here, sheet + next);
+  }
   return mesh;
 }
 

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "hpsdf/error.h"
-#include "mesh/mesh_error.h"
 #include "util/checked_file.h"
+#include "util/refuse.h"
 
 namespace hpsdf {
 namespace {
@@ -28,10 +28,8 @@ void requireValidIndices(const TriangleMesh& mesh) {
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
     for (const std::uint32_t v : mesh.triangles[f])
       if (v >= mesh.vertices.size())
-        throw mesh::meshError(mesh.name, "face " + std::to_string(f + 1) + " refers to vertex " +
-                                             std::to_string(std::uint64_t{v} + 1) + ", but there are only " +
-                                             std::to_string(mesh.vertices.size()) +
-                                             "; repair or export the mesh again");
+        detail::refuseMesh(mesh.name, "face ", f + 1, " refers to vertex ", std::uint64_t{v} + 1,
+                           ", but there are only ", mesh.vertices.size(), "; repair or export the mesh again");
 }
 
 Box boundingBox(const TriangleMesh& mesh) {
@@ -53,20 +51,18 @@ double signedVolume(const TriangleMesh& mesh) {
   // apex; the box's centre keeps the terms small, so that a mesh far from the origin loses no digits.
   const Vector3 apex = box.center();
   double six = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3 pa = mesh.vertices[a] - apex;
-    const Vector3 pb = mesh.vertices[b] - apex;
-    const Vector3 pc = mesh.vertices[c] - apex;
-    six += pa.dot(pb.cross(pc));
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    six += (a - apex).dot((b - apex).cross(c - apex));
   }
   return six / 6;
 }
 
 double surfaceArea(const TriangleMesh& mesh) {
   double twice = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3& origin = mesh.vertices[a];
-    twice += (mesh.vertices[b] - origin).cross(mesh.vertices[c] - origin).norm();
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    twice += (b - a).cross(c - a).norm();
   }
   return twice / 2;
 }

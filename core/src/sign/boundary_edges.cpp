@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "bvh/segment.h"
+#include "bvh/triangle_frame.h"
 
 namespace hpsdf::sign {
 namespace {

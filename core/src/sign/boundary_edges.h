@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bvh/hierarchy.h"
-#include "mesh/directed_edges.h"
+#include "mesh/connectivity.h"
 
 namespace hpsdf::sign {
 

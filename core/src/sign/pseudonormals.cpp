@@ -83,7 +83,7 @@ class VertexVisitor {
   std::uint32_t numberOf(std::uint64_t side) const { return numbers_[static_cast<std::uint32_t>(side)]; }
 
   std::span<const bvh::TriangleFrame> frames_;
-  std::span<const std::array<std::uint32_t, 3>> triangles_;
+  std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
   /// Other vertex in the high half, index in numbers_ in the low half: sorting groups sides by edge.

@@ -38,90 +38,71 @@ double squaredFarDistance(double area, double radius, double error) {
 
 }  // namespace
 
-/// Makes a cluster of each node and each block of a hierarchy.
-class WindingNumber::Builder {
- public:
-  explicit Builder(WindingNumber& winding) : winding_(winding), hierarchy_(*winding.hierarchy_) {
-    addCluster(0, 0, static_cast<std::uint32_t>(hierarchy_.triangles().size()));
-    winding_.moments_.resize(winding_.clusters_.size());
-    tbb::parallel_for(std::size_t{0}, winding_.clusters_.size(), [&](std::size_t n) { measure(n); });
-  }
-
- private:
-  std::uint32_t firstSlot(std::uint32_t child) const {
-    while ((child & bvh::kBlockBit) == 0) child = hierarchy_.nodes()[child].child[0];
-    return hierarchy_.blocks()[child & ~bvh::kBlockBit].first;
-  }
-
-  /// Adds the cluster of a node or block and, recursively, those of its children. The slots below it are [begin, end).
-  void addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end) {
-    const std::size_t self = winding_.clusters_.size();
-    winding_.clusters_.push_back({.begin = begin, .end = end});
-    if ((child & bvh::kBlockBit) == 0) {
-      const bvh::Node& node = hierarchy_.nodes()[child];
-      for (int i = 0; i < bvh::kWidth && node.child[i] != bvh::kEmpty; ++i) {
-        const bool last = i + 1 == bvh::kWidth || node.child[i + 1] == bvh::kEmpty;
-        addCluster(node.child[i], firstSlot(node.child[i]), last ? end : firstSlot(node.child[i + 1]));
-      }
+/// Adds the cluster of a node or block and, recursively, those of its children. The slots below it are [begin, end).
+void WindingNumber::addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end) {
+  const auto firstSlot = [&](std::uint32_t of) {
+    while ((of & bvh::kBlockBit) == 0) of = hierarchy_->nodes()[of].child[0];
+    return hierarchy_->blocks()[of & ~bvh::kBlockBit].first;
+  };
+  const std::size_t self = clusters_.size();
+  clusters_.push_back({.begin = begin, .end = end});
+  if ((child & bvh::kBlockBit) == 0) {
+    const bvh::Node& node = hierarchy_->nodes()[child];
+    for (int i = 0; i < bvh::kWidth && node.child[i] != bvh::kEmpty; ++i) {
+      const bool last = i + 1 == bvh::kWidth || node.child[i + 1] == bvh::kEmpty;
+      addCluster(node.child[i], firstSlot(node.child[i]), last ? end : firstSlot(node.child[i + 1]));
     }
-    winding_.clusters_[self].next = static_cast<std::uint32_t>(winding_.clusters_.size());
   }
+  clusters_[self].next = static_cast<std::uint32_t>(clusters_.size());
+}
 
-  std::array<Vector3, 3> corners(std::uint32_t slot) const {
-    const auto& [a, b, c] = hierarchy_.triangles()[slot];
-    return {winding_.vertices_[a], winding_.vertices_[b], winding_.vertices_[c]};
+std::array<Vector3, 3> WindingNumber::corners(std::uint32_t slot) const {
+  const auto& [a, b, c] = hierarchy_->triangles()[slot];
+  return {vertices_[a], vertices_[b], vertices_[c]};
+}
+
+/// Computes center, moments and far distances of a cluster.
+void WindingNumber::measure(Cluster& cluster, Moments& moments) const {
+  Vector3 sum = Vector3::Zero();
+  double total = 0;
+  for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
+    const auto [a, b, c] = corners(slot);
+    const double area = (b - a).cross(c - a).norm() / 2;
+    total += area;
+    sum += area / 3 * (a + b + c);
   }
-
-  /// Computes center, moments and far distances of a cluster.
-  void measure(std::size_t n) {
-    Cluster& cluster = winding_.clusters_[n];
-    Moments& moments = winding_.moments_[n];
-    Vector3 sum = Vector3::Zero();
-    double total = 0;
-    for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
-      const auto [a, b, c] = corners(slot);
-      const double area = (b - a).cross(c - a).norm() / 2;
-      total += area;
-      sum += area / 3 * (a + b + c);
-    }
-    cluster.center = total > 0 ? Vector3(sum / total) : corners(cluster.begin)[0];
-    for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
-      const auto [a, b, c] = corners(slot);
-      addTriangle({a - cluster.center, b - cluster.center, c - cluster.center}, moments);
-    }
-    if (moments.radius > 0) moments.area /= std::pow(moments.radius, 3);
-    for (int level = 0; level < kLevels; ++level)
-      cluster.squaredFarDistance[level] = squaredFarDistance(moments.area, moments.radius, kErrors[level]);
+  cluster.center = total > 0 ? Vector3(sum / total) : corners(cluster.begin)[0];
+  for (std::uint32_t slot = cluster.begin; slot < cluster.end; ++slot) {
+    const auto [a, b, c] = corners(slot);
+    moments.add({a - cluster.center, b - cluster.center, c - cluster.center});
   }
+  if (moments.radius > 0) moments.area /= std::pow(moments.radius, 3);
+  for (int level = 0; level < kLevels; ++level)
+    cluster.squaredFarDistance[level] = squaredFarDistance(moments.area, moments.radius, kErrors[level]);
+}
 
-  /// Adds the moments of a triangle with corners `v`, relative to the cluster's center.
-  static void addTriangle(const std::array<Vector3, 3>& v, Moments& moments) {
-    const Vector3 normal = (v[1] - v[0]).cross(v[2] - v[0]) / 2, sum = v[0] + v[1] + v[2], mean = sum / 3;
-    double cubes = 0;
-    for (const Vector3& corner : v) {
-      const double distance = corner.norm();
-      moments.radius = std::max(moments.radius, distance);
-      cubes += distance * distance * distance;
-    }
-    moments.area += normal.norm() * cubes / 3;  // the mean of a convex function is at most that of its corners
-    const Eigen::Matrix3d spread =
-        (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
-    moments.first += normal;
-    const auto second = [&](int i, int j) { return (normal[i] * mean[j] + normal[j] * mean[i]) / 2; };
-    const auto third = [&](int i, int j, int k) {
-      return (normal[i] * spread(j, k) + normal[j] * spread(i, k) + normal[k] * spread(i, j)) / 3;
-    };
-    constexpr int kSecond[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-    for (std::size_t m = 0; m < moments.second.size(); ++m) moments.second[m] += second(kSecond[m][0], kSecond[m][1]);
-    constexpr int kThird[][3] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {0, 0, 1}, {0, 0, 2},
-                                 {0, 1, 1}, {1, 1, 2}, {0, 2, 2}, {1, 2, 2}, {0, 1, 2}};
-    for (std::size_t m = 0; m < moments.third.size(); ++m)
-      moments.third[m] += third(kThird[m][0], kThird[m][1], kThird[m][2]);
+void WindingNumber::Moments::add(const std::array<Vector3, 3>& v) {
+  const Vector3 normal = (v[1] - v[0]).cross(v[2] - v[0]) / 2, sum = v[0] + v[1] + v[2], mean = sum / 3;
+  double cubes = 0;
+  for (const Vector3& corner : v) {
+    const double distance = corner.norm();
+    radius = std::max(radius, distance);
+    cubes += distance * distance * distance;
   }
-
-  WindingNumber& winding_;
-  const bvh::Hierarchy& hierarchy_;
-};
+  area += normal.norm() * cubes / 3;  // the mean of a convex function is at most that of its corners
+  const Eigen::Matrix3d spread =
+      (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
+  first += normal;
+  const auto ofSecond = [&](int i, int j) { return (normal[i] * mean[j] + normal[j] * mean[i]) / 2; };
+  const auto ofThird = [&](int i, int j, int k) {
+    return (normal[i] * spread(j, k) + normal[j] * spread(i, k) + normal[k] * spread(i, j)) / 3;
+  };
+  constexpr int kSecond[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  for (std::size_t m = 0; m < second.size(); ++m) second[m] += ofSecond(kSecond[m][0], kSecond[m][1]);
+  constexpr int kThird[][3] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {0, 0, 1}, {0, 0, 2},
+                               {0, 1, 1}, {1, 1, 2}, {0, 2, 2}, {1, 2, 2}, {0, 1, 2}};
+  for (std::size_t m = 0; m < third.size(); ++m) third[m] += ofThird(kThird[m][0], kThird[m][1], kThird[m][2]);
+}
 
 double WindingNumber::Moments::series(const Vector3& toCenter, double squaredDistance) const {
   const double x = toCenter.x(), y = toCenter.y(), z = toCenter.z();
@@ -145,14 +126,16 @@ WindingNumber::WindingNumber(const bvh::Hierarchy& hierarchy)
     : hierarchy_(&hierarchy), vertices_(hierarchy.vertices().size()) {
   tbb::parallel_for(std::size_t{0}, vertices_.size(),
                     [&](std::size_t v) { vertices_[v] = hierarchy.local(hierarchy.vertices()[v]); });
-  Builder build(*this);
+  addCluster(0, 0, static_cast<std::uint32_t>(hierarchy.triangles().size()));
+  moments_.resize(clusters_.size());
+  tbb::parallel_for(std::size_t{0}, clusters_.size(), [&](std::size_t n) { measure(clusters_[n], moments_[n]); });
 }
 
 double WindingNumber::sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const {
   AngleSum angles;
   for (std::uint32_t slot = begin; slot < end; ++slot) {
-    const auto& [a, b, c] = hierarchy_->triangles()[slot];
-    addHalfSolidAngle(vertices_[a] - local, vertices_[b] - local, vertices_[c] - local, angles);
+    const auto [a, b, c] = corners(slot);
+    addHalfSolidAngle(a - local, b - local, c - local, angles);
   }
   return angles.value() / (2 * std::numbers::pi);
 }

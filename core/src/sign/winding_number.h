@@ -60,8 +60,6 @@ class WindingNumber {
   std::size_t bytes() const;
 
  private:
-  class Builder;
-
   /// A run of triangles, and the distance from which on its Taylor series replaces it.
   struct Cluster {
     Vector3 center = Vector3::Zero();                     ///< in the hierarchy's local coordinates
@@ -78,12 +76,17 @@ class WindingNumber {
     std::array<double, 10> third = {};
     double area = 0, radius = 0;  ///< A and r of the error bound
 
+    /// Adds a triangle with corners `v`, relative to the cluster's center.
+    void add(const std::array<Vector3, 3>& v);
     /// Returns 4π times the winding number by the series; `toCenter` runs from x to the center.
     double series(const Vector3& toCenter, double squaredDistance) const;
     /// Returns a bound of the truncation error of the winding number.
     double error(double squaredDistance) const;
   };
 
+  void addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end);
+  void measure(Cluster& cluster, Moments& moments) const;
+  std::array<Vector3, 3> corners(std::uint32_t slot) const;
   /// Returns the exact winding number of the triangles in slots [begin, end).
   double sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const;
 

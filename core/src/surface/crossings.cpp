@@ -10,7 +10,6 @@
 #include <span>
 #include <utility>
 
-#include "bvh/segment.h"
 #include "bvh/triangle_frame.h"
 #include "hpsdf/detail/crossings.h"
 #include "surface/exact_orientation.h"

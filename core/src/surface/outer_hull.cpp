@@ -14,11 +14,10 @@
 #include <string_view>
 #include <utility>
 
-#include "hpsdf/error.h"
 #include "mesh/duplicates.h"
-#include "mesh/mesh_error.h"
 #include "surface/crossings.h"
 #include "util/chunks.h"
+#include "util/refuse.h"
 
 namespace hpsdf::surface {
 namespace {
@@ -64,10 +63,9 @@ bool cuts(const Cutter& cutter, const Corners& piece) {
 }
 
 [[noreturn]] void refuse(const TriangleMesh& mesh) {
-  throw mesh::meshError(
-      mesh.name,
-      "the mesh intersects itself too often for an outer hull: use the winding number without the hull, or "
-      "repair the mesh first");
+  detail::refuseMesh(mesh.name,
+                     "the mesh intersects itself too often for an outer hull: use the winding number without the "
+                     "hull, or repair the mesh first");
 }
 
 std::array<Corners, 4> quarters(const Corners& t) {
@@ -172,9 +170,9 @@ void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, 
 /// Returns the pieces of all triangles, in their order, with coordinates times `scale`. Throws `TooManyPieces`.
 std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
                                       Subdivider& subdivider) {
-  const auto cornersOf = [&](std::uint32_t t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    return Corners{scale * mesh.vertices[a], scale * mesh.vertices[b], scale * mesh.vertices[c]};
+  const auto scaledCorners = [&](std::uint32_t t) {
+    const auto [a, b, c] = cornersOf(mesh, mesh.triangles[t]);
+    return Corners{scale * a, scale * b, scale * c};
   };
   // Subdivide the triangles that others intersect, in parallel.
   std::vector<std::size_t> firsts;  // index of the first pair of each such triangle, and the number of pairs
@@ -184,12 +182,12 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
   std::vector<std::vector<Piece>> parts(firsts.size() - 1);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) {
     const std::uint32_t t = pairs[firsts[n]][0];
-    const Corners corners = cornersOf(t);
+    const Corners corners = scaledCorners(t);
     std::vector<Cutter> cutters;
     for (const Pair& pair : std::span(pairs).subspan(firsts[n], firsts[n + 1] - firsts[n])) {
       if (mesh::haveSameCorners(mesh.triangles[t], mesh.triangles[pair[1]]))
         continue;  // a coincident triangle cuts nothing
-      const Corners other = cornersOf(pair[1]);
+      const Corners other = scaledCorners(pair[1]);
       cutters.push_back({pair[1], other, areCoplanar(corners, other)});
     }
     ignoreInnerEdges(mesh, pairs, cutters);
@@ -200,7 +198,7 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
   auto next = parts.begin();
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (next == parts.end() || next->front().triangle != t) {
-      pieces.push_back({cornersOf(t), t, true, PieceKind::undecided});
+      pieces.push_back({scaledCorners(t), t, true, PieceKind::undecided});
       continue;
     }
     pieces.insert(pieces.end(), next->begin(), next->end());
@@ -309,7 +307,7 @@ OuterHull makeOuterHull(const bvh::Hierarchy& hierarchy, const TriangleMesh& mes
     hull.mesh.triangles.push_back({first, first + 1, first + 2});
   }
   if (hull.sourceTriangles.empty())
-    throw mesh::meshError(mesh.name, "no face has the outside on a side, so that there is no outer hull");
+    detail::refuseMesh(mesh.name, "no face has the outside on a side, so that there is no outer hull");
   return hull;
 }
 

@@ -33,6 +33,11 @@ void CheckedWriter::text(std::string_view value) {
   put(std::as_bytes(std::span(value.data(), length)));
 }
 
+void CheckedWriter::begin(const Magic& magic, std::uint32_t version) {
+  for (const char c : magic) item(c);
+  item(version);
+}
+
 void CheckedWriter::put(std::span<const std::byte> bytes) {
   checksum_.add(bytes);
   output_.write(bytes);
@@ -56,25 +61,35 @@ CheckedReader::CheckedReader(const std::filesystem::path& file, const FileKind& 
   if (problem) size_ = 0;
 }
 
+std::optional<std::uint32_t> CheckedReader::begin(const Magic& magic) {
+  Magic found;
+  if (remaining() < found.size()) return std::nullopt;
+  for (char& c : found) item(c);
+  if (found != magic) return std::nullopt;
+  std::uint32_t version = 0;
+  item(version);
+  return version;
+}
+
 void CheckedReader::flag(bool& value) {
   std::uint8_t stored = 0;
   item(stored);
-  if (stored > 1) damaged("a flag is neither 0 nor 1");
+  require(stored <= 1, "a flag is neither 0 nor 1");
   value = stored == 1;
 }
 
 void CheckedReader::text(std::string& value) {
   std::uint32_t length = 0;
   item(length);
-  if (length > kLongestText) damaged("its name is too long");
+  require(length <= kLongestText, "its name is too long");
   value.resize(length);
   get(std::as_writable_bytes(std::span(value)));
 }
 
 void CheckedReader::get(std::span<std::byte> bytes) {
-  if (bytes.size() > remaining()) damaged("it ends too early");
+  require(bytes.size() <= remaining(), "it ends too early");
   stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!stream_) damaged("it cannot be read to its end");
+  require(bool(stream_), "it cannot be read to its end");
   checksum_.add(bytes);
   position_ += bytes.size();
 }
@@ -85,7 +100,11 @@ void CheckedReader::finish() {
   if (remaining() != kChecksumBytes)
     damaged(remaining() < kChecksumBytes ? "it ends too early" : "it goes on too long");
   item(stored);
-  if (stored != expected) damaged("its checksum is wrong");
+  require(stored == expected, "its checksum is wrong");
+}
+
+void CheckedReader::require(bool holds, const char* how) const {
+  if (!holds) damaged(how);
 }
 
 void CheckedReader::damaged(const std::string& how) const {

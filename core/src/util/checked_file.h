@@ -1,6 +1,7 @@
 #pragma once
 // Files of numbers that end with a checksum: `.hpsdf` files and checkpoints of constructions.
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -44,6 +46,9 @@ class Checksum {
   std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
+/// The first bytes of a file, by which its kind is known.
+using Magic = std::array<char, 8>;
+
 /// Writes numbers and then their checksum. `CheckedReader` has members of the same names, so that one function template
 /// can list the items of a file for both directions.
 class CheckedWriter {
@@ -57,10 +62,20 @@ class CheckedWriter {
   }
   void flag(bool value) { item(std::uint8_t{value}); }
   void text(std::string_view value);
+  /// Writes an array whose size is known from other items.
   template <typename T>
-  void array(std::span<const T> values) {
-    put(std::as_bytes(values));
+  void array(const std::vector<T>& values, std::uint64_t) {
+    put(std::as_bytes(std::span(values)));
   }
+  /// Writes the size of an array and the array.
+  template <typename T>
+  void list(const std::vector<T>& values) {
+    item(std::uint64_t{values.size()});
+    array(values, values.size());
+  }
+  void begin(const Magic& magic, std::uint32_t version);
+  /// Does nothing: what is written is right.
+  void require(bool, const char*) const {}
   /// Writes the checksum and commits the file.
   void finish();
 
@@ -94,14 +109,24 @@ class CheckedReader {
   /// Reads an array. A size that exceeds the rest of the file is refused before memory is allocated.
   template <typename T>
   void array(std::vector<T>& values, std::uint64_t count) {
-    if (count > remaining() / sizeof(T)) damaged("it ends too early");
+    require(count <= remaining() / sizeof(T), "it ends too early");
     values.resize(count);
     get(std::as_writable_bytes(std::span(values)));
   }
+  template <typename T>
+  void list(std::vector<T>& values) {
+    std::uint64_t count = 0;
+    item(count);
+    array(values, count);
+  }
+  /// Reads the beginning of a file and returns its version; nothing where the file begins otherwise.
+  std::optional<std::uint32_t> begin(const Magic& magic);
   /// Compares the checksum and expects the end of the file.
   void finish();
 
   std::uint64_t remaining() const { return size_ - position_; }
+  /// Throws `Error` with `how` the file is damaged unless `holds`.
+  void require(bool holds, const char* how) const;
   [[noreturn]] void damaged(const std::string& how) const;
   [[noreturn]] void refuse(const std::string& why) const;
 

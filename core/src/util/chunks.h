@@ -4,9 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <mutex>
 #include <string_view>
+#include <vector>
 
 #include "hpsdf/error.h"
 
@@ -53,6 +55,76 @@ void forEachChunk(std::size_t items, std::size_t size, const Progress& progress,
     work(chunk, first, count);
     parts.end();
   });
+}
+
+/// Count, sum, sum of squares and maximum of non-negative values.
+struct Sums {
+  std::size_t count = 0;
+  double sum = 0, squares = 0, max = 0;
+
+  void add(double x) {
+    ++count;
+    sum += x;
+    squares += x * x;
+    max = std::max(max, x);
+  }
+  void add(const Sums& other) {
+    count += other.count;
+    sum += other.sum;
+    squares += other.squares;
+    max = std::max(max, other.max);
+  }
+
+  // Mean and root mean square are 0 without any value.
+  double mean() const { return count == 0 ? 0 : sum / static_cast<double>(count); }
+  double rms() const { return count == 0 ? 0 : std::sqrt(squares / static_cast<double>(count)); }
+};
+
+/// Adds up the sums of all chunks, to which work(sum, first item, number of items) adds in parallel. They are added in
+/// the order of the chunks, so that rounding does not depend on the number of threads.
+template <typename Sum, typename Work>
+Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
+                const Work& work) {
+  std::vector<Sum> parts(chunksOf(items, size));
+  forEachChunk(items, size, progress, task,
+               [&](std::size_t chunk, std::size_t first, std::size_t count) { work(parts[chunk], first, count); });
+  Sum all;
+  for (const Sum& part : parts) all.add(part);
+  return all;
+}
+
+/// Adds up the sums of all chunks as `sumOfChunks` does, but in any order and without keeping them: for sums that do
+/// not depend on the order.
+template <typename Sum, typename Work>
+Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
+                         const Work& work) {
+  Sum all;
+  std::mutex adding;
+  forEachChunk(items, size, progress, task, [&](std::size_t, std::size_t first, std::size_t count) {
+    Sum part;
+    work(part, first, count);
+    const std::lock_guard lock(adding);
+    all.add(part);
+  });
+  return all;
+}
+
+/// Joins the lists of all chunks, to which work(list, first item, number of items) appends in parallel.
+template <typename Item, typename Work>
+std::vector<Item> listOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
+                               const Work& work) {
+  std::vector<std::vector<Item>> parts(chunksOf(items, size));
+  forEachChunk(items, size, progress, task,
+               [&](std::size_t chunk, std::size_t first, std::size_t count) { work(parts[chunk], first, count); });
+  std::size_t count = 0;
+  for (const auto& part : parts) count += part.size();
+  std::vector<Item> all;
+  all.reserve(count);
+  for (auto& part : parts) {
+    all.insert(all.end(), part.begin(), part.end());
+    part = {};
+  }
+  return all;
 }
 
 }  // namespace hpsdf::detail

@@ -49,24 +49,6 @@ std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   return name;
 }
 
-struct Opened {
-  std::filesystem::path name;
-  std::FILE* stream;
-};
-
-/// Opens a new temporary file. A name may be taken by the file of a killed process that had the same process id; then
-/// the next name is tried.
-Opened openTemporary(const std::filesystem::path& file) {
-  constexpr int kTries = 100;
-  Opened opened;
-  for (int n = 0; n < kTries; ++n) {
-    opened = {temporaryBeside(file), nullptr};
-    opened.stream = std::fopen(opened.name.c_str(), "wbx");
-    if (opened.stream != nullptr || errno != EEXIST) break;
-  }
-  return opened;
-}
-
 /// The target of a symbolic link, so that the rename replaces the target and keeps the link; other files stay.
 std::filesystem::path resolved(const std::filesystem::path& file) {
   std::error_code ignored;
@@ -148,9 +130,12 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw Error(ErrorKind::file, file.string(), "is not a regular file; give another name");
   if (!file_.has_filename()) throw Error(ErrorKind::file, file.string(), "names a folder; give a file name");
-  Opened opened = openTemporary(file_);
-  temporary_ = std::move(opened.name);
-  stream_ = opened.stream;
+  // A name may be taken by the file of a killed process that had the same process id; then the next name is tried.
+  for (int tries = 100; tries > 0 && stream_ == nullptr; --tries) {
+    temporary_ = temporaryBeside(file_);
+    stream_ = std::fopen(temporary_.c_str(), "wbx");
+    if (stream_ == nullptr && errno != EEXIST) break;
+  }
   if (stream_ == nullptr) refuse(errno);
   remember(temporary_.c_str());
 }

@@ -16,6 +16,8 @@ struct FaceSteps {
   std::size_t points = 0;  ///< number of points at which both sides were queried
   double value = 0;        ///< greatest difference of f, in the field's units
   double gradient = 0;     ///< greatest length of the difference of the gradients
+
+  void add(const FaceSteps& other);
 };
 
 /// Queries a field on both sides of `count` random points of faces. The two queries of a point are at neighbouring

@@ -21,10 +21,6 @@ struct Piece {
 /// the segment are left out, because rounding decides about them. Throws `Error` if the points are equal or not finite.
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to);
 
-/// Evaluates the field at a point of a leaf; on the leaf's faces, the result is the limit from within the leaf. In a
-/// field without blending it is the leaf's polynomial at any x.
-ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x);
-
 struct LineSample {
   double t;           ///< position along the segment, 0 at its start and 1 at its end
   std::size_t piece;  ///< index into `Line::pieces`

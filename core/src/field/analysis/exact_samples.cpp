@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
+#include "field/cells/cell_fit.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
@@ -70,13 +70,7 @@ std::vector<double> distancesAt(const DistanceFunction& distance, const std::vec
     for (std::size_t n = 0; n < count; ++n) distances[order[first + n]] = found[n];
   };
   detail::forEachChunk(points.size(), kBatch, progress, "taking exact distances", computeChunk);
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    if (std::isfinite(distances[n])) continue;
-    std::ostringstream where;
-    where << "the signed distance is not finite at (" << points[n].x() << ", " << points[n].y() << ", " << points[n].z()
-          << "); it must be defined in the whole domain";
-    throw Error(where.str());
-  }
+  detail::requireFinite(points, distances);
   return distances;
 }
 
@@ -131,9 +125,9 @@ class SurfacePoints {
   explicit SurfacePoints(const TriangleMesh& mesh) : mesh_(mesh) {
     cumulativeAreas_.reserve(mesh.triangles.size());
     double area = 0;
-    for (const auto& [a, b, c] : mesh.triangles) {
-      const Vector3& p = mesh.vertices[a];
-      area += (mesh.vertices[b] - p).cross(mesh.vertices[c] - p).norm() / 2;
+    for (const Triangle& triangle : mesh.triangles) {
+      const auto [a, b, c] = cornersOf(mesh, triangle);
+      area += (b - a).cross(c - a).norm() / 2;
       cumulativeAreas_.push_back(area);
     }
     if (!(area > 0)) throw Error("points near the surface: the surface has no area; give a mesh with faces");
@@ -143,9 +137,9 @@ class SurfacePoints {
     const auto found =
         std::upper_bound(cumulativeAreas_.begin(), cumulativeAreas_.end(), random.unit() * cumulativeAreas_.back());
     const std::size_t triangle = std::min(std::size_t(found - cumulativeAreas_.begin()), cumulativeAreas_.size() - 1);
-    const auto& [a, b, c] = mesh_.triangles[triangle];
+    const auto [a, b, c] = cornersOf(mesh_, mesh_.triangles[triangle]);
     const double side = std::sqrt(random.unit()), along = random.unit();
-    return (1 - side) * mesh_.vertices[a] + side * (1 - along) * mesh_.vertices[b] + side * along * mesh_.vertices[c];
+    return (1 - side) * a + side * (1 - along) * b + side * along * c;
   }
 
  private:

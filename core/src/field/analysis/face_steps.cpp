@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "field/query/blend.h"
 #include "field/query/evaluate.h"
@@ -37,33 +36,27 @@ FaceSteps stepAcross(const Field& field, const Interface& face, detail::Random& 
   return {1, std::abs(upper.value - lower.value), (upper.gradient - lower.gradient).norm()};
 }
 
-void merge(FaceSteps& all, const FaceSteps& part) {
-  all.points += part.points;
-  all.value = std::max(all.value, part.value);
-  all.gradient = std::max(all.gradient, part.gradient);
-}
-
 }  // namespace
+
+void FaceSteps::add(const FaceSteps& other) {
+  points += other.points;
+  value = std::max(value, other.value);
+  gradient = std::max(gradient, other.gradient);
+}
 
 FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces, std::size_t count, std::uint64_t seed,
                            int threads, const Progress& progress) {
-  FaceSteps all;
-  if (faces.empty()) return all;
+  if (faces.empty()) return {};
   constexpr std::size_t kChunk = 4096;
-  std::mutex merging;
-  withThreads(threads, [&] {
-    const auto step = [&](std::size_t, std::size_t first, std::size_t chunkCount) {
-      FaceSteps part;
-      for (std::size_t n = first; n < first + chunkCount; ++n) {
-        detail::Random random(seed, n);
-        merge(part, stepAcross(field, faces[random.next() % faces.size()], random));
-      }
-      const std::lock_guard lock(merging);
-      merge(all, part);
-    };
-    detail::forEachChunk(count, kChunk, progress, "querying both sides of faces", step);
+  const auto step = [&](FaceSteps& steps, std::size_t first, std::size_t chunkCount) {
+    for (std::size_t n = first; n < first + chunkCount; ++n) {
+      detail::Random random(seed, n);
+      steps.add(stepAcross(field, faces[random.next() % faces.size()], random));
+    }
+  };
+  return withThreads(threads, [&] {
+    return detail::unorderedSumOfChunks<FaceSteps>(count, kChunk, progress, "querying both sides of faces", step);
   });
-  return all;
 }
 
 }  // namespace hpsdf

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <variant>
 
 #include "basis/legendre.h"
@@ -147,13 +148,11 @@ class FaceMeter {
   FaceMeter(const Field& field, std::span<const Samples> samples)
       : field_(field), data_(field.data()), samplesOfDegree_(samples) {}
 
-  /// Appends the interfaces that a leaf shares with larger leaves, and with equal ones at its upper faces, so that each
-  /// interface is measured once.
+  /// Appends the interfaces of a leaf by `forEachInterface`.
   void measureLeaf(const OctreeNode& leaf, std::vector<Interface>& faces) {
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int step : {-1, 1})
-        if (const auto neighbour = equalOrLargerFaceNeighbour(data_, leaf, axis, step))
-          if (neighbour->depth < leaf.depth || step > 0) faces.push_back(measure(leaf, *neighbour, axis, step));
+    forEachInterface(data_, leaf, [&](int axis, int step, const OctreeNode& neighbour) {
+      faces.push_back(measure(leaf, neighbour, axis, step));
+    });
   }
 
  private:
@@ -302,23 +301,14 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   for (int degree = 0; degree <= maxDegree; ++degree) samples.emplace_back(degree);
 
   constexpr std::size_t kChunk = 256;
-  std::vector<std::vector<Interface>> found(detail::chunksOf(leaves.size(), kChunk));
-  withThreads(threads, [&] {
-    const auto measure = [&](std::size_t chunk, std::size_t first, std::size_t count) {
-      FaceMeter meter(field, samples);
-      for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves[n], found[chunk]);
-    };
-    detail::forEachChunk(leaves.size(), kChunk, progress, "measuring jumps", measure);
-  });
-
+  const auto measure = [&](std::vector<Interface>& faces, std::size_t first, std::size_t count) {
+    FaceMeter meter(field, samples);
+    for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves[n], faces);
+  };
   Jumps jumps;
-  std::size_t count = 0;
-  for (const auto& faces : found) count += faces.size();
-  jumps.interfaces.reserve(count);
-  for (auto& faces : found) {
-    jumps.interfaces.insert(jumps.interfaces.end(), faces.begin(), faces.end());
-    faces = {};
-  }
+  jumps.interfaces = withThreads(threads, [&] {
+    return detail::listOfChunks<Interface>(leaves.size(), kChunk, progress, "measuring jumps", measure);
+  });
   computeTotals(jumps);
   return jumps;
 }
@@ -327,12 +317,8 @@ std::vector<std::size_t> worstInterfaces(const Jumps& jumps, JumpKind kind, std:
   std::vector<std::size_t> order(jumps.interfaces.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const std::size_t kept = std::min(count, order.size());
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(kept), order.end(),
-                    [&](std::size_t a, std::size_t b) {
-                      const double jumpA = jumpOf(jumps.interfaces[a], kind).max;
-                      const double jumpB = jumpOf(jumps.interfaces[b], kind).max;
-                      return jumpA != jumpB ? jumpA > jumpB : a < b;
-                    });
+  std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(kept), {},
+                            [&](std::size_t n) { return std::pair(-jumpOf(jumps.interfaces[n], kind).max, n); });
   order.resize(kept);
   return order;
 }

@@ -121,6 +121,21 @@ Vector3 pointAt(const Vector3& from, const Vector3& to, double t) {
   return {std::lerp(from.x(), to.x(), t), std::lerp(from.y(), to.y(), t), std::lerp(from.z(), to.z(), t)};
 }
 
+/// Evaluates the field at a point of a leaf; on the leaf's faces, the result is the limit from within the leaf. In a
+/// field without blending it is the leaf's polynomial at any x.
+ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x) {
+  const GridFrame& frame = field.lookupGrid().frame;
+  std::array<double, 3> coordinates;
+  query::CellIndex cellIndex;
+  for (int axis = 0; axis < 3; ++axis) {
+    coordinates[axis] = query::gridCoordinate(frame, axis, x[axis]);
+    cellIndex[axis] = std::llround(std::ldexp(query::gridCoordinate(frame, axis, cell.box.min()[axis]), cell.depth));
+  }
+  const query::LeafPoint leaf =
+      query::leafPoint(field.data().nodes[cell.id], cell.depth, cell.id, cellIndex, coordinates);
+  return query::evaluateInLeaf<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
+}
+
 /// Evaluates the continuation outside the domain. On the domain's boundary the boundary leaf's gradient differs from
 /// that of the continuation, so that the gradient is taken slightly inside the piece.
 ValueAndGradient evaluateOutside(const Field& field, const Line& line, const Piece& piece, double t) {
@@ -152,19 +167,6 @@ std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Ve
   else
     pieces.back().tLeave = 1;
   return pieces;
-}
-
-ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x) {
-  const GridFrame& frame = field.lookupGrid().frame;
-  std::array<double, 3> coordinates;
-  query::CellIndex cellIndex;
-  for (int axis = 0; axis < 3; ++axis) {
-    coordinates[axis] = query::gridCoordinate(frame, axis, x[axis]);
-    cellIndex[axis] = std::llround(std::ldexp(query::gridCoordinate(frame, axis, cell.box.min()[axis]), cell.depth));
-  }
-  const query::LeafPoint leaf =
-      query::leafPoint(field.data().nodes[cell.id], cell.depth, cell.id, cellIndex, coordinates);
-  return query::evaluateInLeaf<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
 }
 
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count) {

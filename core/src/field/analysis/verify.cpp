@@ -7,12 +7,12 @@
 #include <numbers>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 #include "field/query/evaluate.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "util/sums.h"
 
 namespace hpsdf {
 namespace {
@@ -22,13 +22,10 @@ namespace {
 constexpr std::size_t kPointsPerTask = 4096;
 
 detail::Sums sumsOf(std::span<const double> values) {
-  std::vector<detail::Sums> parts(detail::chunksOf(values.size(), kPointsPerTask));
-  detail::forEachChunk(values.size(), kPointsPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
-    for (const double x : values.subspan(first, count)) parts[chunk].add(x);
-  });
-  detail::Sums all;
-  for (const detail::Sums& part : parts) all.add(part);
-  return all;
+  const auto add = [&](detail::Sums& sums, std::size_t first, std::size_t count) {
+    for (const double x : values.subspan(first, count)) sums.add(x);
+  };
+  return detail::sumOfChunks<detail::Sums>(values.size(), kPointsPerTask, {}, "", add);
 }
 
 /// Returns the least of some ascending values that is not exceeded by `percent` percent of them.
@@ -148,8 +145,7 @@ std::vector<WorstPoint> worstPoints(const Field& field, std::span<const Sampled*
       candidates.push_back({std::abs(found[n].value - samples.distances[n]), kind, n});
   }
   tbb::parallel_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    if (a.error != b.error) return a.error > b.error;
-    return a.kind != b.kind ? a.kind < b.kind : a.sample < b.sample;
+    return std::tuple(b.error, a.kind, a.sample) < std::tuple(a.error, b.kind, b.sample);
   });
   std::vector<WorstPoint> worst;
   std::set<std::uint32_t> seen;

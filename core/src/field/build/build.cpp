@@ -1,16 +1,20 @@
 #include "hpsdf/build.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
 #include <utility>
 
 #include "field/build/checkpoint_file.h"
-#include "field/build/finishing.h"
-#include "field/build/growth.h"
-#include "field/build/limits.h"
-#include "field/build/max_error_pass.h"
+#include "field/build/refiner.h"
+#include "field/cells/cell_bounds.h"
+#include "field/cells/prune.h"
+#include "field/continuity/continuity.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 
@@ -43,9 +47,8 @@ class Construction {
                .growthGoal = growthGoal(options, errorGoal(options, referenceLength(distance.source(), domain))),
                .budget = budget_},
         fitter_(distance, options, state_.nearness, nearDistance(options, setup_.referenceLength), progress),
-        refiner_(setup_, fitter_, state_, observer_),
-        finishing_(setup_, fitter_) {
-    state_.nearness = Nearness(options, domain);
+        refiner_{setup_, fitter_, state_, observer_} {
+    state_.nearness = nearnessOf(options, domain);
     state_.tree.domain = domain;
     state_.tree.grid = options.grid;
     refiner_.requireMemory();  // for Φ, before anything is built
@@ -66,23 +69,99 @@ class Construction {
 
   void grow(const std::function<void(std::uint64_t)>& afterStep = {}) {
     observer_.afterStep = afterStep;
-    Growth(setup_, fitter_, state_, refiner_, observer_).run();
-    if (setup_.options.maxError > 0) MaxErrorPass(setup_, fitter_, state_, refiner_, observer_).run();
+    growByErrors(refiner_);
+    if (setup_.options.maxError > 0) refineByProbes(refiner_);
   }
 
   /// The field of the present state, from a copy of its tree.
-  Field snapshot() { return Field(finishing_.finish(BuildTree(state_.tree), state_)); }
+  Field snapshot() { return Field(finish(BuildTree(state_.tree))); }
   /// The field of the final state.
-  FieldData finish() { return finishing_.finish(std::move(state_.tree), state_); }
+  FieldData finish() { return finish(std::move(state_.tree)); }
 
  private:
+  /// Makes a field of a tree, which is the state's own or a copy of it: prunes, enriches, lays out, applies continuity,
+  /// rounds, bounds.
+  FieldData finish(BuildTree&& tree) {
+    const BuildOptions& options = setup_.options;
+    const std::uint64_t before = fitter_.evaluations();
+
+    // Make the cells final.
+    if (options.criterion == Criterion::optimal) prune(tree);
+    if (options.enrich) enrich(tree);
+    FieldMetadata built = metadata(sumOfErrors(tree));
+    FieldData field = layOut(std::move(tree), std::move(built));
+
+    // Make the coefficients final: jumps are reduced in double precision.
+    if (options.continuityWeight)
+      continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
+    roundCoefficients(budget_.coefficientType(), field);
+    field.blend = options.blend;
+
+    // Bound the final coefficients as they are blended.
+    if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
+    ownEvaluations_ += fitter_.evaluations() - before;
+    return field;
+  }
+
+  void prune(BuildTree& tree) const {
+    const BuildOptions& options = setup_.options;
+    PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
+    for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
+    // A growth that ended early, but not by bytes, has refinements to take back all the same.
+    if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
+      limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
+    if (options.maxBytes) limits.mostBytes = budget_.limit();
+    limits.leastDegree = leastDegree(options);
+    limits.mostDegree = mostDegree(options);
+    detail::prune(tree, state_.nearness, limits);
+  }
+
+  /// Fits every leaf anew, one degree higher, so that all of its coefficients come from samples of its own.
+  void enrich(BuildTree& tree) const {
+    constexpr std::size_t kChunk = 4096;
+    std::size_t coefficients = 0;
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0) coefficients += budget_.finalCoefficients(node.fit.degree);
+    requireMemory({.nodes = tree.nodes.size(), .coefficients = coefficients, .fixedBytes = setup_.distance.bytes()},
+                  setup_.options);
+    for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
+      setup_.progress.update("raising every degree", double(begin) / double(tree.nodes.size()));
+      tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
+        BuildNode& node = tree.nodes[n];
+        const int degree = budget_.finalDegree(node.fit.degree);
+        if (node.firstChild != 0 || node.fit.degree >= degree) return;
+        node.fit = fitter_.fit(tree.boxOf(node), degree);
+        node.fit.cached = {};
+      });
+    }
+  }
+
+  FieldMetadata metadata(const ErrorTotals& totals) const {
+    const double scale = std::pow(setup_.referenceLength / 2, 5);
+    FieldMetadata metadata;
+    metadata.source = setup_.distance.source();
+    metadata.settings = storedSettings(setup_.options);
+    if (setup_.goal.byDistance()) metadata.settings.targetError = totals.weighted / scale;
+    metadata.settings.nearness = state_.nearness.exponent;
+    metadata.settings.nearnessKind = state_.nearness.kind;
+    metadata.settings.maxDegree = setup_.options.strategy == Strategy::hp
+                                      ? setup_.options.maxDegree
+                                      : budget_.finalDegree(startDegree(setup_.options));
+    metadata.totalError = totals.weighted / scale;
+    metadata.referenceLength = setup_.referenceLength;
+    metadata.measuredError = state_.measuredError;
+    metadata.exactEvaluations = fitter_.evaluations() - ownEvaluations_;
+    metadata.steps = state_.steps;
+    return metadata;
+  }
+
   ConstructionState state_;
   ByteBudget budget_;
   ConstructionSetup setup_;
   CellFitter fitter_;
   GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
   Refiner refiner_;
-  Finishing finishing_;
+  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of Φ for earlier fields, which do not count for later ones
 };
 
 }  // namespace

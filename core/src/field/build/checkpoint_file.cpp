@@ -16,22 +16,15 @@
 namespace hpsdf::detail {
 namespace {
 
-constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
+constexpr Magic kMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // Must be raised whenever a construction would continue differently from the same state, or the layout changes.
 constexpr std::uint32_t kVersion = 3;
-constexpr detail::FileKind kKind{"checkpoint", "another output", "delete it to build from the start"};
+constexpr FileKind kKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
  public:
   template <typename T>
-  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) void add(const T& value) {
-    checksum_.add(detail::bytesOf(value));
-  }
-  template <typename T>
-  void add(const std::optional<T>& value) {
-    add(value.has_value());
-    if (value) add(*value);
-  }
+  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) void add(const T& value) { checksum_.add(bytesOf(value)); }
   void add(std::string_view text) {
     add(std::uint64_t{text.size()});
     checksum_.add(std::as_bytes(std::span(text)));
@@ -46,7 +39,7 @@ class Digest {
   std::uint64_t value() const { return checksum_.value(); }
 
  private:
-  detail::Checksum checksum_;
+  Checksum checksum_;
 };
 
 std::uint64_t digestOf(const Source& source) {
@@ -110,6 +103,128 @@ void checkTimes(const Checkpoint& checkpoint) {
     throw Error("checkpoint: expected a share of the time above 0 up to 1");
 }
 
+/// Bits that tell which parts of a fit follow.
+enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
+
+// The functions for items work in both directions: a `CheckedWriter` writes the state and leaves it unchanged, a
+// `CheckedReader` reads and checks it.
+
+template <typename Stream>
+void finiteItem(Stream& stream, double& value) {
+  stream.item(value);
+  stream.require(std::isfinite(value), "a number is not finite");
+}
+
+template <typename Stream>
+void coefficientItems(Stream& stream, int& degree, std::vector<double>& coefficients, int least, int most) {
+  auto stored = static_cast<std::uint8_t>(degree);
+  stream.item(stored);
+  stream.require(stored >= least && stored <= most, "a degree is out of range");
+  degree = stored;
+  stream.array(coefficients, static_cast<std::uint64_t>(coefficientCount(degree)));
+  stream.require(std::ranges::all_of(coefficients, [](double c) { return std::isfinite(c); }),
+                 "a number is not finite");
+}
+
+template <typename Stream>
+void fitItems(Stream& stream, Fit& fit, int mostDegree) {
+  const auto bit = [](bool set, std::uint8_t value) { return set ? value : std::uint8_t{0}; };
+  auto parts = static_cast<std::uint8_t>(bit(!fit.coefficients.empty(), kFitted) | bit(fit.outsideBand, kOutsideBand) |
+                                         bit(fit.error.near, kNear) | bit(!fit.cached.coefficients.empty(), kCached));
+  stream.item(parts);
+  stream.require(parts <= kAllBits, "a cell's bits are unknown");
+  fit.outsideBand = (parts & kOutsideBand) != 0;
+  fit.error.near = (parts & kNear) != 0;
+  if ((parts & kFitted) != 0) {
+    finiteItem(stream, fit.error.weighted);
+    finiteItem(stream, fit.error.squared);
+    finiteItem(stream, fit.error.volume);
+    coefficientItems(stream, fit.degree, fit.coefficients, 1, mostDegree);
+  }
+  if ((parts & kCached) != 0) {
+    finiteItem(stream, fit.cached.meanSquare);
+    coefficientItems(stream, fit.cached.degree, fit.cached.coefficients, fit.degree, kMaxDegree + 1);
+  }
+}
+
+template <typename Stream>
+void nodeItems(Stream& stream, BuildTree& tree, int mostDegree) {
+  for (BuildNode& node : tree.nodes) {
+    stream.item(node.firstChild);
+    fitItems(stream, node.fit, mostDegree);
+  }
+}
+
+/// Gives the cells below the base their cell indices. Each group of eight must have one parent, which precedes it.
+void setCellIndices(const CheckedReader& reader, BuildTree& tree, int maxDepth) {
+  std::vector<bool> hasParent(tree.nodes.size());
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    reader.require(n < tree.baseCells() || hasParent[n], "a cell has no parent");
+    const std::uint64_t first = tree.nodes[n].firstChild;
+    if (first == 0) continue;
+    const bool isGroup = first > n && first >= tree.baseCells() && first + 8 <= tree.nodes.size() &&
+                         (first - tree.baseCells()) % 8 == 0 && !hasParent[first];
+    reader.require(isGroup && int(tree.nodes[n].depth) < maxDepth, "a cell's children are not its own");
+    for (std::uint64_t child = first; child < first + 8; ++child) hasParent[child] = true;
+    tree.setChildIndices(static_cast<std::uint32_t>(n));
+  }
+}
+
+/// Throws `Error` where a cell lacks a polynomial that the construction needs, or has one that it cannot have.
+void checkFits(const CheckedReader& reader, const BuildTree& tree, std::uint64_t fittedBaseCells, bool keepsAll) {
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const BuildNode& node = tree.nodes[n];
+    const bool isFitted = !node.fit.coefficients.empty(), isCached = !node.fit.cached.coefficients.empty();
+    const bool isUnfitted = n < tree.baseCells() && n >= fittedBaseCells;
+    const bool needsFit = !isUnfitted && (node.firstChild == 0 || keepsAll);
+    const bool isSuperfluous = isUnfitted && (isFitted || node.firstChild != 0);
+    reader.require(!(needsFit && !isFitted) && !isSuperfluous && isCached == (isFitted && keepsAll),
+                   "a cell lacks its polynomial or has one too many");
+  }
+}
+
+void readTree(CheckedReader& reader, BuildTree& tree, std::uint64_t fittedBaseCells, const BuildOptions& options) {
+  constexpr std::uint64_t kLeastBytes = sizeof(std::uint32_t) + 1;  // of a node
+  const std::uint64_t base = tree.baseCells();
+  std::uint64_t count = 0;
+  reader.item(count);
+  reader.require(count >= base && (count - base) % 8 == 0 && count <= 0xffffffffu &&
+                     count <= reader.remaining() / kLeastBytes && fittedBaseCells <= base &&
+                     (fittedBaseCells == base || count == base),
+                 "it has a number of cells that cannot be");
+  requireMemory({.nodes = count, .coefficients = reader.remaining() / sizeof(double)}, options);
+  tree.addBaseCells();
+  tree.nodes.resize(count);
+  nodeItems(reader, tree, options.maxDegree);
+  setCellIndices(reader, tree, options.maxDepth);
+  checkFits(reader, tree, fittedBaseCells, options.criterion == Criterion::optimal);
+}
+
+/// Every scalar of the state, in order.
+template <typename Stream>
+void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evaluations) {
+  stream.item(state.stage);
+  stream.item(state.fittedBaseCells);
+  stream.item(state.steps);
+  stream.item(evaluations);
+  stream.item(state.nearness.kind);
+  stream.item(state.nearness.exponent);
+  for (auto* number : {&state.totals.weighted, &state.totals.nearSquared, &state.totals.nearVolume,
+                       &state.totals.farSquared, &state.totals.farVolume, &state.lastSum, &state.measuredError})
+    stream.item(*number);
+  stream.flag(state.isFull);
+  stream.item(state.processed);
+}
+
+/// Throws `Error` unless these nodes are leaves, each named once.
+void requireLeaves(const CheckedReader& reader, const BuildTree& tree, std::span<const std::uint32_t> nodes) {
+  std::vector<bool> isNamed(tree.nodes.size());
+  for (const std::uint32_t n : nodes) {
+    reader.require(n < isNamed.size() && !isNamed[n] && tree.nodes[n].firstChild == 0, "it names a cell that is none");
+    isNamed[n] = true;
+  }
+}
+
 }  // namespace
 
 CheckpointFile::CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
@@ -123,18 +238,14 @@ CheckpointFile::CheckpointFile(const Checkpoint& checkpoint, const DistanceFunct
   waitFor(checkpoint.seconds);
 }
 
-std::optional<detail::CheckedReader> CheckpointFile::open() const {
+std::optional<CheckedReader> CheckpointFile::open() const {
   if (!std::filesystem::exists(checkpoint_.file)) return std::nullopt;
-  detail::CheckedReader reader(checkpoint_.file, kKind);
+  CheckedReader reader(checkpoint_.file, kKind);
   const std::string remedy = "; " + std::string(kKind.remedy) + ", or give what it was begun with";
-  std::array<char, 8> magic{};
-  if (reader.remaining() >= magic.size())
-    for (char& c : magic) reader.item(c);
-  if (magic != kMagic) reader.refuse("is no checkpoint of a construction; move it away, or give another output");
-  std::uint32_t version = 0;
-  reader.item(version);
-  if (version != kVersion)
-    reader.refuse("is a checkpoint of format version " + std::to_string(version) + ", this program reads " +
+  const std::optional<std::uint32_t> version = reader.begin(kMagic);
+  if (!version) reader.refuse("is no checkpoint of a construction; move it away, or give another output");
+  if (*version != kVersion)
+    reader.refuse("is a checkpoint of format version " + std::to_string(*version) + ", this program reads " +
                   std::to_string(kVersion) + "; " + std::string(kKind.remedy));
   Identity found;
   identityItems(reader, found);
@@ -149,12 +260,11 @@ std::optional<detail::CheckedReader> CheckpointFile::open() const {
 
 bool CheckpointFile::isDue() const { return Clock::now() >= next_; }
 
-void CheckpointFile::keep(const std::function<void(detail::CheckedWriter&)>& writeState) {
+void CheckpointFile::keep(const std::function<void(CheckedWriter&)>& writeState) {
   const Clock::time_point start = Clock::now();
   try {
-    detail::CheckedWriter writer(checkpoint_.file);
-    for (const char c : kMagic) writer.item(c);
-    writer.item(kVersion);
+    CheckedWriter writer(checkpoint_.file);
+    writer.begin(kMagic, kVersion);
     identityItems(writer, identity_);
     writeState(writer);
     writer.finish();
@@ -168,6 +278,36 @@ void CheckpointFile::keep(const std::function<void(detail::CheckedWriter&)>& wri
 
 void CheckpointFile::waitFor(double seconds) {
   next_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations) {
+  scalarItems(writer, state, evaluations);
+  writer.item(std::uint64_t{state.tree.nodes.size()});
+  nodeItems(writer, state.tree, kMaxDegree);
+  writer.list(state.deferred);
+  writer.list(state.pending);
+}
+
+std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
+                      const ByteBudget& budget) {
+  std::uint64_t evaluations = 0;
+  scalarItems(reader, state, evaluations);
+  reader.require(state.stage <= ConstructionState::Stage::probe && state.nearness.kind <= NearnessKind::exponential,
+                 "it is at an unknown stage");
+  readTree(reader, state.tree, state.fittedBaseCells, options);
+  reader.list(state.deferred);
+  reader.list(state.pending);
+  reader.finish();
+  const bool isFitting = state.stage == ConstructionState::Stage::fitBaseCells;
+  reader.require(
+      (isFitting || state.fittedBaseCells >= state.tree.baseCells()) && state.processed <= state.pending.size(),
+      "its numbers do not belong together");
+  requireLeaves(reader, state.tree, state.deferred);
+  requireLeaves(reader, state.tree, std::span(state.pending).subspan(state.processed));
+  if (isFitting) return evaluations;
+  for (const BuildNode& node : state.tree.nodes)
+    if (node.firstChild == 0) state.coefficients += budget.finalCoefficients(node.fit.degree);
+  return evaluations;
 }
 
 }  // namespace hpsdf::detail

@@ -1,5 +1,5 @@
 #pragma once
-// The file that keeps the state of a construction; see construction_state.h for its contents.
+// The file that keeps the state of a construction.
 
 #include <chrono>
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "field/build/refiner.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/distance_function.h"
 #include "util/checked_file.h"
@@ -21,13 +22,13 @@ class CheckpointFile {
                  const BuildOptions& options);
 
   /// A reader at the beginning of the state, if there is one. Throws `Error` for the state of another construction.
-  std::optional<detail::CheckedReader> open() const;
+  std::optional<CheckedReader> open() const;
 
   /// Tells whether enough time has passed since the construction began or the last state was kept.
   bool isDue() const;
 
   /// Writes the state. Errors go to `Checkpoint::failed` if there is one.
-  void keep(const std::function<void(detail::CheckedWriter&)>& writeState);
+  void keep(const std::function<void(CheckedWriter&)>& writeState);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -46,5 +47,13 @@ class CheckpointFile {
   Identity identity_;
   Clock::time_point next_;
 };
+
+/// Writes the state, which stays as it is, and the number of evaluations of Φ.
+void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
+
+/// Reads them into a state that has its domain and grid, and checks that a construction with these options could have
+/// left them. Throws `Error` otherwise. Returns the number of evaluations of Φ.
+std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
+                      const ByteBudget& budget);
 
 }  // namespace hpsdf::detail

@@ -6,10 +6,9 @@
 #include <sstream>
 #include <string>
 
-#include "field/build/byte_budget.h"
-#include "field/refuse.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
+#include "util/refuse.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -85,8 +84,18 @@ void checkEnds(const BuildOptions& options) {
     refuse(
         "the optimal criterion takes refinements back by mean squares, which a maximum error does not allow: take "
         "the paper's criterion");
-  if (options.targetError.isNone() && !ByteBudget::isAskedFor(options))
+  if (options.targetError.isNone() && !options.maxBytes)
     refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
+}
+
+/// The part of the limit that remains without the lookup grid. The grid has an entry for each base cell or, if that is
+/// more, for a sixteenth of the bytes of nodes and coefficients; blending adds half an entry.
+double limitWithoutLookup(const BuildOptions& options) {
+  if (!options.maxBytes) return HUGE_VAL;
+  const auto limit = double(*options.maxBytes);
+  const double entries = options.blend > 0 ? 1.5 : 1;
+  const double baseEntries = 8.0 * double(std::size_t(options.grid[0]) * options.grid[1] * options.grid[2]);
+  return std::min(limit / (1 + entries / 16), limit - entries * baseEntries);
 }
 
 }  // namespace
@@ -98,15 +107,8 @@ ErrorGoal errorGoal(const BuildOptions& options, double referenceLength) {
 }
 
 int startDegree(const BuildOptions& options) {
-  switch (options.strategy) {
-    case Strategy::h1:
-      return 1;
-    case Strategy::h2:
-      return 2;
-    case Strategy::hp:
-      break;
-  }
-  return std::min(2, options.maxDegree);
+  if (options.strategy == Strategy::hp) return std::min(2, options.maxDegree);
+  return options.strategy == Strategy::h1 ? 1 : 2;
 }
 
 int leastDegree(const BuildOptions& options) { return options.strategy == Strategy::hp ? 1 : startDegree(options); }
@@ -151,6 +153,31 @@ double referenceLength(const Source& source, const Box& domain) {
   const double longest = source.box.sizes().maxCoeff();
   if (!(longest > 0) || !std::isfinite(longest)) throw Error(source.name + ": the surface has no extent");
   return longest;
+}
+
+ByteBudget::ByteBudget(const BuildOptions& options)
+    : options_(options),
+      coefficientBytes_(options.coefficients == CoefficientType::float64 ? sizeof(double) : sizeof(float)),
+      limit_(limitWithoutLookup(options)) {}
+
+double ByteBudget::nodeBytes() const {
+  return 8 + (options_.blend > 0 ? 4 : 0) + (options_.bounds ? double(sizeof(CellBound)) : 0);
+}
+
+double ByteBudget::growthLimit() const {
+  // Pruning needs refinements to choose from. The factor was measured like `kGrowth` in growth.cpp.
+  constexpr double kByteGrowth = 1.6;
+  return options_.criterion == Criterion::optimal ? limit_ * kByteGrowth : limit_;
+}
+
+void ByteBudget::requireRoomForBaseGrid(double bytes, double leastBytes) const {
+  if (leastBytes > limit_ || bytes > growthLimit())
+    refuse("the base grid alone takes more than ", *options_.maxBytes, " bytes: allow more, or take a coarser grid");
+}
+
+CoefficientType ByteBudget::coefficientType() const {
+  const bool isFree = options_.coefficients == CoefficientType::automatic;
+  return isFree && options_.maxBytes ? CoefficientType::float32 : options_.coefficients;
 }
 
 void checkOptions(const Box& domain, const BuildOptions& options) {

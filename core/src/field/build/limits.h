@@ -1,6 +1,7 @@
 #pragma once
-// Checks of settings and memory, and figures that follow from the settings.
+// Checks of settings, limits of memory and bytes, and figures that follow from the settings.
 
+#include <algorithm>
 #include <cstddef>
 
 #include "field/nearness.h"
@@ -34,6 +35,40 @@ struct MemoryNeed {
 
 /// Throws `Error` where the octree and the fixed bytes exceed the memory that is allowed, or will at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
+
+/// Counts the bytes of the finished field by its nodes and coefficients, without its lookup grid.
+class ByteBudget {
+ public:
+  explicit ByteBudget(const BuildOptions& options);
+
+  /// A leaf's degree in the finished field: one higher where leaves are enriched.
+  int finalDegree(int degree) const {
+    return options_.enrich ? std::max(degree, std::min(degree + 1, options_.maxDegree)) : degree;
+  }
+  /// Number of coefficients that the finished field keeps of a leaf.
+  std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
+  /// A node's own bytes with its blend extent and bound.
+  double nodeBytes() const;
+  double leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }
+  double bytes(double nodes, double coefficients) const {
+    return nodeBytes() * nodes + coefficientBytes_ * coefficients;
+  }
+
+  /// The limit for nodes and coefficients; infinite without a limit.
+  double limit() const { return limit_; }
+  /// The limit while the octree grows: beyond `limit` where pruning follows.
+  double growthLimit() const;
+  /// Throws `Error` where base cells of these bytes, or of these least bytes after pruning, exceed the limit.
+  void requireRoomForBaseGrid(double bytes, double leastBytes) const;
+
+  /// Precision of the finished field's coefficients: float where bytes are limited and the choice is free.
+  CoefficientType coefficientType() const;
+
+ private:
+  const BuildOptions& options_;
+  double coefficientBytes_;
+  double limit_;
+};
 
 /// Throws `Error` for the first setting or domain that is out of range, see `checkBuild`.
 void checkOptions(const Box& domain, const BuildOptions& options);

@@ -1,90 +1,173 @@
-#include "field/build/max_error_pass.h"
-
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <limits>
+#include <span>
 #include <utility>
+#include <vector>
 
-#include "field/cells/max_error_probe.h"
+#include "field/build/refiner.h"
+#include "field/query/evaluate.h"
 
 namespace hpsdf::detail {
+namespace {
 
-void MaxErrorPass::run() {
-  constexpr std::size_t kRound = 256;
-  std::vector<std::uint32_t>& pending = state_.pending;
-  if (state_.stage != ConstructionState::Stage::probe) {
-    for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
-      if (state_.tree.nodes[n].firstChild == 0) pending.push_back(n);
-    state_.stage = ConstructionState::Stage::probe;
-  }
-  while (state_.processed < pending.size()) {
-    refiner_.requireMemory();
-    setup_.progress.update("probing the maximum error", double(state_.processed) / double(pending.size()));
-    std::vector<Candidate> candidates =
-        evaluateCandidates(std::min<std::size_t>(kRound, pending.size() - state_.processed));
-    for (std::size_t i = 0; i < candidates.size(); ++i) apply(pending[state_.processed + i], std::move(candidates[i]));
-    state_.processed += candidates.size();
-    observer_.atWholeState();
-  }
-  refiner_.sumTotals();
+constexpr int kAcross = 8;
+
+/// The probes of a cell: a lattice of 8 × 8 × 8 points from corner to corner.
+struct Probes {
+  std::vector<std::array<int, 3>> index;  ///< position in the lattice
+  std::vector<Vector3> local;             ///< the points in local coordinates
+};
+
+/// The lattice block by block: exact distances are fastest for eight neighbouring points.
+const Probes& probes() {
+  static const Probes all = [] {
+    constexpr int kBlocks = kAcross / 2;  // number of blocks of eight neighbours along an axis
+    Probes made;
+    for (int block = 0; block < kBlocks * kBlocks * kBlocks; ++block)
+      for (int corner = 0; corner < 8; ++corner) {
+        const std::array<int, 3> index = {2 * (block % kBlocks) + (corner & 1),
+                                          2 * (block / kBlocks % kBlocks) + (corner >> 1 & 1),
+                                          2 * (block / kBlocks / kBlocks) + (corner >> 2)};
+        made.index.push_back(index);
+        made.local.push_back(2.0 / (kAcross - 1) * Vector3(index[0], index[1], index[2]) - Vector3::Ones());
+      }
+    return made;
+  }();
+  return all;
 }
 
-std::vector<MaxErrorPass::Candidate> MaxErrorPass::evaluateCandidates(std::size_t count) const {
-  std::vector<Candidate> candidates(count);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    candidates[i] = evaluateCandidate(state_.tree.nodes[state_.pending[state_.processed + i]]);
-  });
-  return candidates;
+/// The greatest |f − Φ| at the probes, plus half of its greatest step between two neighbouring probes: the error is
+/// assumed to rise no faster between probes than from probe to probe. `exact` holds Φ at the probes; probes with |Φ|
+/// above `farthest` do not count.
+double worstError(const Fit& fit, std::span<const double> exact, double farthest) {
+  constexpr std::array<int, 3> kStride = {1, kAcross, kAcross * kAcross};
+  std::array<double, kAcross * kAcross * kAcross> errors;
+  const auto place = [&](std::size_t i) {
+    const auto& [x, y, z] = probes().index[i];
+    return x * kStride[0] + y * kStride[1] + z * kStride[2];
+  };
+  double worst = 0, step = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const Vector3& local = probes().local[i];
+    double& error = errors[place(i)];
+    error = query::evaluate(fit.coefficients.data(), fit.degree, {local.x(), local.y(), local.z()}) - exact[i];
+    if (std::abs(exact[i]) > farthest) error = std::numeric_limits<double>::quiet_NaN();
+    worst = std::fmax(worst, std::abs(error));  // fmax ignores the NaN of probes that do not count
+  }
+  for (std::size_t i = 0; i < exact.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      if (probes().index[i][axis] > 0)
+        step = std::fmax(step, std::abs(errors[place(i)] - errors[place(i) - kStride[axis]]));
+  return worst + step / 2;
 }
 
-/// Applies the candidate's refinement and lets the new leaves wait for their turn.
-void MaxErrorPass::apply(std::uint32_t leaf, Candidate&& candidate) {
-  if (!candidate.trial) {
-    state_.measuredError = std::max(state_.measuredError, candidate.worst);
-    return;
-  }
-  const bool mayStep = refiner_.mayStep();
-  if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
-  if (!mayStep || state_.isFull || candidate.raises) {
-    state_.pending.push_back(leaf);  // without a step it is only measured
-    return;
-  }
-  const std::uint32_t first = state_.tree.nodes[leaf].firstChild;
-  for (std::uint32_t child = first; child < first + 8; ++child) state_.pending.push_back(child);
-}
+/// The greatest distance of a point of a cell from the closest probe. `cellDiagonal` is the length of its diagonal.
+double probeSpacing(double cellDiagonal) { return cellDiagonal / (2 * (kAcross - 1)); }
 
-MaxErrorPass::Candidate MaxErrorPass::evaluateCandidate(const BuildNode& leaf) const {
-  Candidate candidate;
-  if (leaf.fit.outsideBand) return candidate;
-  const double most = setup_.options.maxError;
-  const std::optional<Refinement> found = refiner_.allowed(leaf);
-  const bool mayRefine = refiner_.mayStep() && found;
-  const Refinement allowed = found.value_or(Refinement::either);
+class MaxErrorPass {
+ public:
+  explicit MaxErrorPass(Refiner& refiner)
+      : setup_(refiner.setup), fitter_(refiner.fitter), state_(refiner.state), refiner_(refiner) {}
 
-  // An RMS error above half the maximum makes probing superfluous.
-  const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
-  if (mayRefine && isSurelyBad) {
+  void run() {
+    constexpr std::size_t kRound = 256;
+    std::vector<std::uint32_t>& pending = state_.pending;
+    if (state_.stage != ConstructionState::Stage::probe) {
+      for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
+        if (state_.tree.nodes[n].firstChild == 0) pending.push_back(n);
+      state_.stage = ConstructionState::Stage::probe;
+    }
+    while (state_.processed < pending.size()) {
+      refiner_.requireMemory();
+      setup_.progress.update("probing the maximum error", double(state_.processed) / double(pending.size()));
+      std::vector<Candidate> candidates =
+          evaluateCandidates(std::min<std::size_t>(kRound, pending.size() - state_.processed));
+      for (std::size_t i = 0; i < candidates.size(); ++i)
+        apply(pending[state_.processed + i], std::move(candidates[i]));
+      state_.processed += candidates.size();
+      refiner_.observer.atWholeState();
+    }
+    refiner_.sumTotals();
+  }
+
+ private:
+  /// The result of probing one leaf: its greatest error or, where that is too great, a trial of its refinements.
+  struct Candidate {
+    double worst = 0;  ///< |f − Φ|, see `worstError`
+    std::optional<Trial> trial;
+    bool raises = false;
+  };
+
+  std::vector<Candidate> evaluateCandidates(std::size_t count) const {
+    std::vector<Candidate> candidates(count);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      candidates[i] = evaluateCandidate(state_.tree.nodes[state_.pending[state_.processed + i]]);
+    });
+    return candidates;
+  }
+
+  /// Applies the candidate's refinement and lets the new leaves wait for their turn.
+  void apply(std::uint32_t leaf, Candidate&& candidate) {
+    if (!candidate.trial) {
+      state_.measuredError = std::max(state_.measuredError, candidate.worst);
+      return;
+    }
+    const bool mayStep = refiner_.mayStep();
+    if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
+    if (!mayStep || state_.isFull || candidate.raises) {
+      state_.pending.push_back(leaf);  // without a step it is only measured
+      return;
+    }
+    const std::uint32_t first = state_.tree.nodes[leaf].firstChild;
+    for (std::uint32_t child = first; child < first + 8; ++child) state_.pending.push_back(child);
+  }
+
+  Candidate evaluateCandidate(const BuildNode& leaf) const {
+    Candidate candidate;
+    if (leaf.fit.outsideBand) return candidate;
+    const double most = setup_.options.maxError;
+    const std::optional<Refinement> found = refiner_.allowed(leaf);
+    const bool mayRefine = refiner_.mayStep() && found;
+    const Refinement allowed = found.value_or(Refinement::either);
+
+    // An RMS error above half the maximum makes probing superfluous.
+    const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
+    if (mayRefine && isSurelyBad) {
+      candidate.trial = refiner_.attempt(leaf, allowed);
+      candidate.raises = prefersDegree(leaf.fit, *candidate.trial);
+      return candidate;
+    }
+
+    // Probe the leaf. A probe outside of the band stands for the points around it that are within.
+    const Box box = state_.tree.boxOf(leaf);
+    const std::vector<double> exact = fitter_.distances(box, probes().local);
+    const double band = setup_.options.band;
+    const double farthest =
+        band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
+    candidate.worst = worstError(leaf.fit, exact, farthest);
+    if (candidate.worst <= most || !mayRefine) return candidate;
+
+    // Raise the degree where that is enough, else decide by the paper's criterion.
     candidate.trial = refiner_.attempt(leaf, allowed);
+    const std::optional<Fit>& raised = candidate.trial->raised;
     candidate.raises =
-        candidate.trial->raised && (!candidate.trial->children || prefersDegree(leaf.fit, *candidate.trial));
+        (raised && worstError(*raised, exact, farthest) <= most) || prefersDegree(leaf.fit, *candidate.trial);
     return candidate;
   }
 
-  // Probe the leaf. A probe outside of the band stands for the points around it that are within.
-  const Box box = state_.tree.boxOf(leaf);
-  const std::vector<double> exact = fitter_.distances(box, maxErrorProbes());
-  const double band = setup_.options.band;
-  const double farthest = band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
-  candidate.worst = worstError(leaf.fit, exact, farthest);
-  if (candidate.worst <= most || !mayRefine) return candidate;
+  const ConstructionSetup& setup_;
+  const CellFitter& fitter_;
+  ConstructionState& state_;
+  Refiner& refiner_;
+};
 
-  // Raise the degree where that is enough, else decide by the paper's criterion.
-  candidate.trial = refiner_.attempt(leaf, allowed);
-  candidate.raises = candidate.trial->raised &&
-                     (!candidate.trial->children || worstError(*candidate.trial->raised, exact, farthest) <= most ||
-                      prefersDegree(leaf.fit, *candidate.trial));
-  return candidate;
-}
+}  // namespace
+
+void refineByProbes(Refiner& refiner) { MaxErrorPass(refiner).run(); }
 
 }  // namespace hpsdf::detail

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <utility>
 
-#include "field/build/limits.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
 
 bool prefersDegree(const Fit& current, const Trial& trial) {
+  if (!trial.raised || !trial.children) return trial.raised.has_value();
   double worstChild = 0;
   for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error.weighted);
   const int p = current.degree;
@@ -26,7 +26,7 @@ ErrorTotals sumOfErrors(const BuildTree& tree) {
 }
 
 std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
-  const BuildOptions& options = setup_.options;
+  const BuildOptions& options = setup.options;
   const bool mayRaise = options.strategy == Strategy::hp && leaf.fit.degree < options.maxDegree;
   const bool maySplit = int(leaf.depth) < options.maxDepth;
   if (mayRaise && maySplit) return Refinement::either;
@@ -36,54 +36,54 @@ std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
 }
 
 bool Refiner::mayStep() const {
-  return !state_.isFull && (!setup_.options.maxSteps || state_.steps < *setup_.options.maxSteps);
+  return !state.isFull && (!setup.options.maxSteps || state.steps < *setup.options.maxSteps);
 }
 
 void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
   constexpr std::size_t kStepsBetweenSums = 1000;  // between exact sums of the total error (paper, sec. 3.6)
-  BuildTree& tree = state_.tree;
+  BuildTree& tree = state.tree;
   if (tree.nodes.size() > 0xffffffffu - 8)
     throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
 
   // Refuse a refinement that would exceed the limit of bytes.
-  const ByteBudget& budget = setup_.budget;
+  const ByteBudget& budget = setup.budget;
   const std::size_t before = budget.finalCoefficients(tree.nodes[leaf].fit.degree);
   const std::size_t added = raises ? budget.finalCoefficients(trial.raised->degree) - before : 7 * before;
   if (bytes() + budget.bytes(0, double(added)) + (raises ? 0 : 8 * budget.nodeBytes()) > budget.growthLimit()) {
-    state_.isFull = true;
+    state.isFull = true;
     return;
   }
 
   // Exchange the leaf's error for that of its successors.
-  state_.coefficients += added;
-  state_.totals.add(tree.nodes[leaf].fit.error, -1);
+  state.coefficients += added;
+  state.totals.add(tree.nodes[leaf].fit.error, -1);
   if (raises) {
     tree.nodes[leaf].fit = std::move(*trial.raised);
-    state_.totals.add(tree.nodes[leaf].fit.error);
+    state.totals.add(tree.nodes[leaf].fit.error);
   } else {
-    const bool keepsOwnFit = setup_.options.criterion == Criterion::optimal;
+    const bool keepsOwnFit = setup.options.criterion == Criterion::optimal;
     tree.split(leaf, std::move(*trial.children), keepsOwnFit ? std::move(*trial.raised) : Fit{});
     const std::uint32_t first = tree.nodes[leaf].firstChild;
-    for (std::uint32_t child = first; child < first + 8; ++child) state_.totals.add(tree.nodes[child].fit.error);
+    for (std::uint32_t child = first; child < first + 8; ++child) state.totals.add(tree.nodes[child].fit.error);
   }
-  if (++state_.steps % kStepsBetweenSums == 0) sumTotals();
-  if (observer_.afterStep) observer_.afterStep(state_.steps);
+  if (++state.steps % kStepsBetweenSums == 0) sumTotals();
+  if (observer.afterStep) observer.afterStep(state.steps);
 }
 
 void Refiner::sumTotals() {
-  state_.totals = sumOfErrors(state_.tree);
-  state_.lastSum = state_.totals.weighted;
+  state.totals = sumOfErrors(state.tree);
+  state.lastSum = state.totals.weighted;
 }
 
 void Refiner::requireMemory(double factor) const {
   // Where refinements may be pruned, cached projections and internal nodes hold about three times the leaves' own
   // coefficients on top.
-  const bool keepsAll = setup_.options.criterion == Criterion::optimal;
-  detail::requireMemory({.nodes = state_.tree.nodes.size(),
-                         .coefficients = keepsAll ? 4 * state_.coefficients : state_.coefficients,
+  const bool keepsAll = setup.options.criterion == Criterion::optimal;
+  detail::requireMemory({.nodes = state.tree.nodes.size(),
+                         .coefficients = keepsAll ? 4 * state.coefficients : state.coefficients,
                          .growthFactor = factor,
-                         .fixedBytes = setup_.distance.bytes()},
-                        setup_.options);
+                         .fixedBytes = setup.distance.bytes()},
+                        setup.options);
 }
 
 }  // namespace hpsdf::detail

@@ -1,14 +1,35 @@
 #pragma once
-// Refinement of single leaves: what is allowed, what is tried, what is applied.
+// The state of a construction, the refinement of single leaves, and the two stages in which the octree grows.
 
+#include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
-#include "field/build/byte_budget.h"
-#include "field/build/construction_state.h"
-#include "field/cells/cell_fit.h"
+#include "field/build/limits.h"
+#include "field/cells/build_tree.h"
 
 namespace hpsdf::detail {
+
+/// The state of a construction: all that must be kept so that another process can continue it.
+struct ConstructionState {
+  /// The stage that comes next; all earlier stages are done.
+  enum class Stage : std::uint8_t { fitBaseCells, refine, probe };
+
+  Stage stage = Stage::fitBaseCells;
+  std::uint64_t fittedBaseCells = 0;
+  std::uint64_t steps = 0;  ///< leaves raised or split so far
+  Nearness nearness;
+  ErrorTotals totals;           ///< running sums, updated with each step
+  double lastSum = 0;           ///< weighted total when the totals were last summed exactly
+  double measuredError = 0;     ///< greatest error that the max-error pass has left
+  bool isFull = false;          ///< a refinement would exceed the limit of bytes
+  std::uint64_t processed = 0;  ///< number of entries of `pending` that the max-error pass has finished
+  BuildTree tree;
+  std::vector<std::uint32_t> deferred;  ///< leaves whose kind, near or far, was exact enough when their turn came
+  std::vector<std::uint32_t> pending;   ///< leaves of the max-error pass, in the order of their turns
+  std::size_t coefficients = 0;         ///< that the finished field keeps of all leaves; derived, not stored
+};
 
 /// The goal of a construction, and what all its stages share.
 struct ConstructionSetup {
@@ -30,11 +51,11 @@ struct GrowthObserver {
 };
 
 /// Applies refinements to the octree of a state and keeps its sums up to date.
-class Refiner {
- public:
-  Refiner(const ConstructionSetup& setup, const CellFitter& fitter, ConstructionState& state,
-          const GrowthObserver& observer)
-      : setup_(setup), fitter_(fitter), state_(state), observer_(observer) {}
+struct Refiner {
+  const ConstructionSetup& setup;
+  const CellFitter& fitter;
+  ConstructionState& state;
+  const GrowthObserver& observer;
 
   /// Returns nothing where the leaf has reached the limits of degree and depth.
   std::optional<Refinement> allowed(const BuildNode& leaf) const;
@@ -43,7 +64,7 @@ class Refiner {
 
   /// Tries the allowed refinements of a leaf. Thread-safe.
   Trial attempt(const BuildNode& leaf, Refinement allowed) const {
-    return fitter_.attempt(state_.tree.boxOf(leaf), leaf.fit, allowed);
+    return fitter.attempt(state.tree.boxOf(leaf), leaf.fit, allowed);
   }
 
   /// Raises the degree of a leaf or splits it as tried, unless the limit of bytes forbids it: then the state is full.
@@ -52,21 +73,24 @@ class Refiner {
   /// Sums the totals exactly.
   void sumTotals();
   /// Bytes of the field so far, by the budget's count.
-  double bytes() const { return setup_.budget.bytes(double(state_.tree.nodes.size()), double(state_.coefficients)); }
+  double bytes() const { return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)); }
   /// Throws `Error` where the octree exceeds memory, or will when `factor` times as much has grown.
   void requireMemory(double factor = 1) const;
-
- private:
-  const ConstructionSetup& setup_;
-  const CellFitter& fitter_;
-  ConstructionState& state_;
-  const GrowthObserver& observer_;
 };
 
 /// The hp decision (paper, eqs. 7 to 9), with errors weighted by nearness: whether a higher degree reduces the error
-/// more for each coefficient than a split. The trial has both.
+/// more for each coefficient than a split. A trial of one of the two leaves no choice.
 bool prefersDegree(const Fit& current, const Trial& trial);
 
 ErrorTotals sumOfErrors(const BuildTree& tree);
+
+/// Fits the base cells and refines the leaves of greatest error until the goal is reached (paper, Algorithm 1), or
+/// goes on with that where the state was restored. The growth ends early where the limits of steps or bytes are
+/// reached.
+void growByErrors(Refiner& refiner);
+
+/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The greatest error that
+/// the limits leave goes into the state.
+void refineByProbes(Refiner& refiner);
 
 }  // namespace hpsdf::detail

@@ -20,6 +20,8 @@
 namespace hpsdf::detail {
 namespace {
 
+using Rows = basis::LegendreRows;
+
 // A bound of accumulated rounding errors, relative to the size of the numbers involved.
 constexpr double kRounding = 1e-12;
 
@@ -34,24 +36,9 @@ struct Part {
   Vector3 restGradient;              ///< bound of the derivatives of the terms of degree 2 and more
 };
 
-/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
-using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
-
-Rows legendreOfPart(double shift, double scale, int degree) {
-  Rows row;
-  row[0][0] = 1;
-  for (int i = 0; i < degree; ++i) {
-    std::array<double, kMaxDegree + 1> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
-    std::fill_n(product.begin(), i + 2, 0.0);
-    for (int a = 0; a <= i; ++a) {
-      product[a] += shift * row[i][a];
-      product[a + 1] += scale * row[i][a] * (a + 1) / (2 * a + 1);
-      if (a > 0) product[a - 1] += scale * row[i][a] * a / (2 * a + 1);
-    }
-    for (int a = 0; a <= i + 1; ++a)
-      row[i + 1][a] = ((2 * i + 1) * product[a] - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
-  }
-  return row;
+/// Index of a coefficient in a cube of (degree + 1)³ numbers.
+std::size_t cubeIndex(int i, int j, int k, int degree) {
+  return (std::size_t(i) * (degree + 1) + j) * (degree + 1) + k;
 }
 
 /// Transforms a polynomial's coefficients to a part's coordinates, one axis after another. They are a cube of
@@ -74,7 +61,7 @@ std::vector<double> partCoefficients(std::vector<double> c, int degree, const st
 
 /// Transformations to the lower and the upper half of an axis.
 struct Halves {
-  Rows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
+  Rows below = basis::legendreOnPart(-0.5, 0.5, kMaxDegree), above = basis::legendreOnPart(0.5, 0.5, kMaxDegree);
 };
 
 /// Adds a product of Legendre polynomials, for which |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
@@ -111,10 +98,9 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
   const std::vector<double> c = partCoefficients(cube, degree, rows);
   part.gradient.setZero();
   part.restGradient.setZero();
-  const int n = degree + 1;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; i + j < n; ++j)
-      for (int k = 0; i + j + k < n; ++k) addTerm(part, {i, j, k}, c[(std::size_t(i) * n + j) * n + k]);
+  basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
+    addTerm(part, {i, j, k}, c[cubeIndex(i, j, k, degree)]);
+  });
   return part;
 }
 
@@ -194,12 +180,11 @@ float roundedUp(double number) {
 /// A leaf's coefficients as a cube of (degree + 1)³ numbers, for a degree that is at least its own.
 std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
   const std::uint64_t bits = field.nodes[leaf];
-  const int n = degree + 1;
-  std::vector<double> cube(std::size_t(n) * n * n, 0.0);
+  std::vector<double> cube(cubeIndex(degree, degree, degree, degree) + 1, 0.0);
   std::visit(
       [&](const auto& c) {
         basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
-          cube[(std::size_t(i) * n + j) * n + k] = c[node::offset(bits) + index];
+          cube[cubeIndex(i, j, k, degree)] = c[node::offset(bits) + index];
         });
       },
       field.coefficients);
@@ -280,7 +265,7 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
     const double to = std::min(high + field.blend, static_cast<double>(wall - smallAt));
     half[axis] = (to - from) / 2;
     const auto rows = [&](double start, double edge) {
-      return legendreOfPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
+      return basis::legendreOnPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
     };
     smallRows[axis] = rows(0, 1);
     largeRows[axis] = rows(static_cast<double>(largeAt - smallAt), static_cast<double>(width));
@@ -290,17 +275,14 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
   const std::vector<double> other =
       partCoefficients(cubeOf(field, large.node, degree), degree, {&largeRows[0], &largeRows[1], &largeRows[2]});
   const Vector3 toWorld = half.cwiseProduct(query::cellSize(field, small.depth)).cwiseInverse();
-  const int n = degree + 1;
   Disagreement disagreement;
   Vector3 slope = Vector3::Zero();
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; i + j < n; ++j)
-      for (int k = 0; i + j + k < n; ++k) {
-        const std::size_t at = (std::size_t(i) * n + j) * n + k;
-        const double difference = std::abs(one[at] - other[at]);
-        disagreement.value += difference;
-        slope += difference * Vector3(i * (i + 1) / 2.0, j * (j + 1) / 2.0, k * (k + 1) / 2.0).cwiseProduct(toWorld);
-      }
+  basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
+    const std::size_t at = cubeIndex(i, j, k, degree);
+    const double difference = std::abs(one[at] - other[at]);
+    disagreement.value += difference;
+    slope += difference * Vector3(i * (i + 1) / 2.0, j * (j + 1) / 2.0, k * (k + 1) / 2.0).cwiseProduct(toWorld);
+  });
   disagreement.slope = slope.norm();
   return disagreement;
 }
@@ -311,15 +293,12 @@ template <typename F>
 void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F& f) {
   std::array<std::uint32_t, 26> seen;
   std::size_t count = 0;
-  for (int x = -1; x <= 1; ++x)
-    for (int y = -1; y <= 1; ++y)
-      for (int z = -1; z <= 1; ++z) {
-        const auto neighbour = query::equalOrLargerNeighbour(field, leaf, {x, y, z});
-        if (!neighbour || (neighbour->depth == leaf.depth && neighbour->node <= leaf.node)) continue;
-        if (std::ranges::find(seen.begin(), seen.begin() + count, neighbour->node) != seen.begin() + count) continue;
-        seen[count++] = neighbour->node;
-        f(*neighbour);
-      }
+  query::forEachNeighbour(field, leaf, [&](const query::OctreeNode& neighbour) {
+    if (neighbour.depth == leaf.depth && neighbour.node < leaf.node) return;
+    if (std::find(seen.begin(), seen.begin() + count, neighbour.node) != seen.begin() + count) return;
+    seen[count++] = neighbour.node;
+    f(neighbour);
+  });
 }
 
 /// By node: depth of the deepest leaf among a leaf's neighbours and their neighbours.

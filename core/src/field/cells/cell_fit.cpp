@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <sstream>
-#include <string>
 
 #include "field/nearness.h"
-#include "hpsdf/error.h"
+#include "util/refuse.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -65,17 +63,14 @@ Box childBox(const Box& cell, int child) {
 
 double volumeOf(const Box& box) { return (box.max() - box.min()).prod(); }
 
-void checkFinite(std::span<const Vector3> points, std::span<const double> values) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (std::isfinite(values[i])) continue;
-    std::ostringstream where;
-    where << "the signed distance is not finite at (" << points[i].x() << ", " << points[i].y() << ", " << points[i].z()
-          << "); it must be defined in the whole domain";
-    throw Error(where.str());
-  }
-}
-
 }  // namespace
+
+void requireFinite(std::span<const Vector3> points, std::span<const double> distances) {
+  for (std::size_t i = 0; i < distances.size(); ++i)
+    if (!std::isfinite(distances[i]))
+      refuse("the signed distance is not finite at (", points[i].x(), ", ", points[i].y(), ", ", points[i].z(),
+             "); it must be defined in the whole domain");
+}
 
 CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
                        double nearDistance, const Progress& progress)
@@ -97,9 +92,8 @@ const CellFitter::Rules& CellFitter::rules(int degree) const {
   return *rules_[degree];
 }
 
-std::vector<double> CellFitter::sample(std::span<const Box> cells, const basis::Projection& projection,
+std::vector<double> CellFitter::sample(std::span<const Box> cells, std::span<const Vector3> local,
                                        std::span<const std::uint32_t> order) const {
-  const std::vector<Vector3>& local = projection.points();
   std::vector<double> samples(cells.size() * local.size());
   std::array<Vector3, kBatch> points;
   std::array<double, kBatch> values;
@@ -112,21 +106,11 @@ std::vector<double> CellFitter::sample(std::span<const Box> cells, const basis::
       points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[sampleAt(i) % local.size()]);
     }
     distance_(std::span(points).first(count), std::span(values).first(count));
-    checkFinite(std::span(points).first(count), std::span(values).first(count));
+    requireFinite(std::span(points).first(count), std::span(values).first(count));
     for (std::size_t i = 0; i < count; ++i) samples[sampleAt(i)] = values[i];
   }
   evaluations_ += samples.size();
   return samples;
-}
-
-std::vector<double> CellFitter::distances(const Box& cell, std::span<const Vector3> local) const {
-  std::vector<Vector3> points(local.size());
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[i]);
-  std::vector<double> values(points.size());
-  distance_(points, values);
-  checkFinite(points, values);
-  evaluations_ += values.size();
-  return values;
 }
 
 bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection,
@@ -181,7 +165,7 @@ Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell,
 
 Fit CellFitter::fit(const Box& cell, int degree) const {
   const basis::Projection& projection = *rules(degree).projection;
-  const std::vector<double> samples = sample({&cell, 1}, projection, rules(degree).orderOfOne);
+  const std::vector<double> samples = sample({&cell, 1}, projection.points(), rules(degree).orderOfOne);
   return makeFit({projection(samples), degree + 1, projection.meanSquare(samples)}, degree, cell,
                  outsideBand(cell, projection, samples));
 }
@@ -206,7 +190,7 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
   const basis::Projection& projection = *rules(degree).projection;
   std::array<Box, 8> boxes;
   for (int child = 0; child < 8; ++child) boxes[child] = childBox(cell, child);
-  const std::vector<double> samples = sample(boxes, projection, rules(degree).orderOfEight);
+  const std::vector<double> samples = sample(boxes, projection.points(), rules(degree).orderOfEight);
   std::array<std::vector<double>, 8> raised;  // projections of the children, one degree higher
   trial.children.emplace();
   bool allOutside = true;

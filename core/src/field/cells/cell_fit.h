@@ -17,6 +17,9 @@
 
 namespace hpsdf::detail {
 
+/// Throws `Error` with the first point at which the distance is not finite.
+void requireFinite(std::span<const Vector3> points, std::span<const double> distances);
+
 /// The projection of a cell's samples onto the highest degree for which they suffice.
 struct CachedProjection {
   std::vector<double> coefficients;
@@ -55,7 +58,9 @@ class CellFitter {
   Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
 
   /// Φ at points given by local coordinates.
-  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
+  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const {
+    return sample({&cell, 1}, local, {});
+  }
 
   /// Number of evaluations of Φ so far.
   std::uint64_t evaluations() const { return evaluations_; }
@@ -72,8 +77,9 @@ class CellFitter {
   };
 
   const Rules& rules(int degree) const;
-  /// Returns the samples of cells one cell after another. Φ is evaluated in the given order.
-  std::vector<double> sample(std::span<const Box> cells, const basis::Projection& projection,
+  /// Returns Φ at the same points, given by local coordinates, of one cell after another. Φ is evaluated in the given
+  /// order; none: as the points come.
+  std::vector<double> sample(std::span<const Box> cells, std::span<const Vector3> local,
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;
   /// Makes a fit of lower degree from the projection of the samples.

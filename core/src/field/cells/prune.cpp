@@ -47,8 +47,10 @@ class Pruning {
   }
 
   void run() {
-    double lambda = greatestLambda([&](const Totals& totals) { return limits_.goal.reached(totals.errors); });
-    if (limits_.mostBytes) lambda = std::max(lambda, leastLambda());
+    // The error grows with λ, the bytes fall: the greatest λ that keeps the goal, or the least that keeps the bytes.
+    double lambda = bracket([&](const Totals& sum) { return limits_.goal.reached(sum.errors); }).first;
+    if (limits_.mostBytes)
+      lambda = std::max(lambda, bracket([&](const Totals& sum) { return sum.bytes > *limits_.mostBytes; }).second);
     choose(lambda);
     cut();
   }
@@ -117,34 +119,19 @@ class Pruning {
     return sum;
   }
 
-  /// The range of λ, in squared error per byte.
-  std::pair<double, double> range() const {
-    double most = 0;
-    for (std::size_t n = 0; n < squared_.size(); ++n) most = std::max(most, weight_[n] * squared_[n].front());
-    return {1e-30 * most, most};
-  }
-
-  /// The greatest λ whose tree is `good`, or the least of the range. The error grows with λ.
-  template <typename Good>
-  double greatestLambda(const Good& good) {
-    auto [low, high] = range();
+  /// Two neighbouring values of λ, in squared error per byte, between which `isBelow(totals)` of their trees becomes
+  /// false; the ends of the range of λ where it does not.
+  template <typename IsBelow>
+  std::pair<double, double> bracket(const IsBelow& isBelow) {
+    double high = 0;
+    for (std::size_t n = 0; n < squared_.size(); ++n) high = std::max(high, weight_[n] * squared_[n].front());
+    double low = 1e-30 * high;
     for (int i = 0; i < kHalvings && low > 0; ++i) {
       const double middle = std::sqrt(low * high);
       choose(middle);
-      (good(totals()) ? low : high) = middle;
+      (isBelow(totals()) ? low : high) = middle;
     }
-    return low;
-  }
-
-  /// The least λ whose tree keeps the limit of bytes.
-  double leastLambda() {
-    auto [low, high] = range();
-    for (int i = 0; i < kHalvings && low > 0; ++i) {
-      const double middle = std::sqrt(low * high);
-      choose(middle);
-      (totals().bytes <= *limits_.mostBytes ? high : low) = middle;
-    }
-    return high;
+    return {low, high};
   }
 
   /// Replaces the tree by the chosen one.

@@ -7,7 +7,6 @@
 #include <utility>
 #include <variant>
 
-#include "basis/half_shares.h"
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/error.h"
@@ -29,13 +28,11 @@ constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 class QuarterRestriction {
  public:
   QuarterRestriction() {
-    const basis::HalfShares shares;
-    for (int i = 0; i <= kMaxDegree; ++i)
-      for (int a = 0; a <= i; ++a) {
-        const double scale = 2 * std::sqrt((2 * a + 1.0) / (2 * i + 1));
-        share_[0][i][a] = scale * shares.below(i, a);
-        share_[1][i][a] = scale * shares.above(i, a);
-      }
+    const std::array<basis::LegendreRows, 2> shares = basis::halfShares();
+    for (int half = 0; half < 2; ++half)
+      for (int i = 0; i <= kMaxDegree; ++i)
+        for (int a = 0; a <= i; ++a)
+          share_[half][i][a] = 2 * std::sqrt((2 * a + 1.0) / (2 * i + 1)) * shares[half][i][a];
   }
 
   /// Restricts a face's polynomial to a quarter in place. Bit 0 and 1 of `quarter`: upper half of the first and of the
@@ -189,47 +186,28 @@ void FaceCoupling::makeTraces() {
   }
 }
 
-/// Returns the link of a leaf's face at the lower (step −1) or upper (step 1) end of an axis; nothing if the leaf
-/// across makes the link.
-std::optional<FaceCoupling::Link> FaceCoupling::linkAcross(const FieldData& field,
-                                                           std::span<const std::uint32_t> leafOfNode,
-                                                           std::uint32_t small, int axis, int step) const {
-  const query::OctreeNode& leaf = leaves_[small];
-  const auto neighbour = query::equalOrLargerFaceNeighbour(field, leaf, axis, step);
-  if (!neighbour || (neighbour->depth == leaf.depth && step < 0)) return {};
-  Link link{.small = small,
-            .large = leafOfNode[neighbour->node],
-            .along = {},
-            .axis = static_cast<std::uint8_t>(axis),
-            .levels = static_cast<std::uint8_t>(leaf.depth - neighbour->depth),
-            .side = static_cast<std::uint8_t>(step > 0)};
-  const std::array<int, 2> axes{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
-  for (int a = 0; a < 2; ++a)
-    link.along[a] =
-        static_cast<std::uint32_t>(leaf.cellIndex[axes[a]] - (neighbour->cellIndex[axes[a]] << link.levels));
-  return link;
-}
-
 void FaceCoupling::linkLeaves(const FieldData& field) {
   std::vector<std::uint32_t> leafOfNode(field.nodes.size());
   for (std::size_t n = 0; n < leaves_.size(); ++n) leafOfNode[leaves_[n].node] = static_cast<std::uint32_t>(n);
-  std::vector<std::vector<Link>> found(detail::chunksOf(leaves_.size(), kLeavesPerTask));
-  detail::forEachChunk(leaves_.size(), kLeavesPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
+  const auto linkChunk = [&](std::vector<Link>& links, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n)
-      for (int axis = 0; axis < 3; ++axis)
-        for (const int step : {-1, 1})
-          if (const auto link = linkAcross(field, leafOfNode, static_cast<std::uint32_t>(n), axis, step))
-            found[chunk].push_back(*link);
-  });
+      query::forEachInterface(field, leaves_[n], [&](int axis, int step, const query::OctreeNode& large) {
+        Link& link = links.emplace_back(Link{.small = static_cast<std::uint32_t>(n),
+                                             .large = leafOfNode[large.node],
+                                             .along = {},
+                                             .axis = static_cast<std::uint8_t>(axis),
+                                             .levels = static_cast<std::uint8_t>(leaves_[n].depth - large.depth),
+                                             .side = static_cast<std::uint8_t>(step > 0)});
+        const std::array<int, 2> axes{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
+        for (int a = 0; a < 2; ++a)
+          link.along[a] =
+              static_cast<std::uint32_t>(leaves_[n].cellIndex[axes[a]] - (large.cellIndex[axes[a]] << link.levels));
+      });
+  };
+  links_ = detail::listOfChunks<Link>(leaves_.size(), kLeavesPerTask, {}, "", linkChunk);
   jumpStart_.push_back(0);
-  for (auto& links : found) {
-    for (const Link& link : links) {
-      links_.push_back(link);
-      jumpStart_.push_back(jumpStart_.back() +
-                           faceCoefficientCount(std::max(degree_[link.small], degree_[link.large])));
-    }
-    links = {};
-  }
+  for (const Link& link : links_)
+    jumpStart_.push_back(jumpStart_.back() + faceCoefficientCount(std::max(degree_[link.small], degree_[link.large])));
   jumps_.resize(jumpStart_.back());
 }
 

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -52,8 +51,6 @@ class FaceCoupling {
   };
 
   void makeTraces();
-  std::optional<Link> linkAcross(const FieldData& field, std::span<const std::uint32_t> leafOfNode, std::uint32_t small,
-                                 int axis, int step) const;
   void linkLeaves(const FieldData& field);
   void groupLinksByLeaf();
   void restrictToFace(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const;

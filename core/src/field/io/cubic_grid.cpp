@@ -7,15 +7,13 @@
 #include <limits>
 #include <numeric>
 #include <span>
-#include <sstream>
-#include <string>
 #include <vector>
 
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
 #include "util/random_points.h"
-#include "util/sums.h"
+#include "util/refuse.h"
 
 namespace hpsdf {
 namespace {
@@ -121,11 +119,9 @@ void checkResolution(const GridResolution& resolution) {
     throw Error("a grid without cells; give at least one cell along each axis");
   const double bytes = cubicGridBytes(resolution);
   if (bytes <= double(kMaxCubicGridBytes)) return;
-  std::ostringstream message;
-  message << "a grid of " << resolution[0] << " x " << resolution[1] << " x " << resolution[2] << " cells takes "
-          << std::uint64_t(std::min(std::ceil(bytes / 1e6), 1e18))
-          << " MB as a file, of which Bullet's loader reads 2147 at most; give fewer cells";
-  throw Error(message.str());
+  detail::refuse("a grid of ", resolution[0], " x ", resolution[1], " x ", resolution[2], " cells takes ",
+                 std::uint64_t(std::min(std::ceil(bytes / 1e6), 1e18)),
+                 " MB as a file, of which Bullet's loader reads 2147 at most; give fewer cells");
 }
 
 template <typename T>
@@ -182,8 +178,8 @@ GridResolution cubicGridResolution(const Box& domain, std::uint32_t alongLongest
 GridResolution finestCubicGrid(const Box& domain, std::uint64_t bytes) {
   const auto fits = [&](std::uint32_t n) { return cubicGridBytes(cubicGridResolution(domain, n)) <= double(bytes); };
   if (!fits(1))
-    throw Error("not even a single cell fits into " + std::to_string(bytes) + " bytes; give " +
-                std::to_string(static_cast<std::uint64_t>(cubicGridBytes({1, 1, 1}))) + " at least");
+    detail::refuse("not even a single cell fits into ", bytes, " bytes; give ",
+                   static_cast<std::uint64_t>(cubicGridBytes({1, 1, 1})), " at least");
   std::uint32_t fitting = 1, tooFine = std::numeric_limits<std::uint32_t>::max();
   while (tooFine - fitting > 1) {
     const std::uint32_t middle = fitting + (tooFine - fitting) / 2;
@@ -213,29 +209,27 @@ CubicGridError measureCubicGrid(const CubicGrid& grid, const Field& field, std::
                                 int threads, const Progress& progress) {
   struct Differences {
     detail::Sums everywhere, nearSurface;
+
+    void add(const Differences& other) {
+      everywhere.add(other.everywhere);
+      nearSurface.add(other.nearSurface);
+    }
   };
   const double near = grid.cellSize().norm();
-  std::vector<Differences> parts(detail::chunksOf(points, kPointsPerQuery));
-  withThreads(threads, [&] {
-    detail::forEachChunk(points, kPointsPerQuery, progress, "measuring",
-                         [&](std::size_t chunk, std::size_t first, std::size_t count) {
-                           std::vector<Vector3> at(count);
-                           std::vector<double> values(count);
-                           for (std::size_t n = 0; n < count; ++n)
-                             at[n] = detail::Random(seed, first + n).inBox(grid.domain);
-                           field.values(at, values);
-                           for (std::size_t n = 0; n < count; ++n) {
-                             const double difference = std::abs(grid.value(at[n]) - values[n]);
-                             parts[chunk].everywhere.add(difference);
-                             if (std::abs(values[n]) <= near) parts[chunk].nearSurface.add(difference);
-                           }
-                         });
+  const auto measure = [&](Differences& differences, std::size_t first, std::size_t count) {
+    std::vector<Vector3> at(count);
+    std::vector<double> values(count);
+    for (std::size_t n = 0; n < count; ++n) at[n] = detail::Random(seed, first + n).inBox(grid.domain);
+    field.values(at, values);
+    for (std::size_t n = 0; n < count; ++n) {
+      const double difference = std::abs(grid.value(at[n]) - values[n]);
+      differences.everywhere.add(difference);
+      if (std::abs(values[n]) <= near) differences.nearSurface.add(difference);
+    }
+  };
+  const Differences all = withThreads(threads, [&] {
+    return detail::sumOfChunks<Differences>(points, kPointsPerQuery, progress, "measuring", measure);
   });
-  Differences all;
-  for (const Differences& part : parts) {
-    all.everywhere.add(part.everywhere);
-    all.nearSurface.add(part.nearSurface);
-  }
   const auto figures = [](const detail::Sums& sums) { return GridDifference{sums.count, sums.rms(), sums.max}; };
   return {figures(all.everywhere), figures(all.nearSurface), near};
 }
@@ -244,8 +238,7 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
   checkResolution(grid.resolution);
   const Numbering numbering(grid.resolution);
   if (grid.nodes.size() != numbering.count())
-    throw Error("a grid with " + std::to_string(grid.nodes.size()) + " nodes instead of " +
-                std::to_string(numbering.count()) + "; sample it anew");
+    detail::refuse("a grid with ", grid.nodes.size(), " nodes instead of ", numbering.count(), "; sample it anew");
   const auto& [nx, ny, nz] = grid.resolution;
   const std::uint64_t cells = std::uint64_t{nx} * ny * nz;
   writeVector(out, grid.domain.min());

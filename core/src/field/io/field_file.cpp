@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <optional>
-#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -17,7 +17,7 @@ namespace hpsdf {
 namespace {
 
 // The carriage return, line feed and end-of-file mark show a transfer that took the file for text, like PNG's.
-constexpr std::array<char, 8> kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
+constexpr detail::Magic kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version 1 has no steps; 2 neither continuity, bounds, maximum error nor criteria; 3 no inside test.
 constexpr std::uint32_t kVersion = 4;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
@@ -31,51 +31,44 @@ struct Sizes {
   std::uint64_t bounds = 0;
 };
 
-void stepsItem(detail::CheckedWriter& writer, const std::optional<std::uint64_t>& steps) {
-  writer.item(steps.value_or(kUnknownSteps));
-}
-
-void stepsItem(detail::CheckedReader& reader, std::optional<std::uint64_t>& steps) {
-  std::uint64_t stored = 0;
-  reader.item(stored);
-  if (stored != kUnknownSteps) steps = stored;
-}
-
-/// A setting is stored as f64 if it is a number, u32 if whole, u8 if it is a word's index or a flag.
-double storedNumber(const BuildSetting& setting, const BuildOptions& settings) {
-  const std::vector<double> numbers = setting.get(settings);
-  return numbers.empty() ? 0 : numbers[0];
-}
-
-void settingItem(detail::CheckedWriter& writer, const BuildSetting& setting, const BuildOptions& settings) {
-  const double number = storedNumber(setting, settings);
-  if (setting.type == BuildSetting::Type::number)
-    writer.item(number);
-  else if (setting.type == BuildSetting::Type::wholeNumber)
-    writer.item(static_cast<std::uint32_t>(static_cast<std::int64_t>(number)));
-  else
-    writer.item(static_cast<std::uint8_t>(number));
-}
-
-void settingItem(detail::CheckedReader& reader, const BuildSetting& setting, BuildOptions& settings) {
-  double number = 0;
-  if (setting.type == BuildSetting::Type::number) {
-    reader.item(number);
-  } else if (setting.type == BuildSetting::Type::wholeNumber) {
-    std::uint32_t whole = 0;
-    reader.item(whole);
-    number = whole;
-  } else {
-    std::uint8_t index = 0;
-    reader.item(index);
-    if (index >= std::max<std::size_t>(setting.words.size(), 2))
-      reader.damaged("its " + std::string(setting.name) + " is unknown");
-    number = index;
+/// `Steps` is const when writing.
+template <typename Stream, typename Steps>
+void stepsItem(Stream& stream, Steps& steps) {
+  std::uint64_t stored = steps.value_or(kUnknownSteps);
+  stream.item(stored);
+  if constexpr (!std::is_const_v<Steps>) {
+    if (stored != kUnknownSteps) steps = stored;
   }
-  if (number == 0 && setting.get(BuildOptions{}).empty())
-    setting.set(settings, {});
-  else
-    setting.set(settings, std::array{number});
+}
+
+template <typename Stored, typename Stream>
+void wholeItem(Stream& stream, double& number) {
+  auto stored = static_cast<Stored>(static_cast<std::int64_t>(number));
+  stream.item(stored);
+  number = stored;
+}
+
+/// A setting is stored as f64 if it is a number, u32 if whole, u8 if it is a word's index or a flag. `Settings` is
+/// const when writing.
+template <typename Stream, typename Settings>
+void settingItem(Stream& stream, const BuildSetting& setting, Settings& settings) {
+  const std::vector<double> numbers = setting.get(settings);
+  double number = numbers.empty() ? 0 : numbers[0];
+  if (setting.type == BuildSetting::Type::number) {
+    stream.item(number);
+  } else if (setting.type == BuildSetting::Type::wholeNumber) {
+    wholeItem<std::uint32_t>(stream, number);
+  } else {
+    wholeItem<std::uint8_t>(stream, number);
+    const bool isKnown = number < std::max(double(setting.words.size()), 2.0);
+    stream.require(isKnown, ("its " + std::string(setting.name) + " is unknown").c_str());
+  }
+  if constexpr (!std::is_const_v<Settings>) {
+    if (number == 0 && setting.get(BuildOptions{}).empty())
+      setting.set(settings, {});
+    else
+      setting.set(settings, std::array{number});
+  }
 }
 
 /// The settings whose positions in the file run from `first` to `last`.
@@ -129,42 +122,36 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
 void save(const Field& field, const std::filesystem::path& file) {
   const FieldData& data = field.data();
   detail::CheckedWriter writer(file);
-  for (const char c : kMagic) writer.item(c);
-  writer.item(kVersion);
+  writer.begin(kMagic, kVersion);
   std::visit(
       [&](const auto& coefficients) {
         const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0]), data.bounds.size()};
         header(writer, data, sizes, kVersion);
-        writer.array(std::span(data.nodes));
-        writer.array(std::span(coefficients));
+        writer.array(data.nodes, sizes.nodes);
+        writer.array(coefficients, sizes.coefficients);
       },
       data.coefficients);
-  writer.array(std::span(data.bounds));
+  writer.array(data.bounds, data.bounds.size());
   writer.finish();
 }
 
 Field load(const std::filesystem::path& file) {
   detail::CheckedReader reader(file, kKind);
-  std::array<char, 8> magic{};
-  try {
-    for (char& c : magic) reader.item(c);
-  } catch (const Error&) {
-    reader.refuse("is not a .hpsdf file (too short); build one with `hpsdf build`");
-  }
-  if (magic != kMagic) reader.refuse("is not a .hpsdf file; build one with `hpsdf build`");
-  std::uint32_t version = 0;
-  reader.item(version);
-  if (version == 0 || version > kVersion)
-    reader.refuse("has file format version " + std::to_string(version) + ", this program reads 1 to " +
+  const bool isTooShort = reader.remaining() < kMagic.size();
+  const std::optional<std::uint32_t> version = reader.begin(kMagic);
+  if (!version)
+    reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
+                  "; build one with `hpsdf build`");
+  if (*version == 0 || *version > kVersion)
+    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to " +
                   std::to_string(kVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
-  header(reader, data, sizes, version);
-  if (sizes.coefficientBytes != 4 && sizes.coefficientBytes != 8)
-    reader.damaged("its coefficients have an unknown type");
+  header(reader, data, sizes, *version);
+  reader.require(sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8, "its coefficients have an unknown type");
   Source& source = data.metadata.source;
-  if (source.insideTest > InsideTest::outerHull) reader.damaged("its inside test is unknown");
-  if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // the only one of these versions
+  reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
+  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // the only one of these versions
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);

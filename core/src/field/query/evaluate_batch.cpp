@@ -1,5 +1,3 @@
-#include "field/query/evaluate_batch.h"
-
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -8,9 +8,7 @@
 
 #include "basis/projection.h"
 #include "field/query/blend.h"
-#include "field/query/blend_extent.h"
 #include "field/query/evaluate.h"
-#include "field/query/evaluate_batch.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -81,44 +79,6 @@ Result evaluateAt(const FieldData& field, const LookupGrid& lookupGrid, const Ve
   }
   const GridPoint point = gridPoint(lookupGrid.frame, x);
   return evaluateInLeaf<Result>(field, lookupGrid, point.coordinates, findLeaf(field, lookupGrid, point));
-}
-
-/// Fills the entries, and with blending their extents, from the nodes of the lookup grid's depth and the leaves above.
-void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
-  visitNodes(field, [&](const OctreeNode& at) {
-    if (!node::isLeaf(field.nodes[at.node]) && at.depth < lookupGrid.depth) return true;
-    const std::int64_t width = std::int64_t{1} << (lookupGrid.depth - at.depth);
-    CellIndex first;  // index of the first entry that the node covers
-    for (int axis = 0; axis < 3; ++axis) first[axis] = at.cellIndex[axis] * width;
-    for (std::int64_t z = first[2]; z < first[2] + width; ++z)
-      for (std::int64_t y = first[1]; y < first[1] + width; ++y) {
-        const std::int64_t row = z * lookupGrid.slab + y * lookupGrid.row + first[0];
-        std::fill_n(&lookupGrid.entries[row], width, LookupGrid::entry(field.nodes[at.node], at.depth));
-        if (field.blend > 0)
-          std::fill_n(&lookupGrid.blendExtents[field.nodes.size() + row], width, lookupGrid.blendExtents[at.node]);
-      }
-    return false;
-  });
-}
-
-/// Makes the deepest lookup grid that takes no more than a sixteenth of the field's own bytes.
-LookupGrid makeLookupGrid(const FieldData& field) {
-  LookupGrid lookupGrid;
-  const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
-  const std::size_t bytes = std::visit([](const auto& c) { return c.size() * sizeof(c[0]); }, field.coefficients) +
-                            field.nodes.size() * sizeof(field.nodes[0]);
-  const std::size_t maxEntries = bytes / 16 / sizeof(lookupGrid.entries[0]);
-  while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= maxEntries) ++lookupGrid.depth;
-  lookupGrid.entries.resize(base << (3 * lookupGrid.depth));
-  if (field.blend > 0) {
-    lookupGrid.blendExtents = findBlendExtents(field);
-    lookupGrid.blendExtents.resize(field.nodes.size() + lookupGrid.entries.size());
-  }
-  lookupGrid.frame = gridFrame(field);
-  lookupGrid.row = std::int64_t{field.grid[0]} << lookupGrid.depth;
-  lookupGrid.slab = lookupGrid.row * (std::int64_t{field.grid[1]} << lookupGrid.depth);
-  fillLookupGrid(field, lookupGrid);
-  return lookupGrid;
 }
 
 Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& leaf) {

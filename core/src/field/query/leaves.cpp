@@ -35,11 +35,4 @@ std::optional<OctreeNode> equalOrLargerNeighbour(const FieldData& field, const O
   return neighbour;
 }
 
-std::optional<OctreeNode> equalOrLargerFaceNeighbour(const FieldData& field, const OctreeNode& leaf, int axis,
-                                                     int step) {
-  std::array<int, 3> steps{};
-  steps[axis] = step;
-  return equalOrLargerNeighbour(field, leaf, steps);
-}
-
 }  // namespace hpsdf::query

@@ -55,9 +55,29 @@ OctreeNode nodeAt(const FieldData& field, const CellIndex& cellIndex, int depth)
 std::optional<OctreeNode> equalOrLargerNeighbour(const FieldData& field, const OctreeNode& leaf,
                                                  const std::array<int, 3>& steps);
 
-/// Returns the leaf, as large as `leaf` or larger, across the face of `leaf` at the lower (step −1) or upper (step 1)
-/// end of an axis; nothing where smaller leaves lie there or the domain ends.
-std::optional<OctreeNode> equalOrLargerFaceNeighbour(const FieldData& field, const OctreeNode& leaf, int axis,
-                                                     int step);
+/// Calls f(neighbour) for the leaves around `leaf` that are as large as it or larger, one for each of 26 directions: a
+/// larger leaf may lie in several of them.
+template <typename F>
+void forEachNeighbour(const FieldData& field, const OctreeNode& leaf, const F& f) {
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z)
+        if (x != 0 || y != 0 || z != 0)
+          if (const auto neighbour = equalOrLargerNeighbour(field, leaf, {x, y, z})) f(*neighbour);
+}
+
+/// Calls f(axis, step, neighbour) for the faces, at the lower (step −1) or upper (step 1) end of an axis, that `leaf`
+/// shares with larger leaves, and for its upper faces also with equal ones: each interface of a field belongs to one
+/// leaf.
+template <typename F>
+void forEachInterface(const FieldData& field, const OctreeNode& leaf, const F& f) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int step : {-1, 1}) {
+      std::array<int, 3> steps{};
+      steps[axis] = step;
+      const auto neighbour = equalOrLargerNeighbour(field, leaf, steps);
+      if (neighbour && (neighbour->depth < leaf.depth || step > 0)) f(axis, step, *neighbour);
+    }
+}
 
 }  // namespace hpsdf::query

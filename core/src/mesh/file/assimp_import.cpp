@@ -198,7 +198,7 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
 }
 
 /// The triangles of a polygon as indices of the part's vertices; empty for points and lines.
-std::vector<std::array<std::uint32_t, 3>> trianglesOf(const aiFace& face, const aiMesh& part) {
+std::vector<Triangle> trianglesOf(const aiFace& face, const aiMesh& part) {
   if (face.mNumIndices < 3) return {};
   std::vector<Vector3> corners;
   for (unsigned i = 0; i < face.mNumIndices; ++i) {

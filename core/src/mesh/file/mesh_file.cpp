@@ -1,17 +1,24 @@
 #include "hpsdf/mesh_file.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
 #include <sstream>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "mesh/cleanup/mesh_cleanup.h"
 #include "mesh/file/assimp_import.h"
-#include "mesh/file/mesh_export.h"
 
 namespace hpsdf {
 namespace {
@@ -63,9 +70,72 @@ bool isPly(const std::filesystem::path& file) {
   return extension == ".ply";
 }
 
-}  // namespace
+static_assert(std::endian::native == std::endian::little, "a PLY file is written as its numbers are in memory");
 
-ImportedMesh cleaned(TriangleMesh mesh) { return mesh::cleanMesh(std::move(mesh)); }
+constexpr std::size_t kPiece = 1 << 16;  ///< bytes of text written at a time
+
+/// Appends the shortest text that reads as the same number.
+void append(std::string& text, double number) {
+  std::array<char, 32> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+  text.append(digits.data(), end);
+}
+
+/// The syntax of a format for meshes as text.
+struct TextForm {
+  std::string_view beforeVertex, beforeFace;
+  std::uint64_t firstVertex;  ///< number of the first vertex
+};
+
+void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) {
+  std::string text;
+  const auto writeIf = [&](bool full) {
+    if (!full) return;
+    out.write(text);
+    text.clear();
+  };
+  for (const Vector3& v : mesh.vertices) {
+    text += form.beforeVertex;
+    append(text, v.x());
+    append(text += ' ', v.y());
+    append(text += ' ', v.z());
+    text += '\n';
+    writeIf(text.size() >= kPiece);
+  }
+  for (const auto& triangle : mesh.triangles) {
+    text += form.beforeFace;
+    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(form.firstVertex + v);
+    text += '\n';
+    writeIf(text.size() >= kPiece);
+  }
+  writeIf(!text.empty());
+}
+
+void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
+
+/// Writes binary data, or text where binary data would begin with the byte of a line feed: readers would take it for a
+/// part of the header.
+void writePly(const TriangleMesh& mesh, OutputFile& out) {
+  static_assert(sizeof(Vector3) == 3 * sizeof(double));
+  const auto vertices = std::as_bytes(std::span(mesh.vertices));
+  // assimp takes a line feed at the beginning of the data for a part of the header, and shifts all numbers by a byte.
+  const bool asText = !vertices.empty() && vertices.front() == std::byte{'\n'};
+  out.write(std::string("ply\nformat ") + (asText ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
+            std::to_string(mesh.vertices.size()) +
+            "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+            std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n");
+  if (asText) return writeText(mesh, {"", "3", 0}, out);
+  out.write(vertices);
+  std::vector<std::byte> faces;
+  for (const auto& triangle : mesh.triangles) {
+    const auto corners = std::as_bytes(std::span(triangle));
+    faces.push_back(std::byte{3});
+    faces.insert(faces.end(), corners.begin(), corners.end());
+  }
+  out.write(faces);
+}
+
+}  // namespace
 
 double coordinateSpacing(const fs::path& file, const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
@@ -94,7 +164,7 @@ void checkMeshWritable(const std::filesystem::path& file) {
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   const bool ply = isPly(file);
   OutputFile out(file);
-  ply ? mesh::writePly(mesh, out) : mesh::writeObj(mesh, out);
+  ply ? writePly(mesh, out) : writeObj(mesh, out);
   out.commit();
 }
 

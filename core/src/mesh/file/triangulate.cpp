@@ -116,7 +116,7 @@ class EarClipper {
     }
   }
 
-  std::vector<std::array<std::uint32_t, 3>> clip() {
+  std::vector<Triangle> clip() {
     // Positions come from float, which rounds corners away from a straight side. Ears as thin as that rounding, and
     // ears whose cut passes a corner that closely, would yield slivers with normals of noise. They are the second
     // choice.
@@ -216,14 +216,14 @@ class EarClipper {
   std::vector<bool> isLeft_;
   std::vector<std::uint32_t> next_;
   std::vector<std::uint32_t> previous_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<Triangle> triangles_;
   std::uint32_t start_ = 0;
   std::size_t left_;  ///< corners not yet cut off
 };
 
 }  // namespace
 
-std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vector3> polygon) {
+std::vector<Triangle> triangulate(std::span<const Vector3> polygon) {
   if (polygon.size() == 3) return {{0, 1, 2}};
   return EarClipper(polygon).clip();
 }

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "hpsdf/types.h"
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::mesh {
 
@@ -13,6 +13,6 @@ namespace hpsdf::mesh {
 /// orientation. Corners along a straight side get triangles with an area where the polygon allows it.
 ///
 /// assimp 5.2 has a triangulation of its own, whose triangles extend beyond concave polygons.
-std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vector3> polygon);
+std::vector<Triangle> triangulate(std::span<const Vector3> polygon);
 
 }  // namespace hpsdf::mesh

@@ -1,6 +1,9 @@
-#include "mesh/patches.h"
+#include "mesh/connectivity.h"
+
+#include <tbb/parallel_sort.h>
 
 #include <array>
+#include <utility>
 
 namespace hpsdf::mesh {
 namespace {
@@ -56,6 +59,22 @@ void addPatch(std::uint32_t lowest, std::span<const Neighbours> neighbours, Patc
 }
 
 }  // namespace
+
+std::vector<DirectedEdge> directedEdgesOf(std::span<const Triangle> triangles) {
+  std::vector<DirectedEdge> edges;
+  edges.reserve(3 * triangles.size());
+  for (std::size_t f = 0; f < triangles.size(); ++f)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t from = triangles[f][i], to = triangles[f][(i + 1) % 3];
+      if (from == to) continue;
+      const auto [low, high] = std::minmax(from, to);
+      edges.push_back({std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), from < to});
+    }
+  tbb::parallel_sort(edges.begin(), edges.end(), [](const DirectedEdge& a, const DirectedEdge& b) {
+    return std::pair(a.edge, a.face) < std::pair(b.edge, b.face);
+  });
+  return edges;
+}
 
 DisjointSets componentsOf(std::size_t faces, std::span<const DirectedEdge> edges) {
   DisjointSets components(faces);

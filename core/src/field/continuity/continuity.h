@@ -6,9 +6,6 @@
 
 namespace hpsdf::continuity {
 
-/// Throws `Error` if an option is out of range.
-void checkWeakContinuity(const WeakContinuity& options);
-
 /// The figures of `WeaklyContinuous`.
 struct WeakContinuityFigures {
   int iterations = 0;

@@ -1,0 +1,242 @@
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "hpsdf/mesh_file.h"
+#include "mesh/duplicates.h"
+#include "mesh/orientation.h"
+#include "util/refuse.h"
+
+namespace hpsdf {
+namespace mesh {
+namespace {
+
+using PositionBits = std::array<std::uint64_t, 3>;
+
+struct HashBits {
+  std::size_t operator()(const PositionBits& key) const { return XXH3_64bits(key.data(), sizeof key); }
+};
+
+void requireUsable(const TriangleMesh& mesh) {
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (mesh.vertices.size() >= kMost || mesh.triangles.size() >= kMost)
+    detail::refuseMesh(mesh.name, "more than 4294967294 vertices or faces; simplify the mesh first");
+  requireValidIndices(mesh);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+    if (!(mesh.vertices[i].cwiseAbs().array() <= kLargestCoordinate).all())
+      detail::refuseMesh(
+          mesh.name, "vertex ", i + 1,
+          " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
+}
+
+/// Replaces vertices of equal position by the first of them in all triangles, and returns the number of vertices that
+/// this leaves unused.
+std::size_t weld(TriangleMesh& mesh) {
+  std::unordered_map<PositionBits, std::uint32_t, HashBits> firstAt;
+  firstAt.reserve(mesh.vertices.size());
+  std::vector<std::uint32_t> representative(mesh.vertices.size());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    Vector3& v = mesh.vertices[i];
+    v.array() += 0.0;  // Adding 0 turns -0 into 0, so that equal positions have equal bits.
+    const PositionBits key = {std::bit_cast<std::uint64_t>(v.x()), std::bit_cast<std::uint64_t>(v.y()),
+                              std::bit_cast<std::uint64_t>(v.z())};
+    representative[i] = firstAt.try_emplace(key, static_cast<std::uint32_t>(i)).first->second;
+  }
+  for (Triangle& triangle : mesh.triangles)
+    for (std::uint32_t& v : triangle) v = representative[v];
+  return mesh.vertices.size() - firstAt.size();
+}
+
+/// Returns true if a triangle's corners lie on one line up to the rounding of this test. The tolerance is relative to
+/// the edges, so that it does not depend on the size of the mesh and keeps thin slivers with an area.
+bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
+  const auto [a, b, c] = cornersOf(mesh, triangle);
+  std::array<Vector3, 3> edges = {b - a, c - b, a - c};
+  double scale = 0;
+  for (const Vector3& edge : edges) scale = std::max(scale, edge.cwiseAbs().maxCoeff());
+  if (scale == 0) return true;
+  for (Vector3& edge : edges) edge /= scale;  // Products of scaled edges neither underflow nor overflow.
+  std::sort(edges.begin(), edges.end(),
+            [](const Vector3& u, const Vector3& v) { return u.squaredNorm() < v.squaredNorm(); });
+  // The cross product of the two shorter edges carries the least cancellation.
+  const double rounding = 4 * std::numeric_limits<double>::epsilon() * edges[0].norm() * edges[1].norm();
+  return edges[0].cross(edges[1]).norm() <= rounding;
+}
+
+/// Maps each directed edge to the triangle that it belongs to.
+class EdgeMap {
+ public:
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();  ///< no triangle
+  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< more than one triangle
+
+  explicit EdgeMap(const std::vector<Triangle>& triangles) {
+    faceOf_.reserve(3 * triangles.size());
+    for (std::size_t f = 0; f < triangles.size(); ++f)
+      for (int i = 0; i < 3; ++i) {
+        const auto face = static_cast<std::uint32_t>(f);
+        const auto [entry, isNew] = faceOf_.try_emplace(key(triangles[f][i], triangles[f][(i + 1) % 3]), face);
+        if (!isNew) entry->second = kSeveral;
+      }
+  }
+
+  std::uint32_t face(std::uint32_t from, std::uint32_t to) const {
+    const auto entry = faceOf_.find(key(from, to));
+    return entry == faceOf_.end() ? kNone : entry->second;
+  }
+
+  void set(const Triangle& t, std::uint32_t face) {
+    for (int i = 0; i < 3; ++i) faceOf_[key(t[i], t[(i + 1) % 3])] = face;
+  }
+
+  void erase(std::uint32_t from, std::uint32_t to) { faceOf_.erase(key(from, to)); }
+
+ private:
+  static std::uint64_t key(std::uint32_t from, std::uint32_t to) { return std::uint64_t{from} << 32 | to; }
+
+  std::unordered_map<std::uint64_t, std::uint32_t> faceOf_;
+};
+
+/// The triangle rotated so that its longest edge comes first. The last corner of a collinear triangle is then the
+/// middle one.
+Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
+  const auto squared = [&](int i) { return (mesh.vertices[t[i]] - mesh.vertices[t[(i + 1) % 3]]).squaredNorm(); };
+  const std::array<double, 3> lengths = {squared(0), squared(1), squared(2)};
+  std::rotate(t.begin(), t.begin() + (std::max_element(lengths.begin(), lengths.end()) - lengths.begin()), t.end());
+  return t;
+}
+
+/// Flips the longest edge of a triangle where that yields two triangles with areas and no edge of more than two.
+bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
+  const auto [a, b, middle] = longestEdgeFirst(mesh, mesh.triangles[face]);
+  const std::uint32_t neighbour = edges.face(b, a);
+  if (edges.face(a, b) != face || neighbour >= EdgeMap::kSeveral) return false;
+  const Triangle& other = mesh.triangles[neighbour];
+  const auto opposite = *std::find_if(other.begin(), other.end(), [a = a, b = b](auto v) { return v != a && v != b; });
+  if (opposite == middle || edges.face(middle, opposite) != EdgeMap::kNone ||
+      edges.face(opposite, middle) != EdgeMap::kNone)
+    return false;  // The new edge exists already and would become non-manifold.
+  const Triangle first = {middle, a, opposite};
+  const Triangle second = {middle, opposite, b};
+  if (hasNoArea(mesh, first) || hasNoArea(mesh, second)) return false;
+  edges.erase(a, b);
+  edges.erase(b, a);
+  edges.set(first, face);
+  edges.set(second, neighbour);
+  mesh.triangles[face] = first;
+  mesh.triangles[neighbour] = second;
+  return true;
+}
+
+/// Flips the longest edge of collinear triangles and returns the number of flips.
+///
+/// Polygons and CAD facets with corners along a straight side yield such triangles, and dropping them would open the
+/// mesh. A flip splits the neighbour across the longest edge at the middle corner: surface and number of triangles
+/// stay, and both triangles have an area. Where that is impossible the triangle stays as it is.
+std::size_t flipCollinearFaces(TriangleMesh& mesh) {
+  std::vector<std::uint32_t> pending;
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+    if (hasNoArea(mesh, mesh.triangles[f])) pending.push_back(static_cast<std::uint32_t>(f));
+  if (pending.empty()) return 0;
+
+  EdgeMap edges(mesh.triangles);
+  std::size_t flips = 0;
+  // A flip may be possible only after that of a neighbour without area, hence the rounds. Every round but the last
+  // flips a triangle.
+  for (bool changed = true; changed;) {
+    const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
+    flips += flipped;
+    changed = flipped > 0;
+  }
+  return flips;
+}
+
+/// The number of triangles dropped for one reason, and the centroid of the first.
+struct Dropped {
+  std::size_t faces = 0;
+  Vector3 position = Vector3::Zero();
+};
+
+template <typename IsBad>
+Dropped drop(TriangleMesh& mesh, const IsBad& isBad) {
+  Dropped dropped;
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    if (!isBad(t)) return false;
+    if (dropped.faces++ == 0) dropped.position = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
+    return true;
+  });
+  return dropped;
+}
+
+Dropped dropDuplicates(TriangleMesh& mesh) {
+  const std::vector<char> redundant = redundantFaces(mesh.triangles);
+  auto next = redundant.begin();
+  return drop(mesh, [&](const Triangle&) { return *next++ != 0; });
+}
+
+std::size_t dropUnusedVertices(TriangleMesh& mesh) {
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> newIndex(mesh.vertices.size(), kUnused);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle) newIndex[v] = 0;
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (newIndex[i] == kUnused) continue;
+    mesh.vertices[kept] = mesh.vertices[i];
+    newIndex[i] = kept++;
+  }
+  for (Triangle& triangle : mesh.triangles)
+    for (std::uint32_t& v : triangle) v = newIndex[v];
+  const std::size_t dropped = mesh.vertices.size() - kept;
+  mesh.vertices.resize(kept);
+  return dropped;
+}
+
+void requireFaces(const TriangleMesh& mesh, std::size_t facesBefore) {
+  if (!mesh.triangles.empty()) return;
+  constexpr const char* kAdvice = "; a surface of triangles or polygons is needed";
+  if (facesBefore == 0) detail::refuseMesh(mesh.name, "no faces", kAdvice);
+  detail::refuseMesh(mesh.name, "no face with an area (", facesBefore, facesBefore == 1 ? " face is" : " faces are",
+                     " degenerate)", kAdvice);
+}
+
+}  // namespace
+}  // namespace mesh
+
+ImportedMesh cleaned(TriangleMesh mesh) {
+  using namespace mesh;
+  requireUsable(mesh);
+  const std::size_t facesBefore = mesh.triangles.size();
+  const std::size_t welded = weld(mesh);
+  const Dropped collapsed = drop(mesh, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  const std::size_t flipped = flipCollinearFaces(mesh);
+  const Dropped withoutArea = drop(mesh, [&](const Triangle& t) { return hasNoArea(mesh, t); });
+  const Dropped duplicates = dropDuplicates(mesh);
+  requireFaces(mesh, facesBefore);
+  const std::size_t unreferenced = dropUnusedVertices(mesh) - welded;
+
+  ImportedMesh result{std::move(mesh), {}};
+  MeshReport& report = result.report = inspect(result.mesh);
+  report.weldedVertices = welded;
+  report.degenerateFaces = collapsed.faces + withoutArea.faces;
+  report.degeneratePosition = (collapsed.faces > 0 ? collapsed : withoutArea).position;
+  report.flippedFaces = flipped;
+  report.duplicateFaces = duplicates.faces;
+  report.duplicatePosition = duplicates.position;
+  report.unreferencedVertices = unreferenced;
+  const bool isClosed = report.unbalancedEdges == 0;
+  if (report.volume < 0 && hasReliableVolumeSign(report.volume, report.area, report.box, isClosed)) {
+    for (Triangle& triangle : result.mesh.triangles) std::swap(triangle[1], triangle[2]);
+    report.reversed = true;
+    report.volume = signedVolume(result.mesh);
+  }
+  return result;
+}
+
+}  // namespace hpsdf
