@@ -91,11 +91,6 @@ std::string worstDifferences(const CheckedItem& item) {
   return html + "</table>\n";
 }
 
-std::string fact(const std::string& name, const std::string& value) {
-  if (value.empty()) return {};
-  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", name, htmlEscaped(value));
-}
-
 std::string shareText(const CheckedItem& item) {
   if (item.compared == 0) return {};
   return fmt::format("{} of {} ({:.3g} %), of which {:.3g} % are free; the largest difference is {:.3g}",
@@ -107,10 +102,17 @@ std::string failure(const CheckedItem& item, const CheckPage& page) {
   std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
                                  verdictText(item.verdict), htmlEscaped(item.problem));
   html += pictures(item) + worstDifferences(item);
-  html += "<table>\n" + fact("Differing", shareText(item)) + fact("Written by", item.where) +
-          fact("Renderer of the baseline", item.baselineRenderer) + fact("Renderer now", item.renderer) + "</table>\n";
-  html +=
-      fmt::format("<code>{} --only {}</code>\n", htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
+  const std::pair<const char*, std::string> facts[] = {{"Differing", shareText(item)},
+                                                       {"Written by", item.where},
+                                                       {"Renderer of the baseline", item.baselineRenderer},
+                                                       {"Renderer now", item.renderer}};
+  html += "<table>\n";
+  for (const auto& [name, value] : facts)
+    if (!value.empty()) html += htmlFact(name, value);
+  html += fmt::format(
+      "</table>\n"
+      "<code>{} --only {}</code>\n",
+      htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
   const bool canBeAccepted = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
   if (canBeAccepted)
     html += fmt::format("<p>If it is right now:</p>\n<code>{} {}</code>\n", htmlEscaped(page.acceptCommand),

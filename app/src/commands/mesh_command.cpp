@@ -27,7 +27,6 @@
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {

@@ -90,7 +90,7 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   } catch (const Error& error) {
-    if (!checkpoint.empty() && std::string_view(error.what()).starts_with(checkpoint.string())) throw;
+    if (!checkpoint.empty() && error.subject() == checkpoint.string()) throw;
     rethrowNaming(surface, error);
   }
 }

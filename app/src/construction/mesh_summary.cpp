@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "text/json.h"
 #include "text/text.h"
 
@@ -18,19 +20,8 @@ std::string faultyEdges(const MeshReport& report) {
 }  // namespace
 
 std::string insideTestName(InsideTest sign) {
-  switch (sign) {
-    case InsideTest::pseudonormal:
-      return "pseudonormal";
-    case InsideTest::winding:
-      return "winding";
-    case InsideTest::shell:
-      return "unsigned-shell";
-    case InsideTest::outerHull:
-      return "hull";
-    case InsideTest::automatic:
-      break;
-  }
-  return "unknown";
+  constexpr std::array kNames = {"unknown", "pseudonormal", "winding", "unsigned-shell", "hull"};
+  return kNames[std::size_t(sign)];
 }
 
 std::string closednessText(const MeshReport& report) {

@@ -107,7 +107,7 @@ std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, co
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
   try {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
-    if (prepared.analytic) throw Error(surface + ": an analytic shape has no mesh, and so no defects");
+    if (prepared.analytic) throw Error(ErrorKind::mesh, surface, "an analytic shape has no mesh, and so no defects");
     requireDistanceMemory(prepared.mesh);
     if (!isMadeFrom({.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source))
       warnOfForeign(console, surface, source);

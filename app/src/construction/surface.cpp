@@ -13,7 +13,6 @@
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/shapes.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -79,8 +78,8 @@ bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) ||
 
 ImportedMesh importSurface(const Console& console, const std::string& surface) {
   if (surface.starts_with(kAnalytic))
-    throw Error(
-        fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
+    throw Error(ErrorKind::mesh, surface,
+                "an analytic shape has no mesh; take builtin:" + surface.substr(kAnalytic.size()));
   if (surface.starts_with(kBuiltin)) {
     TriangleMesh mesh = shapes::mesh(surface);
     const MeshReport report = inspect(mesh);
@@ -135,9 +134,8 @@ std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const
 }
 
 void rethrowNaming(const std::string& surface, const Error& error) {
-  const std::string message = error.what();
-  if (printable(message).find(printable(surface)) != std::string::npos) throw error;  // its name may be escaped there
-  throw Error(surface + ": " + message);
+  if (error.subject() == surface) throw error;
+  throw Error(error.kind(), surface, error.what());
 }
 
 }  // namespace hpsdf::app

@@ -53,7 +53,7 @@ std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 
-/// Throws the error again, with the name of the surface before its message unless that holds it.
+/// Throws the error again, with the surface as its subject.
 [[noreturn]] void rethrowNaming(const std::string& surface, const Error& error);
 
 }  // namespace hpsdf::app

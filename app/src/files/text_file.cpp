@@ -55,14 +55,6 @@ std::string readWholeFile(const std::string& file) {
   return readAll(stream, file, std::numeric_limits<std::size_t>::max());
 }
 
-std::string lastLine(const std::string& text) {
-  std::istringstream lines(text);
-  std::string last;
-  for (std::string line; std::getline(lines, line);)
-    if (!line.empty()) last = line;
-  return last;
-}
-
 void writeTextFile(const std::filesystem::path& file, std::string_view text) {
   OutputFile out(file);
   out.write(text);

@@ -23,9 +23,6 @@ std::string readTextFile(const std::string& file);
 /// Reads a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` does otherwise.
 std::string readWholeFile(const std::string& file);
 
-/// Returns the last line that is not empty; "" where there is none.
-std::string lastLine(const std::string& text);
-
 /// Writes a file under a temporary name and renames it. Throws `Error` naming the file, and leaves nothing behind then.
 void writeTextFile(const std::filesystem::path& file, std::string_view text);
 

@@ -11,20 +11,12 @@
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
 #include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
 constexpr int kBarCells = 40;
-
-template <typename Value>
-Json levelsJson(const std::map<int, Value>& levels) {
-  Json json = Json::object();
-  for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
-  return json;
-}
 
 /// Prints one row a level with its share of the volume, its number of leaves and a bar proportional to the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,

@@ -7,7 +7,6 @@
 
 #include "construction/build_arguments.h"
 #include "session/session.h"
-#include "study/study.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -19,25 +18,23 @@ const std::vector<Study>& studies() {
   return list;
 }
 
-/// nullptr where it takes none of that name.
+/// Returns nullptr where the study takes none of that name.
 const Parameter* parameterOf(const Study& study, const std::string& name) {
   const auto found = std::ranges::find(study.parameters, name, &Parameter::name);
   return found == study.parameters.end() ? nullptr : &*found;
 }
 
-bool takes(const Study& study, const std::string& name) { return parameterOf(study, name) != nullptr; }
-
-std::vector<const Study*> studiesThatTake(const std::string& name) {
+std::vector<const Study*> takersOf(const std::string& parameter) {
   std::vector<const Study*> takers;
   for (const Study& study : studies())
-    if (takes(study, name)) takers.push_back(&study);
+    if (parameterOf(study, parameter) != nullptr) takers.push_back(&study);
   return takers;
 }
 
-std::vector<std::string> namesOf(const std::vector<const Study*>& studies) {
+std::string namesOf(const std::vector<const Study*>& studies) {
   std::vector<std::string> names;
-  for (const Study* study : studies) names.push_back(study->name);
-  return names;
+  for (const Study* study : studies) names.push_back(fmt::format("'study {}'", study->name));
+  return fmt::format("{}", fmt::join(names, " and "));
 }
 
 const Study& studyOf(const Arguments& arguments) {
@@ -50,9 +47,8 @@ std::vector<Parameter> kindParameters() {
   for (const Study& study : studies())
     for (Parameter parameter : study.parameters) {
       if (std::ranges::find(all, parameter.name, &Parameter::name) != all.end()) continue;
-      const std::vector<const Study*> takers = studiesThatTake(parameter.name);
-      if (takers.size() < studies().size())
-        parameter.group = fmt::format("Options of 'study {}'", fmt::join(namesOf(takers), "' and 'study "));
+      const std::vector<const Study*> takers = takersOf(parameter.name);
+      if (takers.size() < studies().size()) parameter.group = "Options of " + namesOf(takers);
       const auto sameDefault = [&](const Study* other) {
         return parameterOf(*other, parameter.name)->defaultText == parameter.defaultText;
       };
@@ -69,9 +65,9 @@ std::vector<Parameter> kindParameters() {
 void checkStudy(const Arguments& arguments) {
   const Study& study = studyOf(arguments);
   for (const Parameter& parameter : kindParameters())
-    if (arguments.given(parameter.name) && !takes(study, parameter.name))
-      throw Error(fmt::format("{}: is for 'study {}', not for 'study {}'", parameter.name,
-                              fmt::join(namesOf(studiesThatTake(parameter.name)), "' and 'study "), study.name));
+    if (arguments.given(parameter.name) && parameterOf(study, parameter.name) == nullptr)
+      throw Error(fmt::format("{}: is for {}, not for 'study {}'", parameter.name, namesOf(takersOf(parameter.name)),
+                              study.name));
 }
 
 }  // namespace
@@ -112,9 +108,10 @@ Arguments buildArguments(const Session& session, const Arguments& arguments, std
   return parseArguments(build, words, Origin::script);
 }
 
-std::vector<std::string> fileNames(const std::vector<std::string>& meshes) {
+std::vector<std::string> checkedNames(const Session& session, const Arguments& arguments) {
   std::vector<std::string> names;
-  for (const std::string& mesh : meshes) {
+  for (const std::string& mesh : arguments.texts("mesh")) {
+    buildArguments(session, arguments, names.size());
     const std::string plain = plainName(mesh);
     std::string name = plain;
     for (int number = 2; std::ranges::find(names, name) != names.end(); ++number)

@@ -22,7 +22,7 @@
 #include "language/script.h"
 #include "session/field_summary.h"
 #include "session/session.h"
-#include "study/study.h"
+#include "study/study_command.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -146,8 +146,10 @@ std::optional<double> coefficientsAt(const Curve& curve, double rms) {
   return std::nullopt;
 }
 
-double comparedRms(const Convergence& convergence, const Arguments& arguments) {
-  return arguments.has("at") ? arguments.number("at") : commonRms(convergence);
+/// The figures of a stage in the order of the tables' columns.
+std::string figuresText(const Stage& stage, const char* separator) {
+  return fmt::format("{1}{0}{2}{0}{3}{0}{4}{0}{5}{0}{6}\n", separator, stage.steps, stage.leaves, stage.coefficients,
+                     stage.estimatedRms, stage.measuredRms, stage.measuredMax);
 }
 
 std::string csvOf(const std::vector<Convergence>& all) {
@@ -155,12 +157,13 @@ std::string csvOf(const std::vector<Convergence>& all) {
   for (const Convergence& convergence : all)
     for (const Curve& curve : convergence.curves)
       for (const Stage& stage : curve.stages)
-        text += fmt::format("{},{},{},{},{},{},{},{}\n", convergence.name, strategyName(curve.strategy), stage.steps,
-                            stage.leaves, stage.coefficients, stage.estimatedRms, stage.measuredRms, stage.measuredMax);
+        text += fmt::format("{},{},{}", convergence.name, strategyName(curve.strategy), figuresText(stage, ","));
   return text;
 }
 
-Json comparisonJson(const Convergence& convergence, double rms) {
+/// The numbers of coefficients with which the curves have the same error.
+Json comparisonJson(const Convergence& convergence, const Arguments& arguments) {
+  const double rms = arguments.has("at") ? arguments.number("at") : commonRms(convergence);
   Json json = {{"measured_rms", rms}};
   const auto ofHp = coefficientsAt(convergence.curves.front(), rms);
   for (const Curve& curve : convergence.curves) {
@@ -188,7 +191,7 @@ Json jsonOf(const std::vector<Convergence>& all, const Arguments& arguments, con
     }
     meshes.push_back({{"mesh", convergence.mesh},
                       {"name", convergence.name},
-                      {"equal_error", comparisonJson(convergence, comparedRms(convergence, arguments))},
+                      {"equal_error", comparisonJson(convergence, arguments)},
                       {"curves", curves}});
   }
   return {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
@@ -206,23 +209,18 @@ std::string textOf(const Convergence& convergence, const Arguments& arguments) {
                         grouped(last.coefficients), grouped(last.leaves), shortNumber(last.estimatedRms),
                         shortNumber(last.measuredRms), shortNumber(last.measuredMax));
   }
-  const double rms = comparedRms(convergence, arguments);
-  text += fmt::format("  coefficients at a measured RMS error of {}\n", shortNumber(rms));
-  const auto ofHp = coefficientsAt(convergence.curves.front(), rms);
+  const Json comparison = comparisonJson(convergence, arguments);
+  text += fmt::format("  coefficients at a measured RMS error of {}\n",
+                      shortNumber(comparison["measured_rms"].get<double>()));
   for (const Curve& curve : convergence.curves) {
-    const auto coefficients = coefficientsAt(curve, rms);
-    text += fmt::format("  {:<9} {:>14}", strategyName(curve.strategy),
-                        coefficients ? grouped(std::uint64_t(std::llround(*coefficients))) : "out of reach");
-    text += coefficients && ofHp ? fmt::format("   {:.2f} × hp\n", *coefficients / *ofHp) : "\n";
+    const Json& found = comparison[strategyName(curve.strategy)];
+    const Json &coefficients = found["coefficients"], &overHp = found["over_hp"];
+    text += fmt::format(
+        "  {:<9} {:>14}{}\n", strategyName(curve.strategy),
+        coefficients.is_null() ? "out of reach" : grouped(std::uint64_t(std::llround(coefficients.get<double>()))),
+        overHp.is_null() ? "" : fmt::format("   {:.2f} × hp", overHp.get<double>()));
   }
   return text;
-}
-
-fs::path requireGnuplot() {
-  if (const auto found = findProgram("gnuplot")) return *found;
-  throw Error(
-      "study convergence: its pictures take the program gnuplot, which PATH does not have; install the package "
-      "gnuplot-nox, or give --no-plot");
 }
 
 /// The gnuplot script that draws a mesh's curves. The data of the n-th curve are the n-th block of plot.dat.
@@ -256,42 +254,34 @@ std::string plotScript(const Convergence& convergence) {
   return script + "\n";
 }
 
-std::string plotData(const Convergence& convergence) {
-  std::string text;
-  for (const Curve& curve : convergence.curves) {
-    for (const Stage& stage : curve.stages)
-      text += fmt::format("{} {} {} {} {} {}\n", stage.steps, stage.leaves, stage.coefficients, stage.estimatedRms,
-                          stage.measuredRms, stage.measuredMax);
-    text += "\n\n";
-  }
-  return text;
-}
-
 /// Draws the curves of a mesh. Returns the bytes of the PNG file.
 std::string plotOf(const fs::path& gnuplot, const Convergence& convergence) {
   const TemporaryFolder folder;
-  writeTextFile(folder.path() / "plot.dat", plotData(convergence));
+  std::string data;
+  for (const Curve& curve : convergence.curves) {
+    for (const Stage& stage : curve.stages) data += figuresText(stage, " ");
+    data += "\n\n";
+  }
+  writeTextFile(folder.path() / "plot.dat", data);
   writeTextFile(folder.path() / "plot.gp", plotScript(convergence));
-  const fs::path log = folder.path() / "gnuplot.txt", picture = folder.path() / "plot.png";
-  const int status = runOtherProgram(gnuplot, {"plot.gp"}, folder.path(), log, {});
-  if (status != 0 || !fs::exists(picture))
-    throw Error(fmt::format("study convergence: gnuplot failed with status {} ({}); give --no-plot", status,
-                            lastLine(readTextFile(log.string()))));
-  return readWholeFile(picture.string());
+  const std::string problem = runOtherProgram(gnuplot, {"plot.gp"}, folder.path(), "plot.png", {});
+  if (!problem.empty()) throw Error(fmt::format("study convergence: {}; give --no-plot", problem));
+  return readWholeFile((folder.path() / "plot.png").string());
 }
 
 void runConvergence(Session& session, const Arguments& arguments) {
   const bool plots = !arguments.flag("no-plot");
-  const fs::path gnuplot = plots ? requireGnuplot() : fs::path();
+  const fs::path gnuplot = findProgram("gnuplot").value_or("");
+  if (plots && gnuplot.empty())
+    throw Error(
+        "study convergence: its pictures take the program gnuplot, which PATH does not have; install the package "
+        "gnuplot-nox, or give --no-plot");
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "convergence.csv");
-  const std::vector<std::string> meshes = arguments.texts("mesh");
-  const std::vector<std::string> names = fileNames(meshes);
-  for (std::size_t n = 0; n < meshes.size(); ++n)
-    buildArguments(session, arguments, n);  // reports mistakes before the long work
+  const std::vector<std::string> names = checkedNames(session, arguments);
   std::vector<Convergence> all;
   std::vector<std::string> pictures;
-  for (std::size_t n = 0; n < meshes.size(); ++n) {
+  for (std::size_t n = 0; n < names.size(); ++n) {
     all.push_back(studied(session, arguments, n, names[n]));
     if (plots) pictures.push_back(plotOf(gnuplot, all.back()));
   }
@@ -306,7 +296,7 @@ void runConvergence(Session& session, const Arguments& arguments) {
   for (std::size_t n = 0; n < pictures.size(); ++n) write(fmt::format("convergence-{}.png", names[n]), pictures[n]);
   files.push_back((folder.path() / "convergence.json").string());
   const Json json = jsonOf(all, arguments, files);
-  folder.write("convergence.json", json.dump(2) + "\n");
+  folder.write("convergence.json", jsonText(json));
   folder.commit();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);
   for (const Convergence& convergence : all) session.console().out << textOf(convergence, arguments);
