@@ -33,7 +33,6 @@
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
-#include "language/script.h"
 #include "session/field_summary.h"
 #include "text/json.h"
 #include "text/text.h"

@@ -5,7 +5,6 @@
 #include "files/data_table.h"
 #include "files/text_file.h"
 #include "hpsdf/error.h"
-#include "language/script.h"
 #include "text/json.h"
 #include "text/text.h"
 

@@ -221,21 +221,20 @@ class ScriptCheck {
 
   /// Compares the files that were written, and, if the script completed, those that have a baseline.
   void judgePictures(bool completed) {
-    const std::vector<CheckedItem> others = std::exchange(items_, {});
+    std::vector<CheckedItem> judged;
     std::set<std::string> pictures = comparableFiles(actual_);
     if (completed) pictures.merge(comparableFiles(baselines_));
     for (const std::string& picture : pictures) {
-      CheckedItem item{.script = name_,
-                       .picture = picture,
-                       .renderer = origins_[picture].renderer,
-                       .where = origins_[picture].where,
-                       .baseline = baselines_ / picture,
-                       .actual = actual_ / picture,
-                       .difference = request_.output / "difference" / name_ / picture};
-      judge(item);
-      items_.push_back(item);
+      judged.push_back({.script = name_,
+                        .picture = picture,
+                        .renderer = origins_[picture].renderer,
+                        .where = origins_[picture].where,
+                        .baseline = baselines_ / picture,
+                        .actual = actual_ / picture,
+                        .difference = request_.output / "difference" / name_ / picture});
+      judge(judged.back());
     }
-    items_.insert(items_.end(), others.begin(), others.end());
+    items_.insert(items_.begin(), judged.begin(), judged.end());
     if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // a script without pictures is listed too
   }
 

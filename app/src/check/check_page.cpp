@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <cstdint>
-
+#include "console/version.h"
 #include "files/html_page.h"
 #include "files/text_file.h"
-#include "language/script.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -98,7 +96,14 @@ std::string shareText(const CheckedItem& item) {
                      100 * double(item.differing) / double(item.compared), 100 * item.budget, item.largest);
 }
 
-std::string failure(const CheckedItem& item, const CheckPage& page) {
+/// The command that repeats the check, without --only.
+std::string checkCommand(const CheckRequest& request) {
+  std::string line = "hpsdf check " + shellWord(request.folder.string());
+  for (const auto& [name, value] : request.variables) line += " " + shellWord(name + "=" + value);
+  return line + " --out " + shellWord(request.output.string());
+}
+
+std::string failure(const CheckedItem& item, const CheckRequest& request) {
   std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
                                  verdictText(item.verdict), htmlEscaped(item.problem));
   html += pictures(item) + worstDifferences(item);
@@ -109,14 +114,13 @@ std::string failure(const CheckedItem& item, const CheckPage& page) {
   html += "<table>\n";
   for (const auto& [name, value] : facts)
     if (!value.empty()) html += htmlFact(name, value);
-  html += fmt::format(
-      "</table>\n"
-      "<code>{} --only {}</code>\n",
-      htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
+  html += fmt::format("</table>\n<code>{} --only {}</code>\n", htmlEscaped(checkCommand(request)),
+                      htmlEscaped(shellWord(item.script)));
   const bool canBeAccepted = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
   if (canBeAccepted)
-    html += fmt::format("<p>If it is right now:</p>\n<code>{} {}</code>\n", htmlEscaped(page.acceptCommand),
-                        htmlEscaped(shellWord(item.name())));
+    html += fmt::format("<p>If it is right now:</p>\n<code>{}</code>\n",
+                        htmlEscaped(fmt::format("hpsdf accept {} --from {} {}", shellWord(request.folder.string()),
+                                                shellWord(request.output.string()), shellWord(item.name()))));
   return html;
 }
 
@@ -152,17 +156,17 @@ std::string junitCase(const CheckedItem& item) {
 
 }  // namespace
 
-std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page) {
+std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) {
   const std::size_t failures = outcome.failures();
   const std::string subtitle = failures == 0
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
-  std::string html = htmlHead(page.title, subtitle, kCheckStyle);
+  std::string html = htmlHead("Check of " + request.folder.string(), subtitle, kCheckStyle);
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
-  html += fmt::format("<code>{}</code>\n", htmlEscaped(page.checkCommand));
+  html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)
-    if (item.verdict != Verdict::passed) html += failure(item, page);
-  return html + std::string(kScript) + htmlFoot(page.footer);
+    if (item.verdict != Verdict::passed) html += failure(item, request);
+  return html + std::string(kScript) + htmlFoot(versionText());
 }
 
 std::string junitXml(const CheckOutcome& outcome) {

@@ -7,15 +7,9 @@
 
 namespace hpsdf::app {
 
-struct CheckPage {
-  std::string title;
-  std::string checkCommand;   ///< command that repeats the check, without --only
-  std::string acceptCommand;  ///< command that accepts a picture, without the picture's name
-  std::string footer;
-};
-
-/// A page with the results of all comparisons and the pictures of each failure, which are embedded in the page.
-std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page);
+/// A page with the results of all comparisons and the pictures of each failure, which are embedded in the page. It
+/// names the commands that repeat the check, and that accept a picture.
+std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request);
 
 /// JUnit XML with a test suite for each script and a test case for each picture.
 std::string junitXml(const CheckOutcome& outcome);

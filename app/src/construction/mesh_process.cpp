@@ -28,7 +28,6 @@
 #include "files/other_program.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
-#include "hpsdf/error.h"
 #include "language/registry.h"
 #include "text/text.h"
 
@@ -81,19 +80,14 @@ struct Pipe {
 
 std::string endText(int status) {
   if (WIFEXITED(status)) return fmt::format("exit status {}", WEXITSTATUS(status));
-  switch (WTERMSIG(status)) {
-    case SIGABRT:
-      return "aborted by a check of its own";
-    case SIGSEGV:
-    case SIGBUS:
-      return "wrong access to memory";
-    case SIGFPE:
-      return "division by zero";
-    case SIGKILL:
-      return "killed; perhaps the machine ran out of memory";
-    default:
-      return fmt::format("signal {}", WTERMSIG(status));
-  }
+  constexpr std::pair<int, const char*> kCauses[] = {{SIGABRT, "aborted by a check of its own"},
+                                                     {SIGSEGV, "wrong access to memory"},
+                                                     {SIGBUS, "wrong access to memory"},
+                                                     {SIGFPE, "division by zero"},
+                                                     {SIGKILL, "killed; perhaps the machine ran out of memory"}};
+  for (const auto& [signal, cause] : kCauses)
+    if (WTERMSIG(status) == signal) return cause;
+  return fmt::format("signal {}", WTERMSIG(status));
 }
 
 /// The reading of one file from the start of the process to its reply.

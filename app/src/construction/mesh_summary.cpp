@@ -4,20 +4,14 @@
 
 #include <array>
 
-#include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 
-namespace {
-
-/// "3 boundary, 1 non-manifold and 0 inconsistent edges"
 std::string faultyEdges(const MeshReport& report) {
   return fmt::format("{} boundary, {} non-manifold and {} inconsistent edges", grouped(report.boundaryEdges),
                      grouped(report.nonManifoldEdges), grouped(report.inconsistentEdges));
 }
-
-}  // namespace
 
 std::string insideTestName(InsideTest sign) {
   constexpr std::array kNames = {"unknown", "pseudonormal", "winding", "unsigned-shell", "hull"};
@@ -78,13 +72,6 @@ std::string meshText(const std::string& name, const MeshReport& report) {
 
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh) {
   return choice.position ? choice.reason + ", as at " + vectorText(*choice.position, mesh) : choice.reason;
-}
-
-std::string unsureSigns(const std::string& name, const MeshReport& report) {
-  return fmt::format(
-      "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "
-      "without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
-      name, faultyEdges(report));
 }
 
 }  // namespace hpsdf::app

@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "console/console.h"
 #include "console/long_work.h"
 #include "construction/mesh_process.h"
 #include "construction/mesh_summary.h"
@@ -69,7 +68,11 @@ void tellInsideTest(const Console& console, const std::string& surface, const Me
   if (!choice.reason.empty() && choice.insideTest != InsideTest::pseudonormal)
     note(console, fmt::format("{}: sign by winding number: {}", surface, reasonText(choice, report.box)));
   if (choice.reason.empty() && choice.insideTest == InsideTest::pseudonormal && !report.closed())
-    warn(console, unsureSigns(surface, report));
+    warn(
+        console,
+        fmt::format("{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase "
+                    "their jumps without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
+                    surface, faultyEdges(report)));
 }
 
 }  // namespace
@@ -131,11 +134,6 @@ std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const
   const auto exact = distanceTo(console, prepared.mesh, options);
   tellInsideTest(console, surface, *prepared.report, exact->insideTestChoice(), prepared.normalization);
   return withNormalization(exact, prepared.normalization);
-}
-
-void rethrowNaming(const std::string& surface, const Error& error) {
-  if (error.subject() == surface) throw error;
-  throw Error(error.kind(), surface, error.what());
 }
 
 }  // namespace hpsdf::app

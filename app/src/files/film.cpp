@@ -7,8 +7,6 @@
 
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
-#include "hpsdf/error.h"
-#include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {

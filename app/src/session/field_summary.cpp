@@ -4,13 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
-#include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -23,10 +21,9 @@ std::string histogram(std::string_view name, const std::map<int, double>& volume
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
   for (const auto& [level, share] : volume) {
-    std::string bar;
     const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kBarCells))) : 0;
-    for (int i = 0; i < cells; ++i) bar += "▇";
-    text += fmt::format("  {:>8} {:>6.2f} % {:>12}  {}\n", level, 100 * share, grouped(leaves.at(level)), bar);
+    text +=
+        fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", level, 100 * share, grouped(leaves.at(level)), "", cells);
   }
   return text;
 }
@@ -39,19 +36,13 @@ std::string strategyName(Strategy strategy) {
   return settingText(buildSetting("strategy"), BuildOptions{.strategy = strategy});
 }
 
-/// Returns the leaves' error bounds in ascending order; empty where the field holds no bounds.
-std::vector<double> leafBounds(const Field& field) {
+Json boundsJson(const Field& field) {
   std::vector<double> bounds;
   const FieldData& data = field.data();
   for (std::size_t n = 0; n < data.bounds.size(); ++n)
     if (node::isLeaf(data.nodes[n])) bounds.push_back(data.bounds[n].error);
-  std::ranges::sort(bounds);
-  return bounds;
-}
-
-Json boundsJson(const Field& field) {
-  const std::vector<double> bounds = leafBounds(field);
   if (bounds.empty()) return {};
+  std::ranges::sort(bounds);
   return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
 }
 
@@ -179,10 +170,10 @@ std::string fieldText(const CurrentField& current) {
   if (metadata.settings.maxError > 0) text += summaryRow("greatest error", shortNumber(metadata.measuredError));
   if (const double width = field.data().blend; width > 0)
     text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
-  if (const auto bounds = leafBounds(field); !bounds.empty())
+  if (const Json bounds = boundsJson(field); !bounds.is_null())
     text += summaryRow("bounds of the error",
-                       fmt::format("{} in the median, {} at most", shortNumber(bounds[bounds.size() / 2]),
-                                   shortNumber(bounds.back())));
+                       fmt::format("{} in the median, {} at most", shortNumber(bounds["median"].get<double>()),
+                                   shortNumber(bounds["greatest"].get<double>())));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

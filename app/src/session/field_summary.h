@@ -17,6 +17,9 @@ Json levelsJson(const std::map<int, Value>& levels) {
   return json;
 }
 
+/// The median and the greatest of the leaves' error bounds; null where the field holds no bounds.
+Json boundsJson(const Field& field);
+
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);
 

@@ -121,6 +121,21 @@ std::vector<std::string> checkedNames(const Session& session, const Arguments& a
   return names;
 }
 
+std::string rowText(const Json& row, const char* separator) {
+  const auto cellText = [](const Json& value) {
+    if (value.is_null()) return std::string();
+    if (value.is_boolean()) return std::to_string(int(value.get<bool>()));
+    if (value.is_number_integer()) return value.dump();
+    if (value.is_number()) return fmt::format("{}", value.get<double>());
+    std::string quoted = "\"";
+    for (const char c : value.get<std::string>()) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + "\"";
+  };
+  std::vector<std::string> cells;
+  for (const Json& value : row) cells.push_back(cellText(value));
+  return fmt::format("{}", fmt::join(cells, separator));
+}
+
 namespace {
 
 const Command kStudy = {

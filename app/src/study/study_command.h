@@ -7,6 +7,7 @@
 
 #include "hpsdf/verify.h"
 #include "language/registry.h"
+#include "text/json.h"
 
 namespace hpsdf::app {
 
@@ -39,5 +40,8 @@ Arguments buildArguments(const Session& session, const Arguments& arguments, std
 /// A different file name for each mesh. Throws `Error` where `buildArguments` would do so for one of them, so that
 /// mistakes are reported before the long work.
 std::vector<std::string> checkedNames(const Session& session, const Arguments& arguments);
+
+/// The values of an object as one line of a table. Texts stand in quotes, because the names of shapes contain commas.
+std::string rowText(const Json& row, const char* separator = ",");
 
 }  // namespace hpsdf::app

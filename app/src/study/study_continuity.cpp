@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <chrono>
 
@@ -14,7 +13,6 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
-#include "language/script.h"
 #include "session/session.h"
 #include "study/study_command.h"
 #include "text/json.h"
@@ -101,37 +99,21 @@ class ContinuityStudy {
   Json first_;  ///< the mesh's first row; null before
 };
 
-/// A value as a cell of a CSV table. Texts stand in quotes, because the names of shapes contain commas.
-std::string cellText(const Json& value) {
-  if (value.is_null()) return {};
-  if (value.is_boolean()) return value.get<bool>() ? "1" : "0";
-  if (value.is_number_integer()) return value.dump();
-  if (value.is_number()) return fmt::format("{}", value.get<double>());
-  std::string quoted = "\"";
-  for (const char c : value.get<std::string>()) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 /// A CSV table of the rows. It leaves the time of the construction out.
 std::string csv(Json rows) {
-  std::vector<std::string> lines;
+  std::string head, body;
   for (Json& row : rows) {
     row.erase("build_seconds");
-    std::vector<std::string> names, cells;
-    for (const auto& [name, value] : row.items()) {
-      names.push_back(name);
-      cells.push_back(cellText(value));
-    }
-    if (lines.empty()) lines.push_back(fmt::format("{}", fmt::join(names, ",")));
-    lines.push_back(fmt::format("{}", fmt::join(cells, ",")));
+    body += rowText(row) + "\n";
   }
-  return fmt::format("{}\n", fmt::join(lines, "\n"));
+  for (const auto& [name, value] : rows.front().items()) head += (head.empty() ? "" : ",") + name;
+  return head + "\n" + body;
 }
 
 std::string table(const Json& rows) {
   std::string text, mesh;
   for (const Json& row : rows) {
-    const auto number = [&](const char* name) { return row[name].get<double>(); };
+    const auto number = [&](const char* name) { return numberIn(row, name); };
     if (row["mesh"].get<std::string>() != mesh) {
       mesh = row["mesh"].get<std::string>();
       text += fmt::format("{}{}: RMS jump {}, greatest {}, RMS error {}, near the surface {}, {}, built in {:.1f} s\n",

@@ -18,7 +18,6 @@
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
-#include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_summary.h"
@@ -48,9 +47,9 @@ constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree
 
 /// A slice through the middle of the domain, and a bar that shows the shares of the volume in the same colours.
 struct LevelPicture {
-  std::string png;  ///< bytes of the slice's file
-  std::string svg;  ///< the bar
-  Colors colors;    ///< of the levels of all rows
+  std::string png = {};  ///< bytes of the slice's file
+  std::string svg = {};  ///< the bar
+  Colors colors = {};    ///< of the levels of all rows
 };
 
 /// A mesh and its field.

@@ -15,6 +15,9 @@ using Json = nlohmann::ordered_json;
 std::string jsonText(const Json& json);
 void printJson(std::ostream& out, const Json& json);
 
+/// The number of that name in an object.
+inline double numberIn(const Json& object, const char* name) { return object.at(name).get<double>(); }
+
 Json vectorJson(const Vector3& v);
 
 Json boxJson(const Box& box);
