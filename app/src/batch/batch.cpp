@@ -103,6 +103,12 @@ Json linesJson(const std::string& text) {
   return list;
 }
 
+/// To be called before `errno` changes.
+Error cannotWrite(const fs::path& file) {
+  return Error(ErrorKind::file, file.string(),
+               fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
+}
+
 /// Divides numbered pieces of work among processes that share a file. A lock is a record lock on one byte of the file,
 /// whose offset follows from the number; the byte need not exist. The system releases the locks when a process ends,
 /// however it ends. The file is empty and must never be removed: processes that open its successor would not see the
@@ -113,9 +119,7 @@ class FileLocks {
   /// object a file: record locks belong to the process, and closing the file anywhere in it releases all of them.
   explicit FileLocks(fs::path file)
       : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (descriptor_ < 0)
-      throw Error(fmt::format("{}: cannot be written ({}); check the folder's permissions", file_.string(),
-                              std::strerror(errno)));
+    if (descriptor_ < 0) throw cannotWrite(file_);
   }
   ~FileLocks() { close(descriptor_); }
   FileLocks(const FileLocks&) = delete;
@@ -155,9 +159,7 @@ class FileLocks {
 struct BuildMark {
   /// Throws `Error` where the file cannot be written, because the death of the process would leave no trace then.
   explicit BuildMark(fs::path path) : file(std::move(path)) {
-    if (!std::ofstream(file))
-      throw Error(fmt::format("{}: cannot be written ({}); check the folder's permissions", file.string(),
-                              std::strerror(errno)));
+    if (!std::ofstream(file)) throw cannotWrite(file);
   }
   ~BuildMark() {
     std::error_code ignored;

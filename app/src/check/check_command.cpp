@@ -6,7 +6,6 @@
 
 #include "check/baseline.h"
 #include "check/check.h"
-#include "check/check_page.h"
 #include "console/failed.h"
 #include "console/version.h"
 #include "files/data_table.h"

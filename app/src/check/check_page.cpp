@@ -1,7 +1,6 @@
-#include "check/check_page.h"
-
 #include <fmt/format.h>
 
+#include "check/check.h"
 #include "console/version.h"
 #include "files/html_page.h"
 #include "files/text_file.h"

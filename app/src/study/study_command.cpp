@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "session/session.h"
 #include "text/text.h"
@@ -83,10 +84,13 @@ std::vector<Parameter> samplingParameters() {
   return {pointsParameter("Random points in the domain at which errors are measured.", "200000", 1), seedParameter()};
 }
 
-SampleOptions sampleOptions(const Arguments& arguments, int threads) {
-  return {.count = static_cast<std::size_t>(arguments.number("points")),
-          .seed = static_cast<std::uint64_t>(arguments.number("seed")),
-          .threads = threads};
+ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
+                          const Box& domain, int threads, double near) {
+  const SampleOptions options{.count = static_cast<std::size_t>(arguments.number("points")),
+                              .seed = static_cast<std::uint64_t>(arguments.number("seed")),
+                              .threads = threads};
+  return withProgress(console,
+                      [&](const Progress& progress) { return sampleUniform(exact, domain, near, options, progress); });
 }
 
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "console/console.h"
 #include "hpsdf/verify.h"
 #include "language/registry.h"
 #include "text/json.h"
@@ -31,7 +32,10 @@ std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& na
 
 /// The parameters of the points at which errors are measured: their number and the seed of their positions.
 std::vector<Parameter> samplingParameters();
-SampleOptions sampleOptions(const Arguments& arguments, int threads);
+
+/// Exact distances at such points, all within `near` of the surface unless that is 0.
+ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
+                          const Box& domain, int threads, double near = 0);
 
 /// The arguments of `build` for the mesh of that index. A parameter that is given once for each mesh has its value at
 /// the same index. Throws `Error` for a parameter that is given another number of times.

@@ -31,9 +31,9 @@ class ContinuityStudy {
       : console_(session.console()),
         arguments_(arguments),
         mesh_(arguments.texts("mesh")[mesh]),
-        input_(buildInput(console_, mesh_, buildArguments(session, arguments, mesh))) {
-    takeSamples();
-  }
+        input_(buildInput(console_, mesh_, buildArguments(session, arguments, mesh))),
+        uniform_(samples(0)),
+        near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
   /// Adds one row for each field: its figures, each with the ratio to that of the mesh's first field, which is neither
   /// enriched nor smoothed.
@@ -57,14 +57,8 @@ class ContinuityStudy {
   }
 
  private:
-  void takeSamples() {
-    const SampleOptions sampling = sampleOptions(arguments_, input_.options.threads);
-    const double near = kNear * input_.domain.sizes().maxCoeff();
-    withProgress(console_, [&](const Progress& progress) {
-      uniform_ = sampleUniform(*input_.exact, input_.domain, 0, sampling, progress);
-      near_ = sampleUniform(*input_.exact, input_.domain, near, sampling, progress);
-      return 0;
-    });
+  ExactSamples samples(double near) const {
+    return exactSamples(console_, arguments_, *input_.exact, input_.domain, input_.options.threads, near);
   }
 
   /// `weight` is null for a field that is not smoothed.

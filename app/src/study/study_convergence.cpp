@@ -131,9 +131,9 @@ Json equalError(const Json& curves, double rms) {
 Json studied(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
   const std::string surface = arguments.texts("mesh")[mesh];
   const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
+  const ExactSamples samples =
+      exactSamples(session.console(), arguments, *input.exact, input.domain, input.options.threads);
   return withProgress(session.console(), [&](const Progress& progress) {
-    const SampleOptions sampling = sampleOptions(arguments, input.options.threads);
-    const ExactSamples samples = sampleUniform(*input.exact, input.domain, 0, sampling, progress);
     Json curves = Json::object();
     for (const Strategy strategy : {Strategy::hp, Strategy::h2, Strategy::h1})
       curves[strategyName(strategy)] = curveOf(input, strategy, samples, arguments, progress);

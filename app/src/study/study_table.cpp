@@ -7,7 +7,6 @@
 #include <set>
 
 #include "console/interrupt.h"
-#include "console/long_work.h"
 #include "console/version.h"
 #include "construction/build_field.h"
 #include "files/html_page.h"
@@ -70,11 +69,9 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
   const std::string surface = arguments.texts("mesh")[mesh];
   const Arguments buildArgs = buildArguments(session, arguments, mesh);
   BuiltField built = buildField(session.console(), surface, buildArgs);
-  const SampleOptions sampling = sampleOptions(arguments, buildArgs.whole("threads"));
-  const ExactSamples samples = withProgress(session.console(), [&](const Progress& progress) {
-    return sampleUniform(*built.exact, built.field.domain(), 0, sampling, progress);
-  });
-  ErrorFigures error = measureError(built.field, samples, sampling.threads);
+  const int threads = buildArgs.whole("threads");
+  const ExactSamples samples = exactSamples(session.console(), arguments, *built.exact, built.field.domain(), threads);
+  ErrorFigures error = measureError(built.field, samples, threads);
   FieldStatistics figures = statistics(built.field);
   return {surface, name, std::move(built.field), std::move(figures), built.seconds, std::move(error)};
 }
