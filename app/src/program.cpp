@@ -12,7 +12,7 @@
 #include "console/version.h"
 #include "hpsdf/error.h"
 #include "language/help.h"
-#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -21,35 +21,19 @@
 #include <vector>
 
 #include "batch/batch_list.h"
+#include "cli_fixture.h"
 #include "files/text_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "language/script.h"
-#include "started_program.h"
-#include "support/temporary_directory.h"
 
 namespace hpsdf::app {
 namespace {
 
-namespace fs = std::filesystem;
-using Json = nlohmann::json;
-using started::Call;
-using started::lineCount;
-using started::namesIn;
-using started::Process;
-using started::readFile;
-using started::run;
-using started::writeFile;
-using testing::AllOf;
+using namespace cli;
 using testing::Contains;
 using testing::Each;
-using testing::ElementsAre;
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Not;
 using testing::SizeIs;
-using testing::StartsWith;
 
 std::vector<std::string> surfacesIn(std::string_view list) {
   std::vector<std::string> surfaces;

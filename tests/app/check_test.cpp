@@ -1,4 +1,6 @@
 // Tests `hpsdf check` and `hpsdf accept` on small folders: each kind of failure must be found and named.
+#include "check/check.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +13,6 @@
 #include <vector>
 
 #include "check/baseline.h"
-#include "check/check_page.h"
 #include "files/data_table.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/image.h"

@@ -1,6 +1,8 @@
 #include "batch/batch.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -18,7 +20,6 @@
 #include <vector>
 
 #include "batch/batch_list.h"
-#include "batch/file_locks.h"
 #include "console/console.h"
 #include "console/error_text.h"
 #include "console/failed.h"
@@ -32,10 +33,8 @@
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
-#include "language/script.h"
 #include "session/field_summary.h"
 #include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -97,31 +96,79 @@ Json givenNames(const Arguments& arguments) {
   return names;
 }
 
-Json optionsJson(const Arguments& arguments) {
-  Json options = Json::array();
-  std::istringstream lines(decidingArguments(arguments));
-  for (std::string line; std::getline(lines, line);) options.push_back(line);
-  return options;
+Json linesJson(const std::string& text) {
+  Json list = Json::array();
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) list.push_back(line);
+  return list;
 }
 
-/// An empty file that exists while a process builds a field. It remains where the process dies.
-class BuildMark {
+/// To be called before `errno` changes.
+Error cannotWrite(const fs::path& file) {
+  return Error(ErrorKind::file, file.string(),
+               fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
+}
+
+/// Divides numbered pieces of work among processes that share a file. A lock is a record lock on one byte of the file,
+/// whose offset follows from the number; the byte need not exist. The system releases the locks when a process ends,
+/// however it ends. The file is empty and must never be removed: processes that open its successor would not see the
+/// locks on it.
+class FileLocks {
  public:
+  /// Creates the file where it does not exist. Throws `Error` where it cannot be written. A process must have one
+  /// object a file: record locks belong to the process, and closing the file anywhere in it releases all of them.
+  explicit FileLocks(fs::path file)
+      : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0) throw cannotWrite(file_);
+  }
+  ~FileLocks() { close(descriptor_); }
+  FileLocks(const FileLocks&) = delete;
+  FileLocks& operator=(const FileLocks&) = delete;
+
+  /// Returns false where another process has this piece of work. Throws `Error` where the file system does not support
+  /// locks.
+  bool take(std::uint64_t number) const {
+    if (change(number, F_WRLCK)) return true;
+    if (errno == EACCES || errno == EAGAIN) return false;
+    throw Error(
+        fmt::format("{}: cannot be locked ({}), so that processes cannot share the work; name a folder on a "
+                    "file system with locks",
+                    file_.string(), std::strerror(errno)));
+  }
+
+  void release(std::uint64_t number) const { change(number, F_UNLCK); }
+
+ private:
+  bool change(std::uint64_t number, short type) const {
+    struct flock range = {};
+    range.l_type = type;
+    range.l_whence = SEEK_SET;
+    range.l_start = static_cast<off_t>(number >> 2);  // file servers differ in their largest offsets
+    range.l_len = 1;
+    for (;;) {
+      if (fcntl(descriptor_, F_SETLK, &range) == 0) return true;
+      if (errno != EINTR) return false;
+    }
+  }
+
+  fs::path file_;
+  int descriptor_;
+};
+
+/// An empty file that exists while a process builds a field. It remains where the process dies.
+struct BuildMark {
   /// Throws `Error` where the file cannot be written, because the death of the process would leave no trace then.
-  explicit BuildMark(fs::path file) : file_(std::move(file)) {
-    if (!std::ofstream(file_))
-      throw Error(fmt::format("{}: cannot be written ({}); check the folder's permissions", file_.string(),
-                              std::strerror(errno)));
+  explicit BuildMark(fs::path path) : file(std::move(path)) {
+    if (!std::ofstream(file)) throw cannotWrite(file);
   }
   ~BuildMark() {
     std::error_code ignored;
-    fs::remove(file_, ignored);
+    fs::remove(file, ignored);
   }
   BuildMark(const BuildMark&) = delete;
   BuildMark& operator=(const BuildMark&) = delete;
 
- private:
-  fs::path file_;
+  fs::path file;
 };
 
 class Batch {
@@ -133,7 +180,7 @@ class Batch {
         meshes_(meshes),
         folder_(folder),
         ownFolder_(folder / kOwnFolder),
-        claims_(ownFolder_ / "claims") {}
+        locks_(ownFolder_ / "claims") {}
 
   void run() {
     const auto start = std::chrono::steady_clock::now();
@@ -158,6 +205,7 @@ class Batch {
     Status status;
     std::optional<CurrentField> field = {};
     std::string error = {};
+    bool errorNamesMesh = false;
   };
 
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
@@ -170,14 +218,12 @@ class Batch {
     std::vector<const BatchMesh*> remaining;
     for (const BatchMesh& mesh : meshes_) remaining.push_back(&mesh);
     for (bool again = false; !remaining.empty(); again = true) {
-      std::vector<const BatchMesh*> busy;
-      for (const BatchMesh* mesh : remaining)
-        if (!attempt(*mesh, again)) busy.push_back(mesh);
-      if (!again && !busy.empty())
-        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are building", busy.size(),
+      const std::size_t finished =
+          std::erase_if(remaining, [&](const BatchMesh* mesh) { return attempt(*mesh, again); });
+      if (!again && !remaining.empty())
+        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are building", remaining.size(),
                                    meshes_.size()));
-      if (again && busy.size() == remaining.size()) std::this_thread::sleep_for(kPollInterval);
-      remaining = std::move(busy);
+      if (again && finished == 0) std::this_thread::sleep_for(kPollInterval);
     }
   }
 
@@ -185,14 +231,14 @@ class Batch {
   bool attempt(const BatchMesh& mesh, bool again) {
     if (InterruptGuard::interrupted() || (console_.listener != nullptr && console_.listener->wantsCancel()))
       throw Cancelled();
-    const std::optional<Claim> claim = claims_.take(mesh.number);
-    if (!claim) return false;
+    if (!locks_.take(mesh.number)) return false;
     console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), printable(mesh.surface));
     const auto start = std::chrono::steady_clock::now();
     const Made made = make(mesh, again);
     ++done_;
     ++counts_[std::size_t(made.status)];
     report(mesh, made, secondsSince(start));
+    locks_.release(mesh.number);
     return true;
   }
 
@@ -207,7 +253,8 @@ class Batch {
     } catch (const Cancelled&) {
       throw;
     } catch (const std::exception& error) {
-      return {Status::failed, {}, errorText(error)};
+      const auto* known = dynamic_cast<const Error*>(&error);
+      return {Status::failed, {}, printable(errorText(error)), known != nullptr && known->subject() == mesh.surface};
     }
   }
 
@@ -225,7 +272,7 @@ class Batch {
     }
   }
 
-  /// Removes files that a dead process left half-written. This process holds the claim, so that the author of a mark
+  /// Removes files that a dead process left half-written. This process holds the lock, so that the author of a mark
   /// has died, on whatever machine. Without a mark there are no such files, and the folder need not be searched.
   void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
@@ -263,20 +310,19 @@ class Batch {
   /// Returns the record of the field that is in the folder, as the present options would produce it. The record is kept
   /// beside the field and compared as a whole; the field's checksum ties both together.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
-    std::ostringstream text;
-    printJson(text, {{"program", versionText()},
+    return jsonText({{"program", versionText()},
                      {"mesh", mesh.surface},
                      {"content", content},
-                     {"options", optionsJson(arguments_)},
+                     {"options", linesJson(decidingArguments(arguments_))},
                      {"given", givenNames(arguments_)},
                      {"field", checksumOf(outputOf(mesh))}});
-    return std::move(text).str();
   }
 
   void report(const BatchMesh& mesh, const Made& made, double seconds) const {
     const std::string position = fmt::format("{} of {}", done_, meshes_.size()), name = printable(mesh.surface);
     if (made.status == Status::failed) {
-      console_.err << fmt::format("hpsdf: error: {}: {}\n", position, withSubject(name, printable(made.error)));
+      console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, made.errorNamesMesh ? "" : name + ": ",
+                                  made.error);
     } else {
       console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, name, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
@@ -300,7 +346,7 @@ class Batch {
             {"file_bytes", value("file_bytes")},
             {"rms_estimate", value("rms_estimate")},
             {"sign", made.field ? field.at("mesh").at("sign") : Json()},
-            {"error", made.status == Status::failed ? Json(printable(made.error)) : Json()}};
+            {"error", made.status == Status::failed ? Json(made.error) : Json()}};
   }
 
   Console console_;
@@ -308,7 +354,7 @@ class Batch {
   const std::vector<BatchMesh>& meshes_;
   fs::path folder_;
   fs::path ownFolder_;
-  FileLocks claims_;
+  FileLocks locks_;
   std::size_t done_ = 0;
   std::array<std::size_t, 4> counts_{};  // number of meshes for each `Status`
 };

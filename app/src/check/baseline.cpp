@@ -4,11 +4,8 @@
 
 #include "files/data_table.h"
 #include "files/text_file.h"
-#include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
-#include "language/script.h"
 #include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -67,9 +64,7 @@ void saveFacts(const BaselineFacts& facts, const std::filesystem::path& baseline
   Json json = {{"size", facts.size}, {"renderer", facts.renderer}, {"version", facts.version}};
   if (facts.budget) json["budget"] = *facts.budget;
   if (facts.bound) json["bound"] = *facts.bound;
-  OutputFile out(factsFile(baseline));
-  out.write(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  out.commit();
+  writeTextFile(factsFile(baseline), jsonText(json));
 }
 
 bool isComparable(const std::filesystem::path& file) { return lowerExtension(file) == ".png" || isDataFile(file); }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <set>
 #include <sstream>
@@ -31,43 +32,31 @@ void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) 
   item.problem = problem;
 }
 
-std::string colorText(const render::Color& color) {
-  return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
-}
-
-void makeParentFolder(const fs::path& file) { fs::create_directories(file.parent_path()); }
-
-void describeDifference(CheckedItem& item, const render::Image& baseline, const render::Image& actual) {
-  for (const render::PixelDifference& pixel : render::worstPixels(baseline, actual, kWorstPixels))
-    item.worst.push_back({fmt::format("x {}, y {}", pixel.x, pixel.y), colorText(pixel.baseline),
-                          colorText(pixel.actual), std::to_string(pixel.difference)});
-  makeParentFolder(item.difference);
-  savePng(render::differencePicture(baseline, actual), item.difference);
+/// Notes how many pixels or values differ, and the verdict unless `problem` is empty.
+void takeComparison(CheckedItem& item, const auto& comparison, bool sameShape, const std::string& problem) {
+  item.compared = comparison.compared;
+  item.differing = comparison.differing;
+  item.largest = comparison.largest;
+  if (!problem.empty()) setVerdict(item, sameShape ? Verdict::differs : Verdict::otherSize, problem);
 }
 
 void judgePicture(CheckedItem& item) {
   const render::Image baseline = render::loadPng(item.baseline);
   const render::Image actual = render::loadPng(item.actual);
   const render::Comparison comparison = render::compare(baseline, actual);
-  item.compared = comparison.compared;
-  item.differing = comparison.differing;
-  item.largest = comparison.largest;
-  const std::string problem = render::problem(comparison, item.budget);
-  if (problem.empty()) return;
-  setVerdict(item, comparison.sameSize() ? Verdict::differs : Verdict::otherSize, problem);
-  if (comparison.sameSize() && !item.difference.empty()) describeDifference(item, baseline, actual);
+  takeComparison(item, comparison, comparison.sameSize(), render::problem(comparison, item.budget));
+  if (item.verdict != Verdict::differs || item.difference.empty()) return;
+  for (const render::PixelDifference& pixel : render::worstPixels(baseline, actual, kWorstPixels))
+    item.worst.push_back({fmt::format("x {}, y {}", pixel.x, pixel.y), colorText(pixel.baseline),
+                          colorText(pixel.actual), std::to_string(pixel.difference)});
+  fs::create_directories(item.difference.parent_path());
+  savePng(render::differencePicture(baseline, actual), item.difference);
 }
 
 void judgeData(CheckedItem& item, double bound) {
-  item.difference.clear();
-  const DataTable baseline = loadData(item.baseline);
-  const DataComparison comparison = compare(baseline, loadData(item.actual), bound);
-  item.compared = comparison.compared;
-  item.differing = comparison.differing;
-  item.largest = comparison.largest;
-  const std::string problem = app::problem(comparison, bound, item.budget);
-  if (problem.empty()) return;
-  setVerdict(item, comparison.sameShape ? Verdict::differs : Verdict::otherSize, problem);
+  const DataComparison comparison = compare(loadData(item.baseline), loadData(item.actual), bound);
+  takeComparison(item, comparison, comparison.sameShape, problem(comparison, bound, item.budget));
+  if (item.verdict == Verdict::passed) return;
   for (const DataDifference& worst : comparison.worst)
     item.worst.push_back({fmt::format("row {}, column {}", worst.row + 1, worst.column + 1),
                           fmt::format("{}", worst.baseline), fmt::format("{}", worst.actual),
@@ -151,18 +140,15 @@ class ScriptCheck {
   std::vector<CheckedItem> run(const Registry& registry, const Console& console) {
     fs::create_directories(actual_);
     bool completed = true;
-    const auto brokenOff = [&](Verdict verdict, const Error& error) {
-      completed = false;
-      CheckedItem item{.script = name_, .where = file_};
-      setVerdict(item, verdict, error.what());
-      items_.push_back(item);
-    };
     try {
       runCalls(registry, console);
-    } catch (const Failed& failed) {
-      brokenOff(Verdict::expected, failed);
     } catch (const Error& error) {
-      brokenOff(Verdict::scriptFailed, error);
+      completed = false;
+      const bool isExpectation = dynamic_cast<const Failed*>(&error) != nullptr;
+      items_.push_back({.script = name_,
+                        .verdict = isExpectation ? Verdict::expected : Verdict::scriptFailed,
+                        .problem = error.what(),
+                        .where = file_});
     }
     judgePictures(completed);
     return std::move(items_);
@@ -235,21 +221,20 @@ class ScriptCheck {
 
   /// Compares the files that were written, and, if the script completed, those that have a baseline.
   void judgePictures(bool completed) {
-    const std::vector<CheckedItem> others = std::exchange(items_, {});
+    std::vector<CheckedItem> judged;
     std::set<std::string> pictures = comparableFiles(actual_);
     if (completed) pictures.merge(comparableFiles(baselines_));
     for (const std::string& picture : pictures) {
-      CheckedItem item{.script = name_,
-                       .picture = picture,
-                       .renderer = origins_[picture].renderer,
-                       .where = origins_[picture].where,
-                       .baseline = baselines_ / picture,
-                       .actual = actual_ / picture,
-                       .difference = request_.output / "difference" / name_ / picture};
-      judge(item);
-      items_.push_back(item);
+      judged.push_back({.script = name_,
+                        .picture = picture,
+                        .renderer = origins_[picture].renderer,
+                        .where = origins_[picture].where,
+                        .baseline = baselines_ / picture,
+                        .actual = actual_ / picture,
+                        .difference = request_.output / "difference" / name_ / picture});
+      judge(judged.back());
     }
-    items_.insert(items_.end(), others.begin(), others.end());
+    items_.insert(items_.begin(), judged.begin(), judged.end());
     if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // a script without pictures is listed too
   }
 
@@ -310,29 +295,17 @@ void prepareOutput(const fs::path& path) {
 }  // namespace
 
 std::string verdictText(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::passed:
-      return "ok";
-    case Verdict::differs:
-      return "differs";
-    case Verdict::otherSize:
-      return "another size";
-    case Verdict::noBaseline:
-      return "no baseline";
-    case Verdict::noPicture:
-      return "no picture";
-    case Verdict::unreadable:
-      return "unreadable";
-    case Verdict::expected:
-      return "expected otherwise";
-    case Verdict::scriptFailed:
-      return "script failed";
-    case Verdict::notNoticed:
-      return "wrong, not noticed";
-    case Verdict::otherReason:
-      break;
-  }
-  return "wrong otherwise";
+  constexpr std::array kTexts = {"ok",
+                                 "differs",
+                                 "another size",
+                                 "no baseline",
+                                 "no picture",
+                                 "unreadable",
+                                 "expected otherwise",
+                                 "script failed",
+                                 "wrong, not noticed",
+                                 "wrong otherwise"};
+  return kTexts[std::size_t(verdict)];
 }
 
 std::string CheckedItem::pictureText() const {

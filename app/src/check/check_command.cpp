@@ -6,7 +6,6 @@
 
 #include "check/baseline.h"
 #include "check/check.h"
-#include "check/check_page.h"
 #include "console/failed.h"
 #include "console/version.h"
 #include "files/data_table.h"
@@ -71,20 +70,6 @@ std::string tableText(const CheckOutcome& outcome) {
   return text;
 }
 
-std::string checkCommandLine(const CheckRequest& request) {
-  std::string line = "hpsdf check " + shellWord(request.folder.string());
-  for (const auto& [name, value] : request.variables) line += " " + shellWord(name + "=" + value);
-  return line + " --out " + shellWord(request.output.string());
-}
-
-CheckPage checkPage(const CheckRequest& request) {
-  return {.title = "Check of " + request.folder.string(),
-          .checkCommand = checkCommandLine(request),
-          .acceptCommand = fmt::format("hpsdf accept {} --from {}", shellWord(request.folder.string()),
-                                       shellWord(request.output.string())),
-          .footer = versionText()};
-}
-
 void refuseInScripts(const Session& session, const char* verb) {
   if (session.scriptDepth > 0) throw Error(fmt::format("{}: is for the command line; a script cannot run it", verb));
 }
@@ -99,9 +84,9 @@ void runCheck(Session& session, const Arguments& arguments) {
   const CheckOutcome outcome = check(session.registry(), session.console(), request);
   const Json json = outcomeJson(outcome, request);
   const fs::path page = request.output / "index.html";
-  writeTextFile(page, checkHtml(outcome, checkPage(request)));
+  writeTextFile(page, checkHtml(outcome, request));
   if (!request.junit.empty()) writeTextFile(request.junit, junitXml(outcome));
-  writeTextFile(request.output / kCheckResults, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  writeTextFile(request.output / kCheckResults, jsonText(json));
   std::ostream& out = session.console().out;
   if (session.wantsJson(arguments))
     printJson(out, json);
@@ -128,31 +113,18 @@ Json lastResults(const fs::path& folder, const fs::path& from) {
   return json;
 }
 
-struct Candidate {
-  std::string name = {};  ///< SCRIPT/PICTURE
-  std::string script = {};
-  std::string picture = {};
-  std::string renderer = {};
-};
-
-/// Lists the results of the last check's scripts, without negative controls.
-std::vector<Candidate> candidates(const Json& results, const fs::path& from) {
-  std::vector<Candidate> found;
-  for (const Json& item : results.at("items")) {
-    if (!item.at("control_line").is_null()) continue;
-    Candidate candidate{.script = item.at("script"), .picture = item.at("picture"), .renderer = item.at("renderer")};
-    candidate.name = candidate.script + "/" + candidate.picture;
-    const bool written = fs::is_regular_file(from / "actual" / candidate.script / candidate.picture);
-    if (written) found.push_back(std::move(candidate));
-  }
-  return found;
+std::string nameOf(const Json& item) {
+  return item.at("script").get<std::string>() + "/" + item.at("picture").get<std::string>();
 }
 
-const Candidate& candidate(const std::vector<Candidate>& all, const std::string& name) {
-  const auto found = std::ranges::find(all, name, &Candidate::name);
-  if (found != all.end()) return *found;
+/// Returns the result of the last check's scripts that has this name, SCRIPT/PICTURE. Negative controls have none.
+Json resultNamed(const std::string& name, const Json& results, const fs::path& from) {
   std::vector<std::string> names;
-  for (const Candidate& other : all) names.push_back(other.name);
+  for (const Json& item : results.at("items")) {
+    if (!item.at("control_line").is_null() || !fs::is_regular_file(from / "actual" / nameOf(item))) continue;
+    names.push_back(nameOf(item));
+    if (names.back() == name) return item;
+  }
   throw Error(fmt::format("the last check wrote no picture '{}'; {}", name,
                           suggestion(name, names, "expected SCRIPT/PICTURE.png")));
 }
@@ -166,27 +138,22 @@ std::array<std::size_t, 2> sizeOf(const fs::path& file) {
   return {std::size_t(image.width), std::size_t(image.height)};
 }
 
-/// Reads the description of the existing baseline; returns nothing where there is no baseline or no description.
-std::optional<BaselineFacts> olderFacts(const fs::path& baseline) {
-  if (!fs::exists(baseline) || !fs::exists(factsFile(baseline))) return std::nullopt;
-  return loadFacts(baseline);
-}
-
-Json acceptOne(const Candidate& taken, const fs::path& folder, const fs::path& from, const Arguments& arguments) {
-  const fs::path actual = from / "actual" / taken.script / taken.picture;
-  const fs::path baseline = folder / "baselines" / taken.script / taken.picture;
-  const auto older = olderFacts(baseline);
-  BaselineFacts facts{.size = sizeOf(actual), .renderer = taken.renderer, .version = versionText()};
-  if (older) facts.budget = older->budget;
-  if (older) facts.bound = older->bound;
+Json acceptOne(const Json& item, const fs::path& folder, const fs::path& from, const Arguments& arguments) {
+  const fs::path actual = from / "actual" / nameOf(item), baseline = folder / "baselines" / nameOf(item);
+  std::optional<BaselineFacts> older;  // nothing where there is no baseline, or no description of it
+  if (fs::exists(baseline) && fs::exists(factsFile(baseline))) older = loadFacts(baseline);
+  BaselineFacts facts = older.value_or(BaselineFacts{});
+  facts.size = sizeOf(actual);
+  facts.renderer = item.at("renderer");
+  facts.version = versionText();
   if (arguments.given("budget")) facts.budget = arguments.number("budget");
   if (arguments.given("bound")) facts.bound = arguments.number("bound");
   fs::create_directories(baseline.parent_path());
   writeTextFile(baseline, readWholeFile(actual.string()));
   saveFacts(facts, baseline);
-  return {{"name", taken.name},
+  return {{"name", nameOf(item)},
           {"baseline", baseline.string()},
-          {"renderer", taken.renderer},
+          {"renderer", facts.renderer},
           {"renderer_before", older ? Json(older->renderer) : Json()}};
 }
 
@@ -202,11 +169,11 @@ void runAccept(Session& session, const Arguments& arguments) {
   refuseInScripts(session, "accept");
   const fs::path folder = arguments.text("folder");
   const fs::path from = arguments.text("from");
-  const auto all = candidates(lastResults(folder, from), from);
-  std::vector<Candidate> taken;  // all names are known before the first is written
-  for (const std::string& name : arguments.texts("names")) taken.push_back(candidate(all, name));
+  const Json results = lastResults(folder, from);
+  std::vector<Json> taken;  // all names are known before the first is written
+  for (const std::string& name : arguments.texts("names")) taken.push_back(resultNamed(name, results, from));
   Json accepted = Json::array();
-  for (const Candidate& one : taken) accepted.push_back(acceptOne(one, folder, from, arguments));
+  for (const Json& item : taken) accepted.push_back(acceptOne(item, folder, from, arguments));
   if (session.wantsJson(arguments)) return printJson(session.console().out, accepted);
   for (const Json& one : accepted) session.console().out << acceptedText(one);
 }

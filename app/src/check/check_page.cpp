@@ -1,12 +1,9 @@
-#include "check/check_page.h"
-
 #include <fmt/format.h>
 
-#include <cstdint>
-
+#include "check/check.h"
+#include "console/version.h"
 #include "files/html_page.h"
 #include "files/text_file.h"
-#include "language/script.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -91,11 +88,6 @@ std::string worstDifferences(const CheckedItem& item) {
   return html + "</table>\n";
 }
 
-std::string fact(const std::string& name, const std::string& value) {
-  if (value.empty()) return {};
-  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", name, htmlEscaped(value));
-}
-
 std::string shareText(const CheckedItem& item) {
   if (item.compared == 0) return {};
   return fmt::format("{} of {} ({:.3g} %), of which {:.3g} % are free; the largest difference is {:.3g}",
@@ -103,18 +95,31 @@ std::string shareText(const CheckedItem& item) {
                      100 * double(item.differing) / double(item.compared), 100 * item.budget, item.largest);
 }
 
-std::string failure(const CheckedItem& item, const CheckPage& page) {
+/// The command that repeats the check, without --only.
+std::string checkCommand(const CheckRequest& request) {
+  std::string line = "hpsdf check " + shellWord(request.folder.string());
+  for (const auto& [name, value] : request.variables) line += " " + shellWord(name + "=" + value);
+  return line + " --out " + shellWord(request.output.string());
+}
+
+std::string failure(const CheckedItem& item, const CheckRequest& request) {
   std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
                                  verdictText(item.verdict), htmlEscaped(item.problem));
   html += pictures(item) + worstDifferences(item);
-  html += "<table>\n" + fact("Differing", shareText(item)) + fact("Written by", item.where) +
-          fact("Renderer of the baseline", item.baselineRenderer) + fact("Renderer now", item.renderer) + "</table>\n";
-  html +=
-      fmt::format("<code>{} --only {}</code>\n", htmlEscaped(page.checkCommand), htmlEscaped(shellWord(item.script)));
+  const std::pair<const char*, std::string> facts[] = {{"Differing", shareText(item)},
+                                                       {"Written by", item.where},
+                                                       {"Renderer of the baseline", item.baselineRenderer},
+                                                       {"Renderer now", item.renderer}};
+  html += "<table>\n";
+  for (const auto& [name, value] : facts)
+    if (!value.empty()) html += htmlFact(name, value);
+  html += fmt::format("</table>\n<code>{} --only {}</code>\n", htmlEscaped(checkCommand(request)),
+                      htmlEscaped(shellWord(item.script)));
   const bool canBeAccepted = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
   if (canBeAccepted)
-    html += fmt::format("<p>If it is right now:</p>\n<code>{} {}</code>\n", htmlEscaped(page.acceptCommand),
-                        htmlEscaped(shellWord(item.name())));
+    html += fmt::format("<p>If it is right now:</p>\n<code>{}</code>\n",
+                        htmlEscaped(fmt::format("hpsdf accept {} --from {} {}", shellWord(request.folder.string()),
+                                                shellWord(request.output.string()), shellWord(item.name()))));
   return html;
 }
 
@@ -150,17 +155,17 @@ std::string junitCase(const CheckedItem& item) {
 
 }  // namespace
 
-std::string checkHtml(const CheckOutcome& outcome, const CheckPage& page) {
+std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) {
   const std::size_t failures = outcome.failures();
   const std::string subtitle = failures == 0
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
-  std::string html = htmlHead(page.title, subtitle, kCheckStyle);
+  std::string html = htmlHead("Check of " + request.folder.string(), subtitle, kCheckStyle);
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
-  html += fmt::format("<code>{}</code>\n", htmlEscaped(page.checkCommand));
+  html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)
-    if (item.verdict != Verdict::passed) html += failure(item, page);
-  return html + std::string(kScript) + htmlFoot(page.footer);
+    if (item.verdict != Verdict::passed) html += failure(item, request);
+  return html + std::string(kScript) + htmlFoot(versionText());
 }
 
 std::string junitXml(const CheckOutcome& outcome) {

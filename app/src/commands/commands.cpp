@@ -1,12 +1,6 @@
 #include "commands/commands.h"
 
 #include "check/check_command.h"
-#include "commands/export_command.h"
-#include "commands/field_commands.h"
-#include "commands/jumps_command.h"
-#include "commands/probe_command.h"
-#include "commands/tool_commands.h"
-#include "commands/verify_command.h"
 #include "explorer/explorer_commands.h"
 #include "explorer/ui_command.h"
 #include "language/help.h"

@@ -1,9 +1,8 @@
-#include "commands/export_command.h"
-
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"

@@ -1,11 +1,10 @@
-#include "commands/field_commands.h"
-
 #include <fmt/format.h>
 
 #include <chrono>
 #include <fstream>
 
 #include "batch/batch.h"
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
@@ -14,6 +13,7 @@
 #include "construction/build_field.h"
 #include "construction/mesh_summary.h"
 #include "construction/reference_surface.h"
+#include "files/text_file.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
@@ -50,11 +50,25 @@ Json madeJson(const Session& session, const Arguments& arguments) {
   return json;
 }
 
-/// Replaces the current field by another form of it and saves that where an output is given.
-void changeCurrent(Session& session, const Arguments& arguments, Field field) {
+/// Replaces the current field by another form of it, saves that where an output is given, and reports it: with
+/// `figures` as JSON, else by the text that textOf(field) returns.
+void changeCurrent(Session& session, const Arguments& arguments, Field field, const Json& figures, const auto& textOf) {
   const CurrentField& before = session.current();
   session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});
   saveMade(session, arguments);
+  std::ostream& out = session.console().out;
+  if (!session.wantsJson(arguments)) {
+    out << fmt::format("{}: {}\n", session.current().name, textOf(session.current().field));
+    return;
+  }
+  Json json = madeJson(session, arguments);
+  json.update(figures);
+  printJson(out, json);
+}
+
+std::string estimateText(const Field& field) {
+  return fmt::format("estimated RMS error {}{}", shortNumber(field.metadata().rmsEstimate(field.domain())),
+                     unitText(field));
 }
 
 /// Returns the file of the checkpoint, or an empty path where none was asked for.
@@ -113,9 +127,8 @@ void runBuild(Session& session, const Arguments& arguments) {
   }
   if (built.mesh) console.out << meshText(surface, *built.mesh);
   const Field& field = session.current().field;
-  console.out << fmt::format("{}{} in {:.1f} s, estimated RMS error {}{}\n",
-                             arguments.has("output") ? arguments.text("output") + ": " : "", fieldLine(field),
-                             built.seconds, shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
+  console.out << fmt::format("{}{} in {:.1f} s, {}\n", arguments.has("output") ? arguments.text("output") + ": " : "",
+                             fieldLine(field), built.seconds, estimateText(field));
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -142,23 +155,21 @@ void runQuery(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   std::ifstream file;
   const bool fromFile = arguments.has("points") && arguments.text("points") != "-";
-  if (fromFile) file = openPoints(arguments.text("points"));
+  if (fromFile) file = openFile(arguments.text("points"), "a file of points");
   std::istream& in = fromFile ? static_cast<std::istream&>(file) : session.console().in;
   const std::string name = fromFile ? arguments.text("points") : "stdin";
   const PointFormat format = session.wantsJson(arguments) ? PointFormat::json : PointFormat::csv;
   const Field& field = session.current().field;
-  if (!arguments.has("output")) {
+  std::optional<OutputFile> output;
+  if (arguments.has("output")) output.emplace(arguments.text("output"));
+  const std::size_t count = queryPoints(field, in, name, format, [&](std::string_view text) {
+    if (output) return output->write(text);
     std::ostream& out = session.console().out;
-    queryPoints(field, in, name, format, [&out](std::string_view text) {
-      out.write(text.data(), static_cast<std::streamsize>(text.size()));
-      out.flush();
-      requireWritten(out);
-    });
-    return;
-  }
-  OutputFile out(arguments.text("output"));
-  const std::size_t count = queryPoints(field, in, name, format, [&out](std::string_view text) { out.write(text); });
-  out.commit();
+    out << text << std::flush;
+    requireWritten(out);
+  });
+  if (!output) return;
+  output->commit();
   session.console().err << fmt::format("{}: {} points\n", arguments.text("output"), grouped(count));
 }
 
@@ -168,36 +179,29 @@ void runSmooth(Session& session, const Arguments& arguments) {
   if (session.current().field.metadata().settings.continuityWeight)
     throw Error(session.current().name +
                 ": is weakly continuous already; smooth the original field, or build it again");
-  const Console& console = session.console();
   const InterruptGuard guard;  // the file is written completely or not at all
   const auto start = std::chrono::steady_clock::now();
-  WeaklyContinuous made = withProgress(console, [&](const Progress& progress) {
+  WeaklyContinuous made = withProgress(session.console(), [&](const Progress& progress) {
     return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
                             arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  changeCurrent(session, arguments, std::move(made.field));
-  if (session.wantsJson(arguments)) {
-    Json json = madeJson(session, arguments);
-    json["change"] = made.change;
-    json["iterations"] = made.iterations;
-    json["seconds"] = seconds;
-    return printJson(console.out, json);
-  }
-  const Field& field = session.current().field;
-  console.out << fmt::format("{}: changed by {} RMS in {} iterations, {:.1f} s; estimated RMS error {}{}\n",
-                             session.current().name, shortNumber(made.change), made.iterations, seconds,
-                             shortNumber(field.metadata().rmsEstimate(field.domain())), unitText(field));
+  changeCurrent(session, arguments, std::move(made.field),
+                {{"change", made.change}, {"iterations", made.iterations}, {"seconds", seconds}},
+                [&](const Field& field) {
+                  return fmt::format("changed by {} RMS in {} iterations, {:.1f} s; {}", shortNumber(made.change),
+                                     made.iterations, seconds, estimateText(field));
+                });
 }
 
 void runBlend(Session& session, const Arguments& arguments) {
   checkFieldOutput(arguments);
   useField(session, arguments);
   const InterruptGuard guard;  // the file is written completely or not at all
-  changeCurrent(session, arguments, blended(session.current().field, arguments.number("width")));
-  if (session.wantsJson(arguments)) return printJson(session.console().out, madeJson(session, arguments));
-  session.console().out << fmt::format("{}: {}, blended within {} of an edge from faces\n", session.current().name,
-                                       fieldLine(session.current().field), arguments.number("width"));
+  const double width = arguments.number("width");
+  changeCurrent(session, arguments, blended(session.current().field, width), Json::object(), [&](const Field& field) {
+    return fmt::format("{}, blended within {} of an edge from faces", fieldLine(field), width);
+  });
 }
 
 void runBounds(Session& session, const Arguments& arguments) {
@@ -215,13 +219,12 @@ void runBounds(Session& session, const Arguments& arguments) {
     return withBounds(from.field, *reference.distance, arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  changeCurrent(session, arguments, std::move(field));
-  Json json = madeJson(session, arguments);
-  json["seconds"] = seconds;
-  if (session.wantsJson(arguments)) return printJson(console.out, json);
-  console.out << fmt::format("{}: nowhere wrong by more than {}, in the median cell by {}; {:.1f} s\n",
-                             session.current().name, shortNumber(json["bounds"]["greatest"].get<double>()),
-                             shortNumber(json["bounds"]["median"].get<double>()), seconds);
+  changeCurrent(session, arguments, std::move(field), {{"seconds", seconds}}, [&](const Field& made) {
+    const Json bounds = boundsJson(made);
+    return fmt::format("nowhere wrong by more than {}, in the median cell by {}; {:.1f} s",
+                       shortNumber(bounds["greatest"].get<double>()), shortNumber(bounds["median"].get<double>()),
+                       seconds);
+  });
 }
 
 const Parameter kFieldOutput = {.name = "output",

@@ -1,9 +1,8 @@
-#include "commands/jumps_command.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/jumps.h"
@@ -24,6 +23,10 @@ JumpKind jumpKind(const Arguments& arguments) {
 std::string kindName(JumpKind kind) { return kind == JumpKind::value ? "value" : "gradient"; }
 
 Json jumpJson(const Jump& jump) { return {{"rms", jump.rms}, {"max", jump.max}}; }
+
+std::string jumpText(const Jump& jump) {
+  return fmt::format("RMS {}, greatest {}", shortNumber(jump.rms), shortNumber(jump.max));
+}
 
 Json interfaceJson(const Interface& face) {
   return {{"cells", face.cells},
@@ -81,9 +84,8 @@ std::string histogramText(const Jumps& jumps, JumpKind kind) {
   std::string text = fmt::format("\n  {:<22} {:>8} {:>12}\n", kindName(kind) + " jump", "area", "interfaces");
   for (const Row& row : histogramRows(jumps, kind)) {
     const double share = row.bin.area / jumps.area;
-    std::string bar;
-    for (double length = 0; length < share * kBarLength; ++length) bar += "▇";
-    text += fmt::format("  {:<22} {:>6.2f} % {:>12}  {}\n", row.label, 100 * share, grouped(row.bin.interfaces), bar);
+    text += fmt::format("  {:<22} {:>6.2f} % {:>12}  {:▇<{}}\n", row.label, 100 * share, grouped(row.bin.interfaces),
+                        "", int(std::ceil(share * kBarLength)));
   }
   return text;
 }
@@ -106,10 +108,7 @@ std::string jumpsText(const std::string& name, const Jumps& jumps, JumpKind by, 
   std::string text = name + "\n";
   text += summaryRow("interfaces", fmt::format("{}, {} of them between cells of different size",
                                                grouped(jumps.interfaces.size()), grouped(jumps.hanging)));
-  text += summaryRow("value jump",
-                     fmt::format("RMS {}, greatest {}", shortNumber(jumps.value.rms), shortNumber(jumps.value.max)));
-  text += summaryRow("gradient jump", fmt::format("RMS {}, greatest {}", shortNumber(jumps.gradient.rms),
-                                                  shortNumber(jumps.gradient.max)));
+  text += summaryRow("value jump", jumpText(jumps.value)) + summaryRow("gradient jump", jumpText(jumps.gradient));
   if (jumps.interfaces.empty()) return text;
   text += histogramText(jumps, JumpKind::value) + histogramText(jumps, JumpKind::gradient);
   if (count > 0) text += worstText(jumps, by, count);

@@ -1,5 +1,3 @@
-#include "commands/mesh_command.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
@@ -19,7 +18,6 @@
 #include "construction/surface.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/sign_check.h"
-#include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_repair.h"
 #include "hpsdf/mesh_report.h"
@@ -27,7 +25,6 @@
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -44,26 +41,37 @@ constexpr std::array<KindNames, kDefectKinds> kKinds = {{{"boundary edges", "bou
                                                          {"pinched vertices", "pinched_vertices"},
                                                          {"self-intersections", "crossings"}}};
 
-struct Inspected {
-  ImportedMesh imported;
+/// The results of one call of the command.
+struct MeshResults {
+  std::string surface;
+  TriangleMesh mesh;
+  MeshReport report;
   MeshDefects defects = {};
   InsideTestChoice choice = {};
   std::optional<SignCheck> check = {};
+  std::optional<RepairedMesh> repairedMesh = {};
+  bool isDrawn = false;
 };
 
-Inspected inspected(Session& session, const Arguments& arguments) {
-  Inspected found{.imported = importSurface(session.console(), arguments.text("mesh"))};
-  const TriangleMesh& mesh = found.imported.mesh;
-  const auto distance = distanceTo(session.console(), mesh);
-  found.defects = findDefects(mesh, withProgress(session.console(), [&](const Progress& progress) {
+MeshResults inspected(Session& session, const Arguments& arguments) {
+  const Console& console = session.console();
+  const std::string surface = arguments.text("mesh");
+  auto [mesh, report] = importSurface(console, surface);
+  MeshResults found{.surface = surface, .mesh = std::move(mesh), .report = report};
+  const auto distance = distanceTo(console, found.mesh);
+  found.defects = findDefects(found.mesh, withProgress(console, [&](const Progress& progress) {
                                 return distance->crossings(kMaxCrossings, progress);
                               }));
   found.choice = distance->insideTestChoice();
   if (arguments.given("check-sign"))
-    found.check = withProgress(session.console(), [&](const Progress& progress) {
-      return checkSign(mesh, *distance, static_cast<std::size_t>(arguments.number("check-sign")),
+    found.check = withProgress(console, [&](const Progress& progress) {
+      return checkSign(found.mesh, *distance, static_cast<std::size_t>(arguments.number("check-sign")),
                        static_cast<std::uint64_t>(arguments.number("seed")), progress);
     });
+  if (arguments.given("repair")) {
+    found.repairedMesh = repaired({found.mesh, found.report});
+    saveMesh(found.repairedMesh->imported.mesh, arguments.text("repair"));
+  }
   return found;
 }
 
@@ -185,14 +193,14 @@ std::string repairText(const RepairedMesh& repairedMesh, const std::string& file
       fmt::format("reversed {} that faced inward", countOf(repairedMesh.reversedPatches, "patch", "patches")));
   add(report.reversed, "reversed the whole mesh");
   std::string text = summaryRow("repaired", done.empty() ? "nothing to do" : done);
-  if (repairedMesh.imported.report.inconsistentEdges > 0)
-    text += summaryRow("left", countOf(repairedMesh.imported.report.inconsistentEdges, "edge", "edges") +
-                                   " of surfaces that have one side only");
+  if (report.inconsistentEdges > 0)
+    text +=
+        summaryRow("left", countOf(report.inconsistentEdges, "edge", "edges") + " of surfaces that have one side only");
   return text + summaryRow("written", printable(file) + ": " + closednessText(report));
 }
 
 /// Draws the mesh with its defects into the file of the argument `picture`.
-void drawPicture(Session& session, const Arguments& arguments, const Inspected& found) {
+void drawPicture(Session& session, const Arguments& arguments, const MeshResults& found) {
   const render::SurfacePicture look = cameraPicture(arguments);
   render::MeshPicture picture{look.camera, look.width, look.height, look.samples, !arguments.given("camera")};
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
@@ -201,18 +209,7 @@ void drawPicture(Session& session, const Arguments& arguments, const Inspected& 
     session.setLastRenderer(renderer->description());
     return renderer;
   };
-  savePng(drawMesh(make, found.imported.mesh, found.defects, picture), arguments.text("picture"));
-}
-
-/// Draws the picture where one is asked for. Returns the error of a failed picture, which the caller throws after
-/// printing all other results.
-std::exception_ptr tryPicture(Session& session, const Arguments& arguments, const Inspected& found) {
-  try {
-    if (arguments.given("picture")) drawPicture(session, arguments, found);
-  } catch (const std::exception&) {
-    return std::current_exception();
-  }
-  return nullptr;
+  savePng(drawMesh(make, found.mesh, found.defects, picture), arguments.text("picture"));
 }
 
 void checkMesh(const Arguments& arguments) {
@@ -227,38 +224,26 @@ void checkMesh(const Arguments& arguments) {
   backend(arguments);
 }
 
-/// The results of one call of the command.
-struct MeshResults {
-  Inspected found;
-  std::optional<RepairedMesh> repairedMesh = {};
-  bool isDrawn = false;
-};
-
 Json resultsJson(const MeshResults& results, const Arguments& arguments) {
-  const Inspected& found = results.found;
-  const MeshReport& report = found.imported.report;
-  const std::string surface = arguments.text("mesh");
-  Json json = meshJson(surface, report);
-  json["coordinate_spacing"] = coordinateSpacing(surface, found.imported.mesh);
-  json["verdict"] = verdictJson(report, found.defects);
-  json["defects"] = defectsJson(found.defects, positionLimit(arguments, kPositionsInJson));
-  json["sign"] = {{"by", insideTestName(found.choice.insideTest)}, {"because", found.choice.reason}};
-  if (found.choice.position) json["sign"]["at"] = vectorJson(*found.choice.position);
-  if (found.check) json["sign_check"] = checkJson(*found.check);
+  Json json = meshJson(results.surface, results.report);
+  json["coordinate_spacing"] = coordinateSpacing(results.surface, results.mesh);
+  json["verdict"] = verdictJson(results.report, results.defects);
+  json["defects"] = defectsJson(results.defects, positionLimit(arguments, kPositionsInJson));
+  json["sign"] = {{"by", insideTestName(results.choice.insideTest)}, {"because", results.choice.reason}};
+  if (results.choice.position) json["sign"]["at"] = vectorJson(*results.choice.position);
+  if (results.check) json["sign_check"] = checkJson(*results.check);
   if (results.repairedMesh) json["repair"] = repairJson(*results.repairedMesh, arguments.text("repair"));
   if (results.isDrawn) json["picture"] = arguments.text("picture");
   return json;
 }
 
 std::string resultsText(const MeshResults& results, const Arguments& arguments) {
-  const Inspected& found = results.found;
-  const MeshReport& report = found.imported.report;
-  const std::string surface = arguments.text("mesh");
-  std::string text = meshText(printable(surface), report) + spacingText(surface, found.imported.mesh);
-  text += defectsText(found.defects, report.box, positionLimit(arguments, kPositionsInText));
-  text += summaryRow("verdict", verdictText(report, found.defects));
-  text += summaryRow("sign", insideTestName(found.choice.insideTest) + ": " + reasonText(found.choice, report.box));
-  if (found.check) text += checkText(*found.check);
+  const MeshReport& report = results.report;
+  std::string text = meshText(printable(results.surface), report) + spacingText(results.surface, results.mesh);
+  text += defectsText(results.defects, report.box, positionLimit(arguments, kPositionsInText));
+  text += summaryRow("verdict", verdictText(report, results.defects));
+  text += summaryRow("sign", insideTestName(results.choice.insideTest) + ": " + reasonText(results.choice, report.box));
+  if (results.check) text += checkText(*results.check);
   if (results.repairedMesh) text += repairText(*results.repairedMesh, arguments.text("repair"));
   if (results.isDrawn) text += summaryRow("picture", printable(arguments.text("picture")));
   return text;
@@ -267,21 +252,21 @@ std::string resultsText(const MeshResults& results, const Arguments& arguments) 
 void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
   if (arguments.given("picture")) checkWritable(arguments.text("picture"));
-  MeshResults results{.found = inspected(session, arguments)};
-  if (arguments.given("repair")) {
-    results.repairedMesh = repaired(results.found.imported);
-    saveMesh(results.repairedMesh->imported.mesh, arguments.text("repair"));
+  MeshResults results = inspected(session, arguments);
+  std::exception_ptr pictureError;  // is thrown after all other results are printed
+  try {
+    if (arguments.given("picture")) drawPicture(session, arguments, results);
+    results.isDrawn = arguments.given("picture");
+  } catch (const std::exception&) {
+    pictureError = std::current_exception();
   }
-  const std::exception_ptr pictureError = tryPicture(session, arguments, results.found);
-  results.isDrawn = arguments.given("picture") && !pictureError;
   if (session.wantsJson(arguments))
     printJson(session.console().out, resultsJson(results, arguments));
   else
     session.console().out << resultsText(results, arguments);
   if (pictureError) std::rethrow_exception(pictureError);
-  const std::optional<SignCheck>& check = results.found.check;
-  if (check && check->wrong > 0)
-    throw Failed(fmt::format("{}: {} of {} signs are wrong", arguments.text("mesh"), check->wrong, check->points));
+  if (const auto& check = results.check; check && check->wrong > 0)
+    throw Failed(fmt::format("{}: {} of {} signs are wrong", results.surface, check->wrong, check->points));
 }
 
 const Command kMesh = {

@@ -1,11 +1,10 @@
-#include "commands/probe_command.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "hpsdf/detail/line.h"
 #include "hpsdf/detail/output_file.h"
@@ -27,11 +26,16 @@ bool isPicture(const std::string& file) {
   return kind == ".png";
 }
 
+std::size_t cellCount(const Line& line) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }));
+}
+
 Line lineOf(const Field& field, const Arguments& arguments) {
   const Vector3 from = pointOf(arguments, "from"), to = pointOf(arguments, "to");
   if (from == to) throw Error(fmt::format("from and to are both {}: give two points", vectorText(from)));
   Line line = sampleLine(field, from, to, arguments.whole("samples"));
-  if (std::ranges::none_of(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }))
+  if (cellCount(line) == 0)
     throw Error(fmt::format("the line from {} to {} does not meet the field's domain, {}: give other points",
                             vectorText(from), vectorText(to), boxText(field.domain())));
   return line;
@@ -64,11 +68,6 @@ void writeTable(const Line& line, std::span<const double> exact, const std::stri
   out.commit();
 }
 
-std::size_t cellCount(const Line& line) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(line.pieces, [](const Piece& piece) { return piece.cell.has_value(); }));
-}
-
 LineJump greatestJump(const Line& line) {
   LineJump greatest{0, 0};
   for (const LineJump& jump : jumpsAlong(line))
@@ -96,8 +95,8 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
     if (!exact.empty()) json["greatest_error"] = greatestError(line, exact);
     return printJson(session.console().out, json);
   }
-  std::string text = fmt::format("{}: {} samples, {} {}", file, grouped(line.samples.size()), grouped(cells),
-                                 cells == 1 ? "cell" : "cells");
+  std::string text =
+      fmt::format("{}: {} samples, {}", file, grouped(line.samples.size()), countOf(cells, "cell", "cells"));
   if (jump.value != 0)
     text += fmt::format(", greatest jump {} at t = {:.4g}", shortNumber(std::abs(jump.value)), jump.t);
   if (!exact.empty()) text += fmt::format(", greatest error {}", shortNumber(greatestError(line, exact)));

@@ -1,21 +1,18 @@
-#include "commands/tool_commands.h"
-
+#include <assimp/version.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <fstream>
 #include <thread>
 
-#include "commands/mesh_command.h"
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
-#include "console/machine.h"
 #include "console/version.h"
 #include "files/text_file.h"
-#include "hpsdf/detail/output_file.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
 #include "language/help.h"
 #include "language/script.h"
-#include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -97,66 +94,82 @@ void runShapes(Session& session, const Arguments& arguments) {
   }
 }
 
-/// Facts about the machine and the build.
-struct Diagnosis {
-  std::string renderer = {};
-  std::string rendererProblem = {};  ///< why there is no renderer; "" where there is one
-  std::vector<std::pair<std::string, bool>> simd = simdOfCpu();
-  unsigned threads = std::thread::hardware_concurrency();
-  bool hasMeshReader = false;  ///< a process of its own reads mesh files
-};
-
-Diagnosis diagnosed(const Session& session, const Arguments& arguments) {
-  Diagnosis found{.hasMeshReader = !session.console().meshReader.empty()};
-  try {
-    found.renderer = render::glDescription(glChoice(arguments));
-  } catch (const Error& error) {
-    found.rendererProblem = error.what();
-  }
-  return found;
+/// Tells for each instruction set beyond the baseline whether this processor has it. The object is empty on other
+/// architectures than x86.
+Json simdOfCpu() {
+#if defined(__x86_64__) || defined(__i386__)
+  __builtin_cpu_init();
+  return {{"sse4.2", __builtin_cpu_supports("sse4.2") != 0},
+          {"avx2", __builtin_cpu_supports("avx2") != 0},
+          {"avx512", __builtin_cpu_supports("avx512f") != 0}};
+#else
+  return Json::object();
+#endif
 }
 
-Json doctorJson(const Diagnosis& found) {
-  Json instructions = Json::object();
-  for (const auto& [name, supported] : found.simd) instructions[name] = supported;
-  const bool draws = found.rendererProblem.empty();
+std::string processorName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name") && line.find(": ") != std::string::npos) return line.substr(line.find(": ") + 2);
+  return "unknown";
+}
+
+std::string compilerText() {
+#if defined(__clang__)
+  return fmt::format("clang {}", __clang_version__);
+#elif defined(__GNUC__)
+  return fmt::format("g++ {}", __VERSION__);
+#else
+  return "unknown";
+#endif
+}
+
+/// Facts about the machine and the build.
+Json diagnosis(const Session& session, const Arguments& arguments) {
+  Json renderer, problem;
+  try {
+    renderer = render::glDescription(glChoice(arguments));
+  } catch (const Error& error) {
+    problem = error.what();
+  }
   return {{"version", versionText()},
           {"compiler", compilerText()},
-          {"renderer", draws ? Json(found.renderer) : Json()},
-          {"renderer_problem", draws ? Json() : Json(found.rendererProblem)},
+          {"renderer", renderer},
+          {"renderer_problem", problem},
           {"processor", processorName()},
-          {"simd", instructions},
+          {"simd", simdOfCpu()},
           {"simd_used", instructionSet()},
-          {"threads", found.threads},
-          {"mesh_reader", found.hasMeshReader ? "own process" : "this process"},
-          {"assimp", assimpVersion()}};
+          {"threads", std::thread::hardware_concurrency()},
+          {"mesh_reader", session.console().meshReader.empty() ? "this process" : "own process"},
+          {"assimp", fmt::format("{}.{}.{}", aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch())}};
 }
 
-std::string doctorText(const Diagnosis& found) {
+std::string doctorText(const Json& found) {
+  const auto textOf = [&](const char* name) { return found[name].get<std::string>(); };
   std::vector<std::string> supported;
-  for (const auto& [name, isSupported] : found.simd)
-    if (isSupported) supported.push_back(name);
+  for (const auto& [name, isSupported] : found["simd"].items())
+    if (isSupported.get<bool>()) supported.push_back(name);
+  const std::pair<const char*, std::string> rows[] = {
+      {"version", textOf("version")},
+      {"compiler", textOf("compiler")},
+      {"renderer", found["renderer"].is_null() ? "none: " + textOf("renderer_problem") : textOf("renderer")},
+      {"processor", textOf("processor")},
+      {"SIMD", fmt::format("{}; exact distances use {}",
+                           supported.empty() ? "the baseline" : fmt::format("{}", fmt::join(supported, ", ")),
+                           textOf("simd_used"))},
+      {"threads", found["threads"].dump()},
+      {"meshes", textOf("mesh_reader") == "own process"
+                     ? "each file is read by a process of its own, with limits of time and memory"
+                     : "files are read by this process, without limits: it cannot be started again"},
+      {"assimp", textOf("assimp")}};
   std::string text;
-  const auto row = [&](std::string_view name, const std::string& value) {
-    text += fmt::format("{:<10} {}\n", name, value);
-  };
-  row("version", versionText());
-  row("compiler", compilerText());
-  row("renderer", found.rendererProblem.empty() ? found.renderer : "none: " + found.rendererProblem);
-  row("processor", processorName());
-  row("SIMD", fmt::format("{}; exact distances use {}",
-                          supported.empty() ? "the baseline" : fmt::format("{}", fmt::join(supported, ", ")),
-                          instructionSet()));
-  row("threads", std::to_string(found.threads));
-  row("meshes", found.hasMeshReader ? "each file is read by a process of its own, with limits of time and memory"
-                                    : "files are read by this process, without limits: it cannot be started again");
-  row("assimp", assimpVersion());
+  for (const auto& [name, value] : rows) text += fmt::format("{:<10} {}\n", name, value);
   return text;
 }
 
 void runDoctor(Session& session, const Arguments& arguments) {
-  const Diagnosis found = diagnosed(session, arguments);
-  if (session.wantsJson(arguments)) return printJson(session.console().out, doctorJson(found));
+  const Json found = diagnosis(session, arguments);
+  if (session.wantsJson(arguments)) return printJson(session.console().out, found);
   session.console().out << doctorText(found);
 }
 
@@ -179,9 +192,7 @@ void runDocs(Session& session, const Arguments& arguments) {
     return;
   }
   const std::string file = arguments.text("output");
-  OutputFile written(file);
-  written.write(page);
-  written.commit();
+  writeTextFile(file, page);
   const std::size_t count = session.registry().commands().size();
   if (json) return printJson(out, {{"output", file}, {"commands", count}});
   out << fmt::format("{}: {} commands\n", file, count);

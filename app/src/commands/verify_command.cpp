@@ -1,9 +1,8 @@
-#include "commands/verify_command.h"
-
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "commands/commands.h"
 #include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
@@ -14,7 +13,6 @@
 #include "hpsdf/detail/face_steps.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
-#include "language/script.h"
 #include "session/field_argument.h"
 #include "session/field_surface.h"
 #include "session/session.h"
@@ -101,16 +99,12 @@ std::string exceeded(const std::vector<Judgement>& judgements) {
   return text;
 }
 
-Json errorJson(const ErrorFigures& error) {
-  Json percentiles = Json::object();
-  for (const auto& [percent, value] : error.percentiles) percentiles[fmt::format("{}", percent)] = value;
-  return {{"rms", error.rms}, {"mean", error.mean}, {"max", error.max}, {"percentiles", percentiles}};
-}
-
 Json sampleJson(const SampleFigures& figures) {
   const auto& [error, signs, gradient] = figures;
+  Json percentiles = Json::object();
+  for (const auto& [percent, value] : error.percentiles) percentiles[fmt::format("{}", percent)] = value;
   return {{"points", error.samples},
-          {"error", errorJson(error)},
+          {"error", {{"rms", error.rms}, {"mean", error.mean}, {"max", error.max}, {"percentiles", percentiles}}},
           {"signs",
            {{"mismatches", signs.mismatches},
             {"deepest", signs.farthest},
@@ -127,7 +121,7 @@ Json sampleJson(const SampleFigures& figures) {
             {"max_pair_slope", gradient.maxPairSlope}}}};
 }
 
-Json boundsJson(const std::optional<BoundFigures>& bounds) {
+Json boundFiguresJson(const std::optional<BoundFigures>& bounds) {
   if (!bounds) return {};
   return {{"violations", bounds->violations},
           {"cells", bounds->cells},
@@ -170,42 +164,43 @@ Json verifiedJson(const Verified& verified, const std::vector<Judgement>& judgem
             {"value", verified.steps.value},
             {"value_of_diagonal", verified.steps.value / verified.diagonal},
             {"gradient", verified.steps.gradient}}},
-          {"bounds", boundsJson(verified.figures.bounds)},
+          {"bounds", boundFiguresJson(verified.figures.bounds)},
           {"worst", worst},
           {"thresholds", limits}};
 }
 
-std::string tableRow(const std::string& label, const std::string& uniform, const std::string& near) {
-  return fmt::format("  {:<34} {:>14} {:>18}\n", label, uniform, near);
-}
-
+/// The figures over uniform points and over those near the surface, side by side.
 std::string figureTable(const Verification& figures) {
-  const auto row = [&](const std::string& label, auto figure) {
-    return tableRow(label, shortNumber(figure(figures.uniform)), shortNumber(figure(figures.nearSurface)));
+  std::string text = "\n";
+  const auto row = [&](const std::string& label, const std::string& uniform, const std::string& near) {
+    text += fmt::format("  {:<34} {:>14} {:>18}\n", label, uniform, near);
   };
-  const auto countRow = [&](const std::string& label, auto figure) {
-    return tableRow(label, grouped(figure(figures.uniform)), grouped(figure(figures.nearSurface)));
+  const auto number = [&](const std::string& label, auto figure) {
+    row(label, shortNumber(figure(figures.uniform)), shortNumber(figure(figures.nearSurface)));
+  };
+  const auto count = [&](const std::string& label, auto figure) {
+    row(label, grouped(figure(figures.uniform)), grouped(figure(figures.nearSurface)));
   };
   using F = const SampleFigures&;
-  std::string text = "\n" + tableRow("", "uniform", "near the surface");
-  text += countRow("points", [](F f) { return f.error.samples; });
-  text += row("RMS error", [](F f) { return f.error.rms; });
-  text += row("mean error", [](F f) { return f.error.mean; });
+  row("", "uniform", "near the surface");
+  count("points", [](F f) { return f.error.samples; });
+  number("RMS error", [](F f) { return f.error.rms; });
+  number("mean error", [](F f) { return f.error.mean; });
   for (const auto& [percent, unused] : figures.uniform.error.percentiles)
-    text += row(fmt::format("{} % of the errors are within", percent),
-                [at = percent](F f) { return f.error.percentiles.at(at); });
-  text += row("greatest error", [](F f) { return f.error.max; });
-  text += countRow("wrong signs", [](F f) { return f.signs.mismatches; });
-  text += row("  the farthest from the surface", [](F f) { return f.signs.farthest; });
-  text += countRow(fmt::format("  farther than {}", shortNumber(figures.uniform.signs.threshold)),
-                   [](F f) { return f.signs.defects; });
-  text += row("angle of gradients, mean [degrees]", [](F f) { return f.gradient.meanAngleDegrees; });
-  text += row("  99 % are within", [](F f) { return f.gradient.angle99Degrees; });
-  text += row("  greatest", [](F f) { return f.gradient.maxAngleDegrees; });
-  text += row("length of the gradient, mean", [](F f) { return f.gradient.meanLength; });
-  text += row("  RMS difference from 1", [](F f) { return f.gradient.lengthErrorRms; });
-  text += row("greatest slope, by gradients", [](F f) { return f.gradient.maxLength; });
-  text += row("  between neighbouring points", [](F f) { return f.gradient.maxPairSlope; });
+    number(fmt::format("{} % of the errors are within", percent),
+           [at = percent](F f) { return f.error.percentiles.at(at); });
+  number("greatest error", [](F f) { return f.error.max; });
+  count("wrong signs", [](F f) { return f.signs.mismatches; });
+  number("  the farthest from the surface", [](F f) { return f.signs.farthest; });
+  count(fmt::format("  farther than {}", shortNumber(figures.uniform.signs.threshold)),
+        [](F f) { return f.signs.defects; });
+  number("angle of gradients, mean [degrees]", [](F f) { return f.gradient.meanAngleDegrees; });
+  number("  99 % are within", [](F f) { return f.gradient.angle99Degrees; });
+  number("  greatest", [](F f) { return f.gradient.maxAngleDegrees; });
+  number("length of the gradient, mean", [](F f) { return f.gradient.meanLength; });
+  number("  RMS difference from 1", [](F f) { return f.gradient.lengthErrorRms; });
+  number("greatest slope, by gradients", [](F f) { return f.gradient.maxLength; });
+  number("  between neighbouring points", [](F f) { return f.gradient.maxPairSlope; });
   return text;
 }
 
@@ -267,11 +262,12 @@ std::string worstScript(const Session& session, const Verified& verified, const 
 }
 
 VerifyOptions verifyOptions(const Arguments& arguments) {
+  const auto numberOrZero = [&](const char* name) { return arguments.has(name) ? arguments.number(name) : 0; };
   return {.points = static_cast<std::size_t>(arguments.number("points")),
           .seed = static_cast<std::uint64_t>(arguments.number("seed")),
-          .near = arguments.has("near") ? arguments.number("near") : 0,
-          .band = arguments.has("band") ? arguments.number("band") : 0,
-          .signBound = arguments.has("sign-bound") ? arguments.number("sign-bound") : 0,
+          .near = numberOrZero("near"),
+          .band = numberOrZero("band"),
+          .signBound = numberOrZero("sign-bound"),
           .worst = static_cast<std::size_t>(arguments.whole("worst")),
           .threads = arguments.whole("threads")};
 }

@@ -3,7 +3,7 @@
 #include <ostream>
 
 #include "hpsdf/error.h"
-#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 

@@ -19,9 +19,4 @@ std::string errorText(const std::exception& error) {
   return fmt::format("{} (this is a fault of the program)", error.what());
 }
 
-std::string withSubject(const std::string& subject, const std::string& message) {
-  // The message is searched only until `Error` has a subject of its own.
-  return message.find(subject) != std::string::npos ? message : subject + ": " + message;
-}
-
 }  // namespace hpsdf::app

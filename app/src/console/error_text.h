@@ -9,7 +9,4 @@ namespace hpsdf::app {
 /// a remedy, and lack of memory a remedy. Any other exception is called a fault of the program.
 std::string errorText(const std::exception& error);
 
-/// Returns "SUBJECT: MESSAGE", or the message alone where it names the subject already.
-std::string withSubject(const std::string& subject, const std::string& message);
-
 }  // namespace hpsdf::app

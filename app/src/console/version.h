@@ -5,6 +5,6 @@
 namespace hpsdf::app {
 
 /// Returns name and version of the program: "hpsdf 0.2.0".
-std::string versionText();
+inline std::string versionText() { return "hpsdf " HPSDF_VERSION; }
 
 }  // namespace hpsdf::app

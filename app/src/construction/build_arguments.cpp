@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "hpsdf/build.h"
-#include "hpsdf/detail/build_settings.h"
 
 namespace hpsdf::app {
 namespace {
@@ -23,25 +22,13 @@ Parameter parameterFrom(const BuildSetting& setting) {
                       .choices = {setting.words.begin(), setting.words.end()}};
   if (std::isfinite(setting.minimum)) parameter.minimum = setting.minimum;
   if (std::isfinite(setting.maximum)) parameter.maximum = setting.maximum;
-  switch (setting.type) {
-    case BuildSetting::Type::number:
-      parameter.type = ParameterType::number;
-      break;
-    case BuildSetting::Type::wholeNumber:
-      parameter.type = ParameterType::wholeNumber;
-      break;
-    case BuildSetting::Type::wholeNumbers:
-      parameter.type = ParameterType::numbers;
-      parameter.valueName = "N|NX,NY,NZ";
-      parameter.whole = true;
-      parameter.counts = {1, 3};
-      break;
-    case BuildSetting::Type::choice:
-      parameter.type = ParameterType::choice;
-      break;
-    case BuildSetting::Type::flag:
-      parameter.type = ParameterType::flag;
-      break;
+  constexpr ParameterType kTypes[] = {ParameterType::number, ParameterType::wholeNumber, ParameterType::numbers,
+                                      ParameterType::choice, ParameterType::flag};  // for each `BuildSetting::Type`
+  parameter.type = kTypes[std::size_t(setting.type)];
+  if (setting.type == BuildSetting::Type::wholeNumbers) {
+    parameter.valueName = "N|NX,NY,NZ";
+    parameter.whole = true;
+    parameter.counts = {1, 3};
   }
   return parameter;
 }

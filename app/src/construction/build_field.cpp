@@ -5,10 +5,8 @@
 #include <chrono>
 #include <utility>
 
-#include "console/console.h"
 #include "console/long_work.h"
 #include "console/progress_line.h"
-#include "construction/build_arguments.h"
 #include "construction/surface.h"
 #include "text/text.h"
 
@@ -54,7 +52,7 @@ Checkpoint checkpointAt(const Console& console, const std::filesystem::path& fil
 std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
-  try {
+  return namingSurface(surface, [&]() -> BuildInput {
     // Find mistakes of the arguments before long work.
     BuildOptions options = buildOptions(arguments);
     const DistanceOptions insideOptions = distanceOptions(arguments);
@@ -71,15 +69,13 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     auto exact = distanceTo(console, surface, prepared, insideOptions);
     if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();
     return {std::move(exact), prepared.report, domain, options, secondsSince(start)};
-  } catch (const Error& error) {
-    rethrowNaming(surface, error);
-  }
+  });
 }
 
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint) {
   BuildInput input = buildInput(console, surface, arguments);
-  try {
+  const auto construct = [&]() -> BuiltField {
     const auto start = std::chrono::steady_clock::now();
     Field field = withProgress(console, [&](const Progress& progress) {
       if (checkpoint.empty()) return build(*input.exact, input.domain, input.options, progress);
@@ -89,10 +85,8 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     warnOfErrorLeft(console, field.metadata());
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
-  } catch (const Error& error) {
-    if (!checkpoint.empty() && std::string_view(error.what()).starts_with(checkpoint.string())) throw;
-    rethrowNaming(surface, error);
-  }
+  };
+  return namingSurface(surface, construct, checkpoint.string());
 }
 
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {

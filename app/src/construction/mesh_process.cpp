@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,21 +17,19 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <new>
 #include <optional>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "construction/mesh_reply.h"
 #include "files/other_program.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
-#include "hpsdf/error.h"
 #include "language/registry.h"
-#include "text/printable.h"
-
-extern char** environ;
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -62,127 +59,51 @@ std::optional<double> numberOf(const char* variable) {
   return number;
 }
 
-/// Settings of posix_spawn: the standard streams of the reading process, and the signals that it ignores.
-class SpawnSettings {
- public:
-  explicit SpawnSettings(int output) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions_, output, STDOUT_FILENO);
-    posix_spawn_file_actions_addopen(&actions_, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    sigset_t ours;
-    sigemptyset(&ours);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-      sigaddset(&ours, signal);  // Ctrl-C reaches both processes; this one reacts
-    posix_spawnattr_init(&attributes_);
-    posix_spawnattr_setsigmask(&attributes_, &ours);
-    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
+/// The pipe from the reading process.
+struct Pipe {
+  Pipe() {
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category());
   }
-  ~SpawnSettings() {
-    posix_spawnattr_destroy(&attributes_);
-    posix_spawn_file_actions_destroy(&actions_);
+  ~Pipe() {
+    closeInput();
+    close(ends[0]);
   }
-  SpawnSettings(const SpawnSettings&) = delete;
-  SpawnSettings& operator=(const SpawnSettings&) = delete;
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
 
-  const posix_spawn_file_actions_t* actions() const { return &actions_; }
-  const posix_spawnattr_t* attributes() const { return &attributes_; }
-
- private:
-  posix_spawn_file_actions_t actions_;
-  posix_spawnattr_t attributes_;
-};
-
-/// The reading process and the pipe from its standard output. The destructor kills it if it still runs.
-class ReadingProcess {
- public:
-  ReadingProcess(const fs::path& program, const fs::path& file, const ReadingLimits& limits) {
-    std::vector<std::string> words = {program.string(), kCommand, file.string(), fmt::format("{}", limits.seconds),
-                                      fmt::format("{}", limits.bytes)};
-    std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw notStarted(file, errno);
-    output_ = ends[0];
-    std::vector<char*> pointers;
-    for (std::string& word : words) pointers.push_back(word.data());
-    pointers.push_back(nullptr);
-    const SpawnSettings settings(ends[1]);
-    const int error =
-        posix_spawn(&id_, program.c_str(), settings.actions(), settings.attributes(), pointers.data(), environ);
-    close(ends[1]);
-    if (error == 0) return;
-    close(output_);
-    throw notStarted(file, error);
-  }
-  ~ReadingProcess() {
-    close(output_);
-    if (!running_) return;
-    kill(id_, SIGKILL);
-    int status = 0;
-    waitForProcess(id_, status, 0);
-  }
-  ReadingProcess(const ReadingProcess&) = delete;
-  ReadingProcess& operator=(const ReadingProcess&) = delete;
-
-  /// Waits at most `kTick`. Returns true if there is output, or its end.
-  bool hasOutput() const {
-    pollfd stream = {output_, POLLIN, 0};
-    return poll(&stream, 1, kTick.count()) > 0;
+  void closeInput() {
+    if (ends[1] >= 0) close(std::exchange(ends[1], -1));
   }
 
-  /// Reads the available output into `buffer`; the result is empty at the end of the output.
-  std::span<const std::byte> read(std::span<std::byte> buffer) const {
-    for (;;) {
-      const ssize_t count = ::read(output_, buffer.data(), buffer.size());
-      if (count >= 0) return buffer.first(std::size_t(count));
-      if (errno != EINTR) return {};
-    }
-  }
-
-  /// The exit status; nothing while the process runs.
-  std::optional<int> ended() {
-    int status = 0;
-    if (waitForProcess(id_, status, WNOHANG) == 0) return std::nullopt;
-    running_ = false;
-    return status;
-  }
-
- private:
-  static Error notStarted(const fs::path& file, int error) {
-    return Error(fmt::format("{}: no process can be started to read it ({}); close other programs and try again",
-                             file.string(), std::strerror(error)));
-  }
-
-  pid_t id_ = 0;
-  int output_ = -1;
-  bool running_ = true;
+  std::array<int, 2> ends{-1, -1};
 };
 
 std::string endText(int status) {
   if (WIFEXITED(status)) return fmt::format("exit status {}", WEXITSTATUS(status));
-  switch (WTERMSIG(status)) {
-    case SIGABRT:
-      return "aborted by a check of its own";
-    case SIGSEGV:
-    case SIGBUS:
-      return "wrong access to memory";
-    case SIGFPE:
-      return "division by zero";
-    case SIGKILL:
-      return "killed; perhaps the machine ran out of memory";
-    default:
-      return fmt::format("signal {}", WTERMSIG(status));
-  }
+  constexpr std::pair<int, const char*> kCauses[] = {{SIGABRT, "aborted by a check of its own"},
+                                                     {SIGSEGV, "wrong access to memory"},
+                                                     {SIGBUS, "wrong access to memory"},
+                                                     {SIGFPE, "division by zero"},
+                                                     {SIGKILL, "killed; perhaps the machine ran out of memory"}};
+  for (const auto& [signal, cause] : kCauses)
+    if (WTERMSIG(status) == signal) return cause;
+  return fmt::format("signal {}", WTERMSIG(status));
 }
 
 /// The reading of one file from the start of the process to its reply.
 class Reading {
  public:
   Reading(const fs::path& program, const fs::path& file, const ReadingLimits& limits, const Progress& progress)
-      : file_(file),
-        limits_(limits),
+      : limits_(limits),
         progress_(progress),
         task_("Reading " + printable(file.filename().string())),
-        process_(program, file, limits) {}
+        process_(
+            {.program = program,
+             .arguments = {kCommand, file.string(), fmt::format("{}", limits.seconds), fmt::format("{}", limits.bytes)},
+             .output = pipe_.ends[1],
+             .isQuiet = true}) {
+    pipe_.closeInput();
+  }
 
   MeshReply reply() {
     receive();
@@ -193,21 +114,25 @@ class Reading {
   }
 
  private:
+  static Error exceeded(const std::string& most, const char* variable, const std::string& number) {
+    return Error(fmt::format("reading it takes more than {}; check or export the file again, or set {} above {}", most,
+                             variable, number));
+  }
+
   Error tooLarge() const {
-    return Error(
-        fmt::format("{}: reading it takes more than {} of memory; check or export the file again, or set {} "
-                    "above {}",
-                    file_.string(), bytesText(double(limits_.bytes)), kBytesVariable, limits_.bytes));
+    return exceeded(bytesText(double(limits_.bytes)) + " of memory", kBytesVariable, std::to_string(limits_.bytes));
   }
 
   void receive() {
     std::array<std::byte, 65536> buffer;
     for (;;) {
       pause();
-      if (!process_.hasOutput()) continue;
-      const auto piece = process_.read(buffer);
-      if (piece.empty()) return;
-      bytes_.insert(bytes_.end(), piece.begin(), piece.end());
+      pollfd output = {pipe_.ends[0], POLLIN, 0};
+      if (poll(&output, 1, kTick.count()) <= 0) continue;
+      const ssize_t count = read(output.fd, buffer.data(), buffer.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) return;
+      bytes_.insert(bytes_.end(), buffer.begin(), buffer.begin() + count);
       if (expected_ == 0 && bytes_.size() >= kReplyHeaderBytes) expectWhole();
       if (expected_ > 0 && bytes_.size() > expected_) throw DamagedReply("it goes on too long");
     }
@@ -224,9 +149,8 @@ class Reading {
   void pause() const {
     progress_.throwIfCancelled();
     const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
-    if (elapsed > limits_.seconds)
-      throw Error(fmt::format("{}: reading it takes more than {} s; check or export the file again, or set {} above {}",
-                              file_.string(), limits_.seconds, kSecondsVariable, limits_.seconds));
+    const std::string seconds = fmt::format("{}", limits_.seconds);
+    if (elapsed > limits_.seconds) throw exceeded(seconds + " s", kSecondsVariable, seconds);
     if (elapsed > kSilentSeconds && progress_.report) progress_.report(task_, 0);  // the fraction is unknown
   }
 
@@ -234,17 +158,17 @@ class Reading {
     std::optional<int> status;
     for (; !(status = process_.ended()); pause()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return Error(
-        fmt::format("{}: the process that read it came down ({}): the file is damaged, or too much for assimp; "
-                    "check or export it again",
-                    file_.string(), endText(*status)));
+        fmt::format("the process that read it came down ({}): the file is damaged, or too much for assimp; check or "
+                    "export it again",
+                    endText(*status)));
   }
 
-  const fs::path& file_;
   const ReadingLimits& limits_;
   const Progress& progress_;
   std::string task_;
   Clock::time_point start_ = Clock::now();
-  ReadingProcess process_;
+  Pipe pipe_;
+  OtherProcess process_;
   std::vector<std::byte> bytes_;
   std::uint64_t expected_ = 0;  ///< length of the reply; 0 until its header has arrived
 };
@@ -307,16 +231,21 @@ fs::path ownProgram() {
 
 ImportedMesh importInSubprocess(const fs::path& program, const fs::path& file, const ReadingLimits& limits,
                                 const Progress& progress) {
+  const auto refused = [&](const std::string& problem) { return Error(ErrorKind::file, file.string(), problem); };
   try {
     MeshReply reply = Reading(program, file, limits, progress).reply();
     if (reply.kind == MeshReply::Kind::refusal) throw Error(reply.refusal);
     reply.imported.mesh.name = file.filename().string();
     return std::move(reply.imported);
+  } catch (const std::system_error& error) {
+    throw refused(fmt::format("no process can be started to read it ({}); close other programs and try again",
+                              error.code().message()));
   } catch (const DamagedReply& damage) {
-    throw Error(
-        fmt::format("{}: the process that read it gave a wrong answer ({}): the file is damaged; check or "
-                    "export it again",
-                    file.string(), damage.what()));
+    throw refused(
+        fmt::format("the process that read it gave a wrong answer ({}): the file is damaged; check or export it again",
+                    damage.what()));
+  } catch (const Error& error) {
+    throw refused(error.what());
   }
 }
 
@@ -331,11 +260,11 @@ int readForOtherProcess(std::span<const std::string> words) {
     // The stacks of threads would count as memory.
     writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
   } catch (const Error& error) {
-    writeRefusal(error.what(), toStandardOutput);
+    writeRefusal(error.subject() == words[1] ? error.problem() : error.what(), toStandardOutput);
   } catch (const std::bad_alloc&) {  // thrown by code that calls malloc, as Eigen does, and bypasses `onMemoryOut`
     writeOutOfMemory(toStandardOutput);
   } catch (const std::exception& error) {
-    writeRefusal(fmt::format("{}: {} (this is a fault of the program)", words[1], error.what()), toStandardOutput);
+    writeRefusal(fmt::format("{} (this is a fault of the program)", error.what()), toStandardOutput);
   }
   return 0;
 }

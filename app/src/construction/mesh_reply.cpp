@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <iterator>
 #include <type_traits>
 
-#include "text/printable.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -22,6 +22,13 @@ constexpr std::uint64_t kLongestText = 1 << 16;
 using Triangle = std::array<std::uint32_t, 3>;
 static_assert(sizeof(Vector3) == 3 * sizeof(double) && sizeof(Triangle) == 12, "arrays are sent as they lie in memory");
 
+/// The counts of a report that cannot be derived from the mesh.
+constexpr std::size_t MeshReport::*kCounts[] = {&MeshReport::components,           &MeshReport::boundaryEdges,
+                                                &MeshReport::nonManifoldEdges,     &MeshReport::inconsistentEdges,
+                                                &MeshReport::unbalancedEdges,      &MeshReport::weldedVertices,
+                                                &MeshReport::unreferencedVertices, &MeshReport::degenerateFaces,
+                                                &MeshReport::flippedFaces,         &MeshReport::duplicateFaces};
+
 /// The beginning of a reply; vertices, triangles and text follow. It needs neither a version nor a byte order, since
 /// one program on one machine writes and reads it.
 struct Header {
@@ -31,20 +38,11 @@ struct Header {
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   std::uint64_t textBytes = 0;
-  // The following members of the report cannot be derived from the mesh.
-  std::uint64_t parts = 0;
-  std::uint64_t boundaryEdges = 0;
-  std::uint64_t nonManifoldEdges = 0;
-  std::uint64_t inconsistentEdges = 0;
-  std::uint64_t unbalancedEdges = 0;
-  std::uint64_t weldedVertices = 0;
-  std::uint64_t unreferencedVertices = 0;
-  std::uint64_t degenerateFaces = 0;
-  std::uint64_t flippedFaces = 0;
-  std::uint64_t duplicateFaces = 0;
+  // The following members are those of the report.
+  std::array<std::uint64_t, std::size(kCounts)> counts = {};
   std::array<double, 3> degeneratePosition = {};
   std::array<double, 3> duplicatePosition = {};
-  std::uint64_t turned = 0;
+  std::uint64_t reversed = 0;
   double volume = 0;
   double area = 0;
 };
@@ -88,32 +86,21 @@ Header headerOf(std::span<const std::byte> bytes) {
   return header;
 }
 
-Vector3 vectorOf(const std::array<double, 3>& numbers) { return {numbers[0], numbers[1], numbers[2]}; }
-std::array<double, 3> numbersOf(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
-
 MeshReport reportOf(const Header& header) {
-  if (header.turned > 1) throw DamagedReply("a flag is neither 0 nor 1");
-  if (!std::isfinite(header.volume) || !std::isfinite(header.area) ||
-      !vectorOf(header.degeneratePosition).allFinite() || !vectorOf(header.duplicatePosition).allFinite())
+  MeshReport report{.vertices = header.vertices,
+                    .faces = header.triangles,
+                    .degeneratePosition = Vector3(header.degeneratePosition.data()),
+                    .duplicatePosition = Vector3(header.duplicatePosition.data()),
+                    .reversed = header.reversed == 1,
+                    .volume = header.volume,
+                    .area = header.area,
+                    .box = {}};
+  for (std::size_t n = 0; n < header.counts.size(); ++n) report.*kCounts[n] = header.counts[n];
+  if (header.reversed > 1) throw DamagedReply("a flag is neither 0 nor 1");
+  if (!std::isfinite(report.volume) || !std::isfinite(report.area) || !report.degeneratePosition.allFinite() ||
+      !report.duplicatePosition.allFinite())
     throw DamagedReply("a figure is not finite");
-  return {.vertices = header.vertices,
-          .faces = header.triangles,
-          .components = header.parts,
-          .boundaryEdges = header.boundaryEdges,
-          .nonManifoldEdges = header.nonManifoldEdges,
-          .inconsistentEdges = header.inconsistentEdges,
-          .unbalancedEdges = header.unbalancedEdges,
-          .weldedVertices = header.weldedVertices,
-          .unreferencedVertices = header.unreferencedVertices,
-          .degenerateFaces = header.degenerateFaces,
-          .flippedFaces = header.flippedFaces,
-          .duplicateFaces = header.duplicateFaces,
-          .degeneratePosition = vectorOf(header.degeneratePosition),
-          .duplicatePosition = vectorOf(header.duplicatePosition),
-          .reversed = header.turned == 1,
-          .volume = header.volume,
-          .area = header.area,
-          .box = {}};
+  return report;
 }
 
 template <typename T>
@@ -169,19 +156,10 @@ void writeMesh(const ImportedMesh& imported, const ReplySink& sink) {
   header.kind = std::uint64_t(MeshReply::Kind::mesh);
   header.vertices = mesh.vertices.size();
   header.triangles = mesh.triangles.size();
-  header.parts = report.components;
-  header.boundaryEdges = report.boundaryEdges;
-  header.nonManifoldEdges = report.nonManifoldEdges;
-  header.inconsistentEdges = report.inconsistentEdges;
-  header.unbalancedEdges = report.unbalancedEdges;
-  header.weldedVertices = report.weldedVertices;
-  header.unreferencedVertices = report.unreferencedVertices;
-  header.degenerateFaces = report.degenerateFaces;
-  header.flippedFaces = report.flippedFaces;
-  header.duplicateFaces = report.duplicateFaces;
-  header.degeneratePosition = numbersOf(report.degeneratePosition);
-  header.duplicatePosition = numbersOf(report.duplicatePosition);
-  header.turned = report.reversed;
+  for (std::size_t n = 0; n < header.counts.size(); ++n) header.counts[n] = report.*kCounts[n];
+  Vector3::Map(header.degeneratePosition.data()) = report.degeneratePosition;
+  Vector3::Map(header.duplicatePosition.data()) = report.duplicatePosition;
+  header.reversed = report.reversed;
   header.volume = report.volume;
   header.area = report.area;
   write(header, std::as_bytes(std::span(mesh.vertices)), std::as_bytes(std::span(mesh.triangles)), {}, sink);

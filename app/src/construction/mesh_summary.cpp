@@ -2,35 +2,20 @@
 
 #include <fmt/format.h>
 
-#include "text/json.h"
+#include <array>
+
 #include "text/text.h"
 
 namespace hpsdf::app {
 
-namespace {
-
-/// "3 boundary, 1 non-manifold and 0 inconsistent edges"
 std::string faultyEdges(const MeshReport& report) {
   return fmt::format("{} boundary, {} non-manifold and {} inconsistent edges", grouped(report.boundaryEdges),
                      grouped(report.nonManifoldEdges), grouped(report.inconsistentEdges));
 }
 
-}  // namespace
-
 std::string insideTestName(InsideTest sign) {
-  switch (sign) {
-    case InsideTest::pseudonormal:
-      return "pseudonormal";
-    case InsideTest::winding:
-      return "winding";
-    case InsideTest::shell:
-      return "unsigned-shell";
-    case InsideTest::outerHull:
-      return "hull";
-    case InsideTest::automatic:
-      break;
-  }
-  return "unknown";
+  constexpr std::array kNames = {"unknown", "pseudonormal", "winding", "unsigned-shell", "hull"};
+  return kNames[std::size_t(sign)];
 }
 
 std::string closednessText(const MeshReport& report) {
@@ -62,38 +47,31 @@ Json meshJson(const std::string& name, const MeshReport& report) {
 
 std::string meshText(const std::string& name, const MeshReport& report) {
   std::string text = name + "\n";
-  text += summaryRow("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
-  text += summaryRow("parts", grouped(report.components));
-  text += summaryRow("surface", closednessText(report));
-  text += summaryRow("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
-  text += summaryRow("box", boxText(report.box));
+  const auto row = [&](std::string_view label, const std::string& value) { text += summaryRow(label, value); };
+  row("vertices, faces", fmt::format("{}, {}", grouped(report.vertices), grouped(report.faces)));
+  row("parts", grouped(report.components));
+  row("surface", closednessText(report));
+  row("volume, area", fmt::format("{:.6g}, {:.6g}", report.volume, report.area));
+  row("box", boxText(report.box));
   if (report.weldedVertices > 0)
-    text += summaryRow("welded", countOf(report.weldedVertices, "vertex", "vertices") +
-                                     " (most readers give each corner of a face its own)");
+    row("welded",
+        countOf(report.weldedVertices, "vertex", "vertices") + " (most readers give each corner of a face its own)");
   if (report.unreferencedVertices > 0)
-    text += summaryRow("unused", countOf(report.unreferencedVertices, "vertex", "vertices") + " dropped");
+    row("unused", countOf(report.unreferencedVertices, "vertex", "vertices") + " dropped");
   const auto dropped = [&](const char* kind, std::size_t faces, const Vector3& place) {
-    if (faces > 0)
-      text += summaryRow(kind, countOf(faces, "face", "faces") + " dropped, as at " + vectorText(place, report.box));
+    if (faces > 0) row(kind, countOf(faces, "face", "faces") + " dropped, as at " + vectorText(place, report.box));
   };
   dropped("degenerate", report.degenerateFaces, report.degeneratePosition);
   if (report.flippedFaces > 0)
-    text += summaryRow("flipped", countOf(report.flippedFaces, "edge of a face without area that holds its neighbours",
-                                          "edges of faces without area that hold their neighbours"));
+    row("flipped", countOf(report.flippedFaces, "edge of a face without area that holds its neighbours",
+                           "edges of faces without area that hold their neighbours"));
   dropped("duplicate", report.duplicateFaces, report.duplicatePosition);
-  if (report.reversed) text += summaryRow("turned", "the whole mesh: its faces looked inward");
+  if (report.reversed) row("turned", "the whole mesh: its faces looked inward");
   return text;
 }
 
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh) {
   return choice.position ? choice.reason + ", as at " + vectorText(*choice.position, mesh) : choice.reason;
-}
-
-std::string unsureSigns(const std::string& name, const MeshReport& report) {
-  return fmt::format(
-      "{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase their jumps "
-      "without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
-      name, faultyEdges(report));
 }
 
 }  // namespace hpsdf::app

@@ -13,6 +13,9 @@ Json meshJson(const std::string& name, const MeshReport& report);
 
 std::string meshText(const std::string& name, const MeshReport& report);
 
+/// "3 boundary, 1 non-manifold and 0 inconsistent edges"
+std::string faultyEdges(const MeshReport& report);
+
 std::string closednessText(const MeshReport& report);
 
 /// As `--sign` has them; "unknown" for `automatic`.
@@ -20,8 +23,5 @@ std::string insideTestName(InsideTest sign);
 
 /// "the mesh meets itself, as at (0, 1, 2)"; `mesh`: its box.
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh);
-
-/// One line for a mesh that is not closed and yet is to have its sign by pseudonormals.
-std::string unsureSigns(const std::string& name, const MeshReport& report);
 
 }  // namespace hpsdf::app

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "console/console.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "construction/surface.h"
@@ -49,9 +48,10 @@ bool isMadeFrom(const Source& candidate, const Source& source) {
   return candidate.fingerprint == source.fingerprint && (source.fingerprint != 0 || candidate.name == source.name);
 }
 
-void warnOfForeign(const Console& console, const std::string& surface, const Source& source) {
-  warn(console, fmt::format("{} is not what the field was made from ({})", surface,
-                            source.name.empty() ? "unknown" : source.name));
+void warnIfForeign(const Console& console, const std::string& surface, const Source& found, const Source& source) {
+  if (!isMadeFrom(found, source))
+    warn(console, fmt::format("{} is not what the field was made from ({})", surface,
+                              source.name.empty() ? "unknown" : source.name));
 }
 
 ReferenceSurface analyticReference(const DistanceFunction& analytic, const std::string& surface) {
@@ -81,42 +81,35 @@ ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepare
 }  // namespace
 
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
-  try {
+  return namingSurface(surface, [&] {
     PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
     ReferenceSurface reference = prepared.analytic ? analyticReference(*prepared.analytic, surface)
                                                    : meshReference(console, std::move(prepared), source);
     reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
     return reference;
-  } catch (const Error& error) {
-    rethrowNaming(surface, error);
-  }
+  });
 }
 
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
-  try {
+  return namingSurface(surface, [&] {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
     auto exact = distanceTo(console, surface, prepared, distanceOptions(source));
-    if (!isMadeFrom(exact->source(), source)) warnOfForeign(console, surface, source);
+    warnIfForeign(console, surface, exact->source(), source);
     return exact;
-  } catch (const Error& error) {
-    rethrowNaming(surface, error);
-  }
+  });
 }
 
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
-  try {
+  return namingSurface(surface, [&] {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
-    if (prepared.analytic) throw Error(surface + ": an analytic shape has no mesh, and so no defects");
+    if (prepared.analytic) throw Error("an analytic shape has no mesh, and so no defects");
     requireDistanceMemory(prepared.mesh);
-    if (!isMadeFrom({.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source))
-      warnOfForeign(console, surface, source);
+    warnIfForeign(console, surface, {.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source);
     return findDefects(prepared.mesh, withProgress(console, [&](const Progress& progress) {
                          return findCrossings(prepared.mesh, kMaxCrossings, progress);
                        }));
-  } catch (const Error& error) {
-    rethrowNaming(surface, error);
-  }
+  });
 }
 
 }  // namespace hpsdf::app

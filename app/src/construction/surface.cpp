@@ -7,13 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "console/console.h"
 #include "console/long_work.h"
 #include "construction/mesh_process.h"
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/shapes.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -70,7 +68,11 @@ void tellInsideTest(const Console& console, const std::string& surface, const Me
   if (!choice.reason.empty() && choice.insideTest != InsideTest::pseudonormal)
     note(console, fmt::format("{}: sign by winding number: {}", surface, reasonText(choice, report.box)));
   if (choice.reason.empty() && choice.insideTest == InsideTest::pseudonormal && !report.closed())
-    warn(console, unsureSigns(surface, report));
+    warn(
+        console,
+        fmt::format("{}: the surface is not closed ({}): by pseudonormals signs may be wrong, and refinement may chase "
+                    "their jumps without end; --sign auto closes the holes, and a lower max-depth bounds refinement",
+                    surface, faultyEdges(report)));
 }
 
 }  // namespace
@@ -79,8 +81,8 @@ bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) ||
 
 ImportedMesh importSurface(const Console& console, const std::string& surface) {
   if (surface.starts_with(kAnalytic))
-    throw Error(
-        fmt::format("{}: an analytic shape has no mesh; take builtin:{}", surface, surface.substr(kAnalytic.size())));
+    throw Error(ErrorKind::mesh, surface,
+                "an analytic shape has no mesh; take builtin:" + surface.substr(kAnalytic.size()));
   if (surface.starts_with(kBuiltin)) {
     TriangleMesh mesh = shapes::mesh(surface);
     const MeshReport report = inspect(mesh);
@@ -132,12 +134,6 @@ std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const
   const auto exact = distanceTo(console, prepared.mesh, options);
   tellInsideTest(console, surface, *prepared.report, exact->insideTestChoice(), prepared.normalization);
   return withNormalization(exact, prepared.normalization);
-}
-
-void rethrowNaming(const std::string& surface, const Error& error) {
-  const std::string message = error.what();
-  if (printable(message).find(printable(surface)) != std::string::npos) throw error;  // its name may be escaped there
-  throw Error(surface + ": " + message);
 }
 
 }  // namespace hpsdf::app

@@ -53,7 +53,15 @@ std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 
-/// Throws the error again, with the name of the surface before its message unless that holds it.
-[[noreturn]] void rethrowNaming(const std::string& surface, const Error& error);
+/// Returns work(). The `Error`s that it throws get the surface as their subject, but those about `other` keep it.
+template <typename Work>
+auto namingSurface(const std::string& surface, const Work& work, const std::string& other = "") {
+  try {
+    return work();
+  } catch (const Error& error) {
+    if (error.subject() == surface || (!other.empty() && error.subject() == other)) throw;
+    throw Error(error.kind(), surface, error.what());
+  }
+}
 
 }  // namespace hpsdf::app

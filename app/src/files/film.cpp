@@ -7,8 +7,6 @@
 
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
-#include "hpsdf/error.h"
-#include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -18,21 +16,13 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAbout = "frames.json";  // marks a folder as one of frames
 constexpr const char* kMovie = "film.mp4";
-constexpr const char* kLog = "ffmpeg.txt";
 
 bool isFrameName(std::string_view name) {
   constexpr std::string_view kPrefix = "frame-", kSuffix = ".png";
   if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix) || name.size() < kPrefix.size() + 4 + kSuffix.size())
     return false;
   const auto digits = name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size());
-  return std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; });
-}
-
-void copyFile(const fs::path& from, const fs::path& to) { writeTextFile(to, readWholeFile(from.string())); }
-
-fs::path requireFfmpeg(const std::string& output) {
-  if (const auto found = findProgram("ffmpeg")) return *found;
-  throw Error(output + ": an MP4 needs the program ffmpeg, which is not in PATH; install it, or give a folder");
+  return std::ranges::all_of(digits, isDigit);
 }
 
 }  // namespace
@@ -45,7 +35,9 @@ Film::Film(const std::string& output) : output_(output) {
   if (std::ranges::find(kOthers, kind) != kOthers.end())
     throw Error(fmt::format("{}: expected a folder for the frames, or a name that ends in .mp4", output));
   if (kind == ".mp4") {
-    ffmpeg_ = requireFfmpeg(output);
+    ffmpeg_ = findProgram("ffmpeg").value_or("");
+    if (ffmpeg_.empty())
+      throw Error(output + ": an MP4 needs the program ffmpeg, which is not in PATH; install it, or give a folder");
     checkWritable(output_);
     return;
   }
@@ -60,15 +52,13 @@ void Film::encode(double framesPerSecond, const Progress& progress) {
   if (folder_) return;
   if (progress.report) progress.report("encoding", 0);
   // Every player supports 4:2:0 colours; they require even numbers of pixels.
-  const int status =
+  const std::string problem =
       runOtherProgram(ffmpeg_,
                       {"-hide_banner", "-loglevel", "error", "-y", "-framerate", fmt::format("{}", framesPerSecond),
                        "-start_number", "0", "-i", "frame-%04d.png", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt",
                        "yuv420p", "-movflags", "+faststart", kMovie},
-                      work_.path(), work_.path() / kLog, progress.cancelled);
-  if (status == 0 && fs::exists(work_.path() / kMovie)) return;
-  throw Error(fmt::format("{}: ffmpeg failed with status {} ({}); give a folder instead", output_.string(), status,
-                          lastLine(readTextFile((work_.path() / kLog).string()))));
+                      work_.path(), kMovie, progress.cancelled);
+  if (!problem.empty()) throw Error(fmt::format("{}: {}; give a folder instead", output_.string(), problem));
 }
 
 Json Film::about(const render::Image& last, const std::string& renderer, Json rows) const {
@@ -86,16 +76,14 @@ std::string Film::line(const Json& about) {
 }
 
 void Film::publish(const Json& about) {
-  if (folder_) return publishFolder(about);
-  copyFile(work_.path() / kMovie, output_);
-}
-
-void Film::publishFolder(const Json& about) {
+  const auto copy = [&](const std::string& name, const fs::path& to) {
+    writeTextFile(to, readWholeFile((work_.path() / name).string()));
+  };
+  if (!folder_) return copy(kMovie, output_);
   folder_->keep();
   folder_->startAnew(kAbout, isFrameName);
-  for (std::size_t frame = 0; frame < frames_; ++frame)
-    copyFile(work_.path() / frameName(frame), output_ / frameName(frame));
-  writeTextFile(output_ / kAbout, about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  for (std::size_t frame = 0; frame < frames_; ++frame) copy(frameName(frame), output_ / frameName(frame));
+  writeTextFile(output_ / kAbout, jsonText(about));
 }
 
 }  // namespace hpsdf::app

@@ -39,7 +39,6 @@ class Film {
 
  private:
   static std::string frameName(std::size_t frame);
-  void publishFolder(const Json& about);
 
   std::filesystem::path output_;
   std::filesystem::path ffmpeg_;          // empty for a folder

@@ -41,13 +41,13 @@ std::string shareText(double share) {
   return share > 0 && share < 0.5e-4 ? "<0.01 %" : fmt::format("{:.2f} %", 100 * share);
 }
 
-std::string levels(const std::string& title, const std::vector<ReportBar>& bars) {
+std::string levels(const std::string& title, const std::map<int, double>& shares) {
   std::string rows;
-  for (const ReportBar& bar : bars)
+  for (const auto& [level, share] : shares)
     rows += fmt::format(
         "<tr><th>{}</th><td class=\"share\">{}</td><td class=\"bar\"><span "
         "style=\"width:{:.2f}%\"></span></td></tr>\n",
-        bar.level, htmlEscaped(shareText(bar.share)), 100 * bar.share);
+        level, htmlEscaped(shareText(share)), 100 * share);
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 
@@ -75,24 +75,22 @@ std::string htmlPng(std::string_view bytes) {
 std::string htmlEscaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else if (c == '"')
+      result += "&quot;";
+    else
+      result += c;
   }
   return result;
+}
+
+std::string htmlFact(const std::string& name, const std::string& value) {
+  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", htmlEscaped(name), htmlEscaped(value));
 }
 
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle) {
@@ -110,8 +108,7 @@ std::string htmlFoot(const std::string& footer) {
 std::string reportHtml(const ReportPage& page) {
   std::string html = htmlHead(page.title, page.subtitle, "");
   html += "<h2>Figures</h2>\n<table>\n";
-  for (const auto& [name, value] : page.figures)
-    html += fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", htmlEscaped(name), htmlEscaped(value));
+  for (const auto& [name, value] : page.figures) html += htmlFact(name, value);
   html += "</table>\n";
   if (!page.buildCommand.empty()) html += fmt::format("<code>{}</code>\n", htmlEscaped(page.buildCommand));
   html += "<h2>Pictures</h2>\n";

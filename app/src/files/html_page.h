@@ -1,6 +1,7 @@
 #pragma once
 // The page of a report: one HTML file beside its pictures, without scripts and without network access.
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,17 +16,12 @@ struct ReportPicture {
   std::string command;  ///< command that draws the picture
 };
 
-struct ReportBar {
-  int level;
-  double share;  ///< share of the domain's volume, 0 to 1
-};
-
 struct ReportPage {
   std::string title;
   std::string subtitle;
   std::vector<std::pair<std::string, std::string>> figures = {};
-  std::vector<ReportBar> degrees = {};
-  std::vector<ReportBar> depths = {};
+  std::map<int, double> degrees = {};  ///< shares of the domain's volume, 0 to 1
+  std::map<int, double> depths = {};
   std::vector<ReportPicture> pictures = {};
   std::string buildCommand = {};  ///< "" where the command is unknown
   std::string footer = {};
@@ -36,6 +32,9 @@ std::string reportHtml(const ReportPage& page);
 /// Return the beginning and the end of a page. `moreStyle` is CSS that is added to that of reports.
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
+
+/// A row of a table: a name and its value, both of which it escapes.
+std::string htmlFact(const std::string& name, const std::string& value);
 
 /// Encodes a PNG file as the source of an <img>, so that the page contains it.
 std::string htmlPng(std::string_view bytes);

@@ -10,10 +10,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <sstream>
+#include <system_error>
 #include <thread>
 
+#include "files/text_file.h"
 #include "hpsdf/error.h"
 
 extern char** environ;
@@ -23,45 +24,67 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Sets the standard streams and the working folder of a new process.
-class SpawnActions {
- public:
-  SpawnActions(const fs::path& folder, const fs::path& log) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions_, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    posix_spawn_file_actions_adddup2(&actions_, STDOUT_FILENO, STDERR_FILENO);
-    posix_spawn_file_actions_addchdir_np(&actions_, folder.c_str());
-  }
-  ~SpawnActions() { posix_spawn_file_actions_destroy(&actions_); }
-  SpawnActions(const SpawnActions&) = delete;
-  SpawnActions& operator=(const SpawnActions&) = delete;
-
-  const posix_spawn_file_actions_t* get() const { return &actions_; }
-
- private:
-  posix_spawn_file_actions_t actions_;
-};
-
-pid_t start(const fs::path& program, const std::vector<std::string>& arguments, const SpawnActions& actions) {
-  std::vector<std::string> words = {program.string()};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  pid_t id = 0;
-  if (const int error = posix_spawn(&id, program.c_str(), actions.get(), nullptr, pointers.data(), environ); error != 0)
-    throw Error(fmt::format("{}: cannot be started ({}); check the program", program.string(), std::strerror(error)));
-  return id;
-}
-
-}  // namespace
-
+/// Calls waitpid, again where a signal interrupts it.
 pid_t waitForProcess(pid_t id, int& status, int options) {
   for (;;) {
     const pid_t ended = waitpid(id, &status, options);
     if (ended >= 0 || errno != EINTR) return ended;
   }
+}
+
+/// Returns the last line that is not empty; "" where there is none.
+std::string lastLine(const std::string& text) {
+  std::istringstream lines(text);
+  std::string last;
+  for (std::string line; std::getline(lines, line);)
+    if (!line.empty()) last = line;
+  return last;
+}
+
+}  // namespace
+
+OtherProcess::OtherProcess(const ProcessStart& start) {
+  std::vector<std::string> words = {start.program.string()};
+  words.insert(words.end(), start.arguments.begin(), start.arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, start.output, STDOUT_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  if (start.isQuiet) {
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    sigset_t interrupts;
+    sigemptyset(&interrupts);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&interrupts, signal);
+    posix_spawnattr_setsigmask(&attributes, &interrupts);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  } else {
+    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  }
+  if (!start.folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, start.folder.c_str());
+  const int error = posix_spawn(&id_, start.program.c_str(), &actions, &attributes, pointers.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) throw std::system_error(error, std::generic_category());
+}
+
+OtherProcess::~OtherProcess() {
+  if (!running_) return;
+  kill(id_, SIGKILL);
+  int status = 0;
+  waitForProcess(id_, status, 0);
+}
+
+std::optional<int> OtherProcess::ended() {
+  int status = 0;
+  if (waitForProcess(id_, status, WNOHANG) == 0) return std::nullopt;
+  running_ = false;
+  return status;
 }
 
 std::optional<fs::path> findProgram(const std::string& name) {
@@ -75,20 +98,27 @@ std::optional<fs::path> findProgram(const std::string& name) {
   return std::nullopt;
 }
 
-int runOtherProgram(const fs::path& program, const std::vector<std::string>& arguments, const fs::path& folder,
-                    const fs::path& log, const std::function<bool()>& cancelled) {
-  const pid_t id = start(program, arguments, SpawnActions(folder, log));
-  int status = 0;
-  while (waitForProcess(id, status, WNOHANG) == 0) {
-    if (cancelled && cancelled()) {
-      kill(id, SIGKILL);
-      waitForProcess(id, status, 0);
-      throw Cancelled();
+std::string runOtherProgram(const fs::path& program, const std::vector<std::string>& arguments, const fs::path& folder,
+                            const std::string& result, const std::function<bool()>& cancelled) {
+  const fs::path log = folder / "output.txt";
+  std::optional<int> status;
+  try {
+    const int output = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    OtherProcess process({program, arguments, output, false, folder});
+    close(output);
+    while (!(status = process.ended())) {
+      if (cancelled && cancelled()) throw Cancelled();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  } catch (const std::system_error& error) {
+    throw Error(ErrorKind::file, program.string(),
+                fmt::format("cannot be started ({}); check the program", error.code().message()));
   }
   if (cancelled && cancelled()) throw Cancelled();  // Ctrl-C ends the other program too
-  return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  if (*status == 0 && fs::exists(folder / result)) return {};
+  return fmt::format("{} failed with status {} ({})", program.filename().string(),
+                     WIFSIGNALED(*status) ? 128 + WTERMSIG(*status) : WEXITSTATUS(*status),
+                     lastLine(readTextFile(log.string())));
 }
 
 }  // namespace hpsdf::app

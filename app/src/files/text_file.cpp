@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <istream>
 #include <limits>
-#include <sstream>
 #include <vector>
 
 #include "hpsdf/detail/output_file.h"
@@ -15,17 +13,13 @@ namespace hpsdf::app {
 
 namespace {
 
-std::ifstream openFile(const std::string& file) {
+/// Refuses devices, which might have no end.
+std::ifstream openFiniteFile(const std::string& file) {
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);
-  if (std::filesystem::is_directory(status)) throw Error(file + ": is a folder; give a file");
   if (std::filesystem::is_character_file(status) || std::filesystem::is_block_file(status))
     throw Error(file + ": is a device; give a file");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw Error(file + (std::filesystem::exists(status) ? ": cannot be read; check its permissions"
-                                                        : ": no such file; check the name"));
-  return stream;
+  return openFile(file);
 }
 
 std::string readAll(std::istream& in, const std::string& name, std::size_t mostBytes) {
@@ -43,24 +37,26 @@ std::string readAll(std::istream& in, const std::string& name, std::size_t mostB
 
 }  // namespace
 
+std::ifstream openFile(const std::filesystem::path& file, const std::string& wanted) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) throw Error(file.string() + ": is a folder; give " + wanted);
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw Error(file.string() + (std::filesystem::exists(file, ignored) ? ": cannot be read; check its permissions"
+                                                                        : ": no such file; check the name"));
+  return stream;
+}
+
 std::string readText(std::istream& in, const std::string& name) { return readAll(in, name, kMostTextBytes); }
 
 std::string readTextFile(const std::string& file) {
-  std::ifstream stream = openFile(file);
+  std::ifstream stream = openFiniteFile(file);
   return readText(stream, file);
 }
 
 std::string readWholeFile(const std::string& file) {
-  std::ifstream stream = openFile(file);
+  std::ifstream stream = openFiniteFile(file);
   return readAll(stream, file, std::numeric_limits<std::size_t>::max());
-}
-
-std::string lastLine(const std::string& text) {
-  std::istringstream lines(text);
-  std::string last;
-  for (std::string line; std::getline(lines, line);)
-    if (!line.empty()) last = line;
-  return last;
 }
 
 void writeTextFile(const std::filesystem::path& file, std::string_view text) {

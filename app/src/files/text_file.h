@@ -3,7 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <iosfwd>
+#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -11,6 +11,9 @@ namespace hpsdf::app {
 
 /// Largest accepted text: scripts and lists of meshes are never this long.
 constexpr std::size_t kMostTextBytes = std::size_t{1} << 26;
+
+/// Opens a file of any kind but a folder. Throws `Error` where it cannot be read; the message asks for `wanted`.
+std::ifstream openFile(const std::filesystem::path& file, const std::string& wanted = "a file");
 
 /// Reads a stream to its end; `name` stands for it in messages. Throws `Error` where it is longer than `kMostTextBytes`
 /// or cannot be read to its end.
@@ -22,9 +25,6 @@ std::string readTextFile(const std::string& file);
 
 /// Reads a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` does otherwise.
 std::string readWholeFile(const std::string& file);
-
-/// Returns the last line that is not empty; "" where there is none.
-std::string lastLine(const std::string& text);
 
 /// Writes a file under a temporary name and renames it. Throws `Error` naming the file, and leaves nothing behind then.
 void writeTextFile(const std::filesystem::path& file, std::string_view text);

@@ -41,9 +41,8 @@ class Reader {
   std::string name() {
     skipBlanks();
     const std::size_t begin = position_;
-    while (position_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[position_])) ||
-                                        text_[position_] == '_' || text_[position_] == '-'))
-      ++position_;
+    const auto isInName = [](char c) { return isLetter(c) || isDigit(c) || c == '-'; };
+    while (position_ < text_.size() && isInName(text_[position_])) ++position_;
     return std::string(text_.substr(begin, position_ - begin));
   }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -119,16 +118,6 @@ class Query {
 };
 
 }  // namespace
-
-std::ifstream openPoints(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw Error(file.string() + ": is a folder; give a file of points");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw Error(file.string() + (std::filesystem::exists(file, ignored) ? ": cannot be read; check its permissions"
-                                                                        : ": no such file; check the name"));
-  return stream;
-}
 
 std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                         const std::function<void(std::string_view)>& write) {

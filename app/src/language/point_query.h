@@ -3,8 +3,6 @@
 // memory.
 
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <istream>
 #include <string>
@@ -15,9 +13,6 @@
 namespace hpsdf::app {
 
 enum class PointFormat : std::uint8_t { csv, json };
-
-/// Opens a file of points. Throws `Error` with its name where it is missing, a folder or unreadable.
-std::ifstream openPoints(const std::filesystem::path& file);
 
 /// Reads points from `in`, evaluates the field there and passes the answers to `write`. Returns the number of points.
 /// Throws `Error` "name:line: …" for a line that is not a point.

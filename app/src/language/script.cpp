@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "console/failed.h"
 #include "files/text_file.h"
@@ -52,24 +50,24 @@ class Scanner {
       : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 
   /// Returns the next statement that has words, or an empty one at the end of the text.
-  Statement next(const Variables& variables) {
-    Statement statement{line_, {}};
-    while (position_ < text_.size()) {
-      const char c = text_[position_];
+  Statement statement(const Variables& variables) {
+    Statement read{line_, {}};
+    while (!atEnd()) {
+      const char c = next();
       if (c == '\n' || c == ';') {
         advance();
-        if (!statement.words.empty()) return statement;
-        statement.line = line_;
+        if (!read.words.empty()) return read;
+        read.line = line_;
       } else if (c == ' ' || c == '\t' || c == '\r') {
         advance();
       } else if (c == '#') {
-        while (position_ < text_.size() && text_[position_] != '\n') advance();
+        while (!atEnd() && next() != '\n') advance();
       } else {
-        statement.line = statement.words.empty() ? line_ : statement.line;
-        statement.words.push_back(word(variables));
+        read.line = read.words.empty() ? line_ : read.line;
+        read.words.push_back(word(variables));
       }
     }
-    return statement;
+    return read;
   }
 
   [[noreturn]] void fail(int line, int column, const std::string& message) const {
@@ -77,12 +75,15 @@ class Scanner {
   }
 
  private:
+  bool atEnd() const { return position_ == text_.size(); }
+  /// The character that `advance` will pass; a zero byte at the end of the text.
+  char next() const { return atEnd() ? '\0' : text_[position_]; }
+
   void advance() {
-    if (text_[position_] == '\n') {
+    if (next() == '\n') {
       ++line_;
       column_ = 1;
-    } else if ((static_cast<unsigned char>(text_[position_]) & 0xc0) !=
-               0x80) {  // continuation bytes of UTF-8 have no column
+    } else if ((static_cast<unsigned char>(next()) & 0xc0) != 0x80) {  // continuation bytes of UTF-8 have no column
       ++column_;
     }
     ++position_;
@@ -90,14 +91,14 @@ class Scanner {
 
   bool atWordEnd() const {
     constexpr std::string_view kEnds = " \t\r\n;";
-    return position_ == text_.size() || kEnds.find(text_[position_]) != std::string_view::npos;
+    return atEnd() || kEnds.find(next()) != std::string_view::npos;
   }
 
   Word word(const Variables& variables) {
     Word word{.column = column_};
     std::size_t literal = std::string::npos;  // length of the text before the first quote or variable
     while (!atWordEnd()) {
-      const char c = text_[position_];
+      const char c = next();
       if (c == '"' || c == '$') literal = std::min(literal, word.text.size());
       if (c == '"') {
         quoted(word.text, variables);
@@ -116,8 +117,8 @@ class Scanner {
     const int line = line_;
     const int column = column_;
     advance();
-    while (position_ < text_.size() && text_[position_] != '\n') {
-      const char c = text_[position_];
+    while (!atEnd() && next() != '\n') {
+      const char c = next();
       const char after = position_ + 1 < text_.size() ? text_[position_ + 1] : '\0';
       if (c == '"') return advance();
       if (c == '$') {
@@ -125,7 +126,7 @@ class Scanner {
         continue;
       }
       if (c == '\\' && (after == '"' || after == '\\')) advance();
-      out += text_[position_];
+      out += next();
       advance();
     }
     fail(line, column, "this quote is not closed on its line; expected another \"");
@@ -134,19 +135,15 @@ class Scanner {
   void variable(std::string& out, const Variables& variables) {
     const int column = column_;
     advance();
-    if (position_ < text_.size() && text_[position_] == '$') {
+    if (next() == '$') {
       out += '$';
       return advance();
     }
-    const bool braced = position_ < text_.size() && text_[position_] == '{';
+    const bool braced = next() == '{';
     if (braced) advance();
     std::string name;
-    while (position_ < text_.size() && (isLetter(text_[position_]) || isDigit(text_[position_]))) {
-      name += text_[position_];
-      advance();
-    }
-    if (braced && (position_ == text_.size() || text_[position_] != '}'))
-      fail(line_, column, "expected } after ${" + name);
+    for (; isLetter(next()) || isDigit(next()); advance()) name += next();
+    if (braced && next() != '}') fail(line_, column, "expected } after ${" + name);
     if (braced) advance();
     if (!isIdentifier(name)) fail(line_, column, "expected a variable's name after $; write $$ for a dollar sign");
     const auto found = variables.find(name);
@@ -197,7 +194,7 @@ class ScriptReader {
     open_.push_back({std::string(name)});
     Scanner scanner(name, text, includedFrom, variableBytes_);
     for (;;) {
-      const Statement statement = scanner.next(variables_);
+      const Statement statement = scanner.statement(variables_);
       if (statement.words.empty()) break;
       const std::optional<Included> included = addCall(scanner, statement, includedFrom);
       if (included) add(included->name, included->text);
@@ -271,16 +268,13 @@ class ScriptReader {
 
 }  // namespace
 
-bool isVariableAssignment(std::string_view word) {
-  const std::size_t equals = word.find('=');
-  return equals != std::string_view::npos && isIdentifier(word.substr(0, equals));
-}
-
 Variables parseVariables(const std::vector<std::string>& words) {
   Variables variables;
   for (const std::string& word : words) {
-    if (!isVariableAssignment(word)) throw Error(fmt::format("expected name=value, found '{}'", word));
-    variables[word.substr(0, word.find('='))] = word.substr(word.find('=') + 1);
+    const std::size_t equals = word.find('=');
+    if (equals == std::string::npos || !isIdentifier(std::string_view(word).substr(0, equals)))
+      throw Error(fmt::format("expected name=value, found '{}'", word));
+    variables[word.substr(0, equals)] = word.substr(equals + 1);
   }
   return variables;
 }

@@ -37,6 +37,4 @@ void runScript(Session& session, std::span<const Call> calls);
 /// Parses words of the form name=value. Throws `Error` for any other word.
 Variables parseVariables(const std::vector<std::string>& words);
 
-bool isVariableAssignment(std::string_view word);
-
 }  // namespace hpsdf::app

@@ -108,12 +108,6 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
   return {drawing.file, drawing.title, drawing.caption, command};
 }
 
-std::vector<ReportBar> bars(const std::map<int, double>& volume) {
-  std::vector<ReportBar> result;
-  for (const auto& [level, share] : volume) result.push_back({level, share});
-  return result;
-}
-
 std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
                                                          const BuiltField* built) {
   const FieldMetadata& metadata = field.metadata();
@@ -168,8 +162,8 @@ void runReport(Session& session, const Arguments& arguments) {
                                           bytesText(double(counts.bytes)),
                                           shortNumber(field.metadata().rmsEstimate(field.domain()))),
                   .figures = figures(field, counts, built ? &*built : nullptr),
-                  .degrees = bars(counts.degreeVolume),
-                  .depths = bars(counts.depthVolume),
+                  .degrees = counts.degreeVolume,
+                  .depths = counts.depthVolume,
                   .buildCommand = built ? buildCommandLine(arguments.text("source"), fieldFile, arguments) : "",
                   .footer = fmt::format("{}; {}", versionText(), renderer.description())};
   for (const Drawing& drawing : drawings())

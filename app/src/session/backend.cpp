@@ -22,9 +22,8 @@ std::vector<Parameter> backendParameters() {
 
 render::GlChoice glChoice(const Arguments& arguments) {
   const std::string gl = arguments.text("gl");
-  return gl == "software"   ? render::GlChoice::software
-         : gl == "hardware" ? render::GlChoice::hardware
-                            : render::GlChoice::automatic;
+  if (gl == "auto") return render::GlChoice::automatic;
+  return gl == "software" ? render::GlChoice::software : render::GlChoice::hardware;
 }
 
 Backend backend(const Arguments& arguments) {

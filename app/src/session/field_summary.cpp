@@ -4,14 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
-#include "text/json.h"
-#include "text/printable.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -19,22 +16,14 @@ namespace {
 
 constexpr int kBarCells = 40;
 
-template <typename Value>
-Json levelsJson(const std::map<int, Value>& levels) {
-  Json json = Json::object();
-  for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
-  return json;
-}
-
 /// Prints one row a level with its share of the volume, its number of leaves and a bar proportional to the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
   for (const auto& [level, share] : volume) {
-    std::string bar;
     const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kBarCells))) : 0;
-    for (int i = 0; i < cells; ++i) bar += "▇";
-    text += fmt::format("  {:>8} {:>6.2f} % {:>12}  {}\n", level, 100 * share, grouped(leaves.at(level)), bar);
+    text +=
+        fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", level, 100 * share, grouped(leaves.at(level)), "", cells);
   }
   return text;
 }
@@ -47,19 +36,13 @@ std::string strategyName(Strategy strategy) {
   return settingText(buildSetting("strategy"), BuildOptions{.strategy = strategy});
 }
 
-/// Returns the leaves' error bounds in ascending order; empty where the field holds no bounds.
-std::vector<double> leafBounds(const Field& field) {
+Json boundsJson(const Field& field) {
   std::vector<double> bounds;
   const FieldData& data = field.data();
   for (std::size_t n = 0; n < data.bounds.size(); ++n)
     if (node::isLeaf(data.nodes[n])) bounds.push_back(data.bounds[n].error);
-  std::ranges::sort(bounds);
-  return bounds;
-}
-
-Json boundsJson(const Field& field) {
-  const std::vector<double> bounds = leafBounds(field);
   if (bounds.empty()) return {};
+  std::ranges::sort(bounds);
   return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
 }
 
@@ -156,41 +139,39 @@ std::string fieldText(const CurrentField& current) {
   const auto& grid = field.grid();
   const bool fromMesh = metadata.source.faces > 0;
   std::string text = current.name + "\n";
-  text += summaryRow("made from", metadata.source.name.empty() ? "a function" : printable(metadata.source.name));
+  const auto row = [&](std::string_view label, const std::string& value) { text += summaryRow(label, value); };
+  row("made from", metadata.source.name.empty() ? "a function" : printable(metadata.source.name));
   if (fromMesh) {
-    text += summaryRow("vertices, faces",
-                       fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
-    text += summaryRow("fingerprint", fingerprintText(metadata.source.fingerprint));
-    text += summaryRow(
-        "sign", insideTestName(metadata.source.insideTest) +
+    row("vertices, faces", fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
+    row("fingerprint", fingerprintText(metadata.source.fingerprint));
+    row("sign", insideTestName(metadata.source.insideTest) +
                     (metadata.source.thickness > 0 ? fmt::format(", {} thick", shortNumber(metadata.source.thickness))
                                                    : std::string()));
   }
   if (const Normalization& n = metadata.source.normalization; !n.isIdentity())
-    text += summaryRow("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
-  text += summaryRow("domain", boxText(field.domain()));
-  text += summaryRow("leaves", grouped(figures.leaves));
-  text += summaryRow("coefficients", fmt::format("{} ({})", grouped(figures.coefficients),
-                                                 field.singlePrecision() ? "float" : "double"));
-  text += summaryRow("memory", bytesText(double(figures.bytes)));
-  if (current.fileBytes) text += summaryRow("file", bytesText(double(*current.fileBytes)));
-  text += summaryRow("error, target",
-                     fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
-                                 shortNumber(metadata.settings.targetError.weighted())));
-  text += summaryRow("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
-  if (field.singlePrecision()) text += summaryRow("change by float", shortNumber(metadata.roundingRms) + " RMS");
-  text += summaryRow("exact distances", grouped(metadata.exactEvaluations));
-  if (metadata.steps) text += summaryRow("refinement steps", grouped(*metadata.steps));
-  text += summaryRow("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));
-  text += summaryRow("settings", settingsText(metadata.settings, false));
-  text += summaryRow("", settingsText(metadata.settings, true));
-  if (metadata.settings.maxError > 0) text += summaryRow("greatest error", shortNumber(metadata.measuredError));
+    row("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
+  row("domain", boxText(field.domain()));
+  row("leaves", grouped(figures.leaves));
+  row("coefficients",
+      fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
+  row("memory", bytesText(double(figures.bytes)));
+  if (current.fileBytes) row("file", bytesText(double(*current.fileBytes)));
+  row("error, target",
+      fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
+                  shortNumber(metadata.settings.targetError.weighted())));
+  row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
+  if (field.singlePrecision()) row("change by float", shortNumber(metadata.roundingRms) + " RMS");
+  row("exact distances", grouped(metadata.exactEvaluations));
+  if (metadata.steps) row("refinement steps", grouped(*metadata.steps));
+  row("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));
+  row("settings", settingsText(metadata.settings, false));
+  row("", settingsText(metadata.settings, true));
+  if (metadata.settings.maxError > 0) row("greatest error", shortNumber(metadata.measuredError));
   if (const double width = field.data().blend; width > 0)
-    text += summaryRow("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
-  if (const auto bounds = leafBounds(field); !bounds.empty())
-    text += summaryRow("bounds of the error",
-                       fmt::format("{} in the median, {} at most", shortNumber(bounds[bounds.size() / 2]),
-                                   shortNumber(bounds.back())));
+    row("continuity", fmt::format("exact: blended within {} of an edge from faces", width));
+  if (const Json bounds = boundsJson(field); !bounds.is_null())
+    row("bounds of the error", fmt::format("{} in the median, {} at most", shortNumber(bounds["median"].get<double>()),
+                                           shortNumber(bounds["greatest"].get<double>())));
   text += histogram("degree", figures.degreeVolume, figures.degreeLeaves);
   text += histogram("depth", figures.depthVolume, figures.depthLeaves);
   return text;

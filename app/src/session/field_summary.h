@@ -1,12 +1,24 @@
 #pragma once
 // Describes a field in text and in JSON.
 
+#include <map>
 #include <string>
 
 #include "session/current_field.h"
 #include "text/json.h"
 
 namespace hpsdf::app {
+
+/// An object whose keys are degrees or depths.
+template <typename Value>
+Json levelsJson(const std::map<int, Value>& levels) {
+  Json json = Json::object();
+  for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
+  return json;
+}
+
+/// The median and the greatest of the leaves' error bounds; null where the field holds no bounds.
+Json boundsJson(const Field& field);
 
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "construction/reference_surface.h"
 #include "construction/surface.h"
 #include "hpsdf/error.h"
 

@@ -1,14 +1,12 @@
 #include "session/session.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "console/long_work.h"
 #include "construction/reference_surface.h"
 #include "construction/surface.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
-#include "session/backend.h"
 #include "session/field_surface.h"
 
 namespace hpsdf::app {
@@ -16,6 +14,12 @@ namespace {
 
 std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
   return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+}
+
+/// Returns the jumps of the field, which it measures unless they are known.
+const Jumps& jumpsOf(const Field& field, std::optional<Jumps>& known, const Console& console) {
+  if (!known) known = withProgress(console, [&](const Progress& progress) { return findJumps(field, 0, progress); });
+  return *known;
 }
 
 }  // namespace
@@ -49,11 +53,7 @@ const CurrentField& Session::current() const {
 
 void Session::setFileBytes(std::uintmax_t bytes) { field_->fileBytes = bytes; }
 
-const Jumps& Session::jumps() {
-  const Field& field = current().field;
-  if (!jumps_) jumps_ = withProgress(console_, [&](const Progress& progress) { return findJumps(field, 0, progress); });
-  return *jumps_;
-}
+const Jumps& Session::jumps() { return jumpsOf(current().field, jumps_, console_); }
 
 bool Session::knowsExact() const {
   return exact_ || exactOfArgument_ || isShape(current().field.metadata().source.name);
@@ -101,7 +101,7 @@ const MeshDefects& Session::defects(const std::string& surface) {
   return *defects_;
 }
 
-Session::Other& Session::loadedOther(const std::string& file) {
+Session::Other& Session::other(const std::string& file) {
   const auto found = std::ranges::find(others_, file, &Other::file);
   if (found != others_.end()) {
     std::rotate(others_.begin(), found, found + 1);
@@ -115,8 +115,6 @@ Session::Other& Session::loadedOther(const std::string& file) {
   return *others_.front();
 }
 
-const Session::Other& Session::other(const std::string& file) { return loadedOther(file); }
-
 bool Session::forgetChangedOthers() {
   return std::erase_if(others_, [](const std::unique_ptr<Other>& other) {
            std::error_code missing;
@@ -126,14 +124,12 @@ bool Session::forgetChangedOthers() {
 }
 
 const Jumps& Session::otherJumps(const std::string& file) {
-  Other& other = loadedOther(file);
-  if (!other.jumps)
-    other.jumps = withProgress(console_, [&](const Progress& progress) { return findJumps(other.field, 0, progress); });
-  return *other.jumps;
+  Other& other = this->other(file);
+  return jumpsOf(other.field, other.jumps, console_);
 }
 
 render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
-  Other& other = loadedOther(file);
+  Other& other = this->other(file);
   if (!other.renderer || other.backend != backend) other.renderer = makeRenderer(other.field, backend);
   other.backend = backend;
   return *other.renderer;

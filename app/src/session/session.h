@@ -89,7 +89,7 @@ class Session {
     std::unique_ptr<render::Renderer> renderer = {};
     Backend backend = {};
   };
-  const Other& other(const std::string& file);
+  Other& other(const std::string& file);
   /// Forgets second fields whose files were modified, and returns whether there were any. A field whose file was
   /// deleted is kept.
   bool forgetChangedOthers();
@@ -110,8 +110,6 @@ class Session {
   const std::string& lastRenderer() const { return lastRenderer_; }
 
  private:
-  Other& loadedOther(const std::string& file);
-
   const Registry& registry_;
   Console console_;
   bool json_ = false;

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "session/session.h"
-#include "study/study.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -19,25 +19,23 @@ const std::vector<Study>& studies() {
   return list;
 }
 
-/// nullptr where it takes none of that name.
+/// Returns nullptr where the study takes none of that name.
 const Parameter* parameterOf(const Study& study, const std::string& name) {
   const auto found = std::ranges::find(study.parameters, name, &Parameter::name);
   return found == study.parameters.end() ? nullptr : &*found;
 }
 
-bool takes(const Study& study, const std::string& name) { return parameterOf(study, name) != nullptr; }
-
-std::vector<const Study*> studiesThatTake(const std::string& name) {
+std::vector<const Study*> takersOf(const std::string& parameter) {
   std::vector<const Study*> takers;
   for (const Study& study : studies())
-    if (takes(study, name)) takers.push_back(&study);
+    if (parameterOf(study, parameter) != nullptr) takers.push_back(&study);
   return takers;
 }
 
-std::vector<std::string> namesOf(const std::vector<const Study*>& studies) {
+std::string namesOf(const std::vector<const Study*>& studies) {
   std::vector<std::string> names;
-  for (const Study* study : studies) names.push_back(study->name);
-  return names;
+  for (const Study* study : studies) names.push_back(fmt::format("'study {}'", study->name));
+  return fmt::format("{}", fmt::join(names, " and "));
 }
 
 const Study& studyOf(const Arguments& arguments) {
@@ -50,9 +48,8 @@ std::vector<Parameter> kindParameters() {
   for (const Study& study : studies())
     for (Parameter parameter : study.parameters) {
       if (std::ranges::find(all, parameter.name, &Parameter::name) != all.end()) continue;
-      const std::vector<const Study*> takers = studiesThatTake(parameter.name);
-      if (takers.size() < studies().size())
-        parameter.group = fmt::format("Options of 'study {}'", fmt::join(namesOf(takers), "' and 'study "));
+      const std::vector<const Study*> takers = takersOf(parameter.name);
+      if (takers.size() < studies().size()) parameter.group = "Options of " + namesOf(takers);
       const auto sameDefault = [&](const Study* other) {
         return parameterOf(*other, parameter.name)->defaultText == parameter.defaultText;
       };
@@ -69,9 +66,9 @@ std::vector<Parameter> kindParameters() {
 void checkStudy(const Arguments& arguments) {
   const Study& study = studyOf(arguments);
   for (const Parameter& parameter : kindParameters())
-    if (arguments.given(parameter.name) && !takes(study, parameter.name))
-      throw Error(fmt::format("{}: is for 'study {}', not for 'study {}'", parameter.name,
-                              fmt::join(namesOf(studiesThatTake(parameter.name)), "' and 'study "), study.name));
+    if (arguments.given(parameter.name) && parameterOf(study, parameter.name) == nullptr)
+      throw Error(fmt::format("{}: is for {}, not for 'study {}'", parameter.name, namesOf(takersOf(parameter.name)),
+                              study.name));
 }
 
 }  // namespace
@@ -87,10 +84,13 @@ std::vector<Parameter> samplingParameters() {
   return {pointsParameter("Random points in the domain at which errors are measured.", "200000", 1), seedParameter()};
 }
 
-SampleOptions sampleOptions(const Arguments& arguments, int threads) {
-  return {.count = static_cast<std::size_t>(arguments.number("points")),
-          .seed = static_cast<std::uint64_t>(arguments.number("seed")),
-          .threads = threads};
+ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
+                          const Box& domain, int threads, double near) {
+  const SampleOptions options{.count = static_cast<std::size_t>(arguments.number("points")),
+                              .seed = static_cast<std::uint64_t>(arguments.number("seed")),
+                              .threads = threads};
+  return withProgress(console,
+                      [&](const Progress& progress) { return sampleUniform(exact, domain, near, options, progress); });
 }
 
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh) {
@@ -112,9 +112,10 @@ Arguments buildArguments(const Session& session, const Arguments& arguments, std
   return parseArguments(build, words, Origin::script);
 }
 
-std::vector<std::string> fileNames(const std::vector<std::string>& meshes) {
+std::vector<std::string> checkedNames(const Session& session, const Arguments& arguments) {
   std::vector<std::string> names;
-  for (const std::string& mesh : meshes) {
+  for (const std::string& mesh : arguments.texts("mesh")) {
+    buildArguments(session, arguments, names.size());
     const std::string plain = plainName(mesh);
     std::string name = plain;
     for (int number = 2; std::ranges::find(names, name) != names.end(); ++number)
@@ -122,6 +123,21 @@ std::vector<std::string> fileNames(const std::vector<std::string>& meshes) {
     names.push_back(name);
   }
   return names;
+}
+
+std::string rowText(const Json& row, const char* separator) {
+  const auto cellText = [](const Json& value) {
+    if (value.is_null()) return std::string();
+    if (value.is_boolean()) return std::to_string(int(value.get<bool>()));
+    if (value.is_number_integer()) return value.dump();
+    if (value.is_number()) return fmt::format("{}", value.get<double>());
+    std::string quoted = "\"";
+    for (const char c : value.get<std::string>()) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + "\"";
+  };
+  std::vector<std::string> cells;
+  for (const Json& value : row) cells.push_back(cellText(value));
+  return fmt::format("{}", fmt::join(cells, separator));
 }
 
 namespace {

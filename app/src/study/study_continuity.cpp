@@ -13,9 +13,8 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
-#include "language/script.h"
 #include "session/session.h"
-#include "study/study.h"
+#include "study/study_command.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -25,29 +24,6 @@ namespace {
 /// Width of the region near the surface, as a share of the domain's longest edge.
 constexpr double kNear = 0.01;
 
-struct ContinuityRow {
-  std::string mesh;
-  bool enriched = false;
-  double weight = 0;  ///< λ; 0 without weak continuity
-  double jump = 0, greatestJump = 0, rms = 0, nearRms = 0;
-  std::size_t bytes = 0;
-  int iterations = 0;
-  double seconds = 0;       ///< time of the post-process
-  double buildSeconds = 0;  ///< time of the construction
-};
-
-/// A row with its ratios to `first`, the mesh's field without enrichment and without weak continuity.
-struct Compared {
-  const ContinuityRow& row;
-  const ContinuityRow& first;
-  double jump() const { return row.jump / first.jump; }
-  double greatestJump() const { return row.greatestJump / first.greatestJump; }
-  double rms() const { return row.rms / first.rms; }
-  double nearRms() const { return row.nearRms / first.nearRms; }
-  double bytes() const { return double(row.bytes) / double(first.bytes); }
-  double time() const { return row.seconds / row.buildSeconds; }
-};
-
 /// Measures the fields of one mesh.
 class ContinuityStudy {
  public:
@@ -55,55 +31,58 @@ class ContinuityStudy {
       : console_(session.console()),
         arguments_(arguments),
         mesh_(arguments.texts("mesh")[mesh]),
-        input_(buildInput(console_, mesh_, buildArguments(session, arguments, mesh))) {
-    takeSamples();
-  }
+        input_(buildInput(console_, mesh_, buildArguments(session, arguments, mesh))),
+        uniform_(samples(0)),
+        near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
-  std::vector<ContinuityRow> run() {
-    std::vector<ContinuityRow> rows;
+  /// Adds one row for each field: its figures, each with the ratio to that of the mesh's first field, which is neither
+  /// enriched nor smoothed.
+  void addRows(Json& rows) {
     for (const bool enriched : {false, true}) {
       BuildOptions options = input_.options;
       options.enrich = enriched;
       const auto begin = std::chrono::steady_clock::now();
       const Field built = withProgress(
           console_, [&](const Progress& progress) { return build(*input_.exact, input_.domain, options, progress); });
-      ContinuityRow row{.mesh = mesh_, .enriched = enriched, .buildSeconds = input_.setUpSeconds + secondsSince(begin)};
-      measure(built, row);
-      rows.push_back(row);
+      const double buildSeconds = input_.setUpSeconds + secondsSince(begin);
+      rows.push_back(rowOf(built, enriched, {}, 0, 0, buildSeconds));
       for (const double weight : arguments_.numbers("weights")) {
         const auto start = std::chrono::steady_clock::now();
         const WeaklyContinuous made = withProgress(console_, [&](const Progress& progress) {
           return weaklyContinuous(built, {.weight = weight}, options.threads, progress);
         });
-        row.seconds = secondsSince(start);
-        row.weight = weight;
-        row.iterations = made.iterations;
-        measure(made.field, row);
-        rows.push_back(row);
+        rows.push_back(rowOf(made.field, enriched, weight, made.iterations, secondsSince(start), buildSeconds));
       }
     }
-    return rows;
   }
 
  private:
-  void takeSamples() {
-    const SampleOptions sampling = sampleOptions(arguments_, input_.options.threads);
-    const double near = kNear * input_.domain.sizes().maxCoeff();
-    withProgress(console_, [&](const Progress& progress) {
-      uniform_ = sampleUniform(*input_.exact, input_.domain, 0, sampling, progress);
-      near_ = sampleUniform(*input_.exact, input_.domain, near, sampling, progress);
-      return 0;
-    });
+  ExactSamples samples(double near) const {
+    return exactSamples(console_, arguments_, *input_.exact, input_.domain, input_.options.threads, near);
   }
 
-  void measure(const Field& field, ContinuityRow& row) const {
-    const Jumps jumps = withProgress(
-        console_, [&](const Progress& progress) { return findJumps(field, input_.options.threads, progress); });
-    row.jump = jumps.value.rms;
-    row.greatestJump = jumps.value.max;
-    row.rms = measureError(field, uniform_, input_.options.threads).rms;
-    row.nearRms = measureError(field, near_, input_.options.threads).rms;
-    row.bytes = field.bytes();
+  /// `weight` is null for a field that is not smoothed.
+  Json rowOf(const Field& field, bool enriched, const Json& weight, int iterations, double seconds,
+             double buildSeconds) {
+    Json row = {{"mesh", mesh_}, {"enriched", enriched}, {"weight", weight}};
+    const auto add = [&](const std::string& name, const Json& figure) {
+      row[name] = figure;
+      row[name + "_ratio"] = figure.get<double>() / (first_.is_null() ? row : first_)[name].get<double>();
+    };
+    const int threads = input_.options.threads;
+    const Jumps jumps =
+        withProgress(console_, [&](const Progress& progress) { return findJumps(field, threads, progress); });
+    add("jump_rms", jumps.value.rms);
+    add("jump_max", jumps.value.max);
+    add("rms", measureError(field, uniform_, threads).rms);
+    add("near_rms", measureError(field, near_, threads).rms);
+    add("bytes", field.bytes());
+    row.update({{"iterations", iterations},
+                {"seconds", seconds},
+                {"build_seconds", buildSeconds},
+                {"seconds_ratio", seconds / buildSeconds}});
+    if (first_.is_null()) first_ = row;
+    return row;
   }
 
   const Console& console_;
@@ -111,71 +90,40 @@ class ContinuityStudy {
   std::string mesh_;
   BuildInput input_;
   ExactSamples uniform_, near_;
+  Json first_;  ///< the mesh's first row; null before
 };
 
-/// A CSV field in quotes, because the names of shapes contain commas.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return result + "\"";
-}
-
-std::string csv(const std::vector<Compared>& rows) {
-  std::string text =
-      "mesh,enriched,weight,jump_rms,jump_rms_ratio,jump_max,jump_max_ratio,rms,rms_ratio,near_rms,near_rms_ratio,"
-      "bytes,bytes_ratio,iterations,seconds,seconds_ratio\n";
-  for (const Compared& ratio : rows) {
-    const ContinuityRow& row = ratio.row;
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", quoted(row.mesh), int(row.enriched),
-                        row.weight > 0 ? fmt::format("{}", row.weight) : "", row.jump, ratio.jump(), row.greatestJump,
-                        ratio.greatestJump(), row.rms, ratio.rms(), row.nearRms, ratio.nearRms(), row.bytes,
-                        ratio.bytes(), row.iterations, row.seconds, ratio.time());
+/// A CSV table of the rows. It leaves the time of the construction out.
+std::string csv(Json rows) {
+  std::string head, body;
+  for (Json& row : rows) {
+    row.erase("build_seconds");
+    body += rowText(row) + "\n";
   }
-  return text;
+  for (const auto& [name, value] : rows.front().items()) head += (head.empty() ? "" : ",") + name;
+  return head + "\n" + body;
 }
 
-Json json(const std::vector<Compared>& rows) {
-  Json all = Json::array();
-  for (const Compared& ratio : rows) {
-    const ContinuityRow& row = ratio.row;
-    all.push_back({{"mesh", row.mesh},
-                   {"enriched", row.enriched},
-                   {"weight", row.weight > 0 ? Json(row.weight) : Json()},
-                   {"jump_rms", row.jump},
-                   {"jump_rms_ratio", ratio.jump()},
-                   {"jump_max", row.greatestJump},
-                   {"jump_max_ratio", ratio.greatestJump()},
-                   {"rms", row.rms},
-                   {"rms_ratio", ratio.rms()},
-                   {"near_rms", row.nearRms},
-                   {"near_rms_ratio", ratio.nearRms()},
-                   {"bytes", row.bytes},
-                   {"bytes_ratio", ratio.bytes()},
-                   {"iterations", row.iterations},
-                   {"seconds", row.seconds},
-                   {"build_seconds", row.buildSeconds},
-                   {"seconds_ratio", ratio.time()}});
-  }
-  return all;
-}
-
-std::string table(const std::vector<Compared>& rows) {
+std::string table(const Json& rows) {
   std::string text, mesh;
-  for (const Compared& ratio : rows) {
-    const ContinuityRow& row = ratio.row;
-    if (row.mesh != mesh) {
-      mesh = row.mesh;
-      text +=
-          fmt::format("{}{}: RMS jump {}, greatest {}, RMS error {}, near the surface {}, {}, built in {:.1f} s\n",
-                      text.empty() ? "" : "\n", mesh, shortNumber(row.jump), shortNumber(row.greatestJump),
-                      shortNumber(row.rms), shortNumber(row.nearRms), bytesText(double(row.bytes)), row.buildSeconds);
+  for (const Json& row : rows) {
+    const auto number = [&](const char* name) { return numberIn(row, name); };
+    if (row["mesh"].get<std::string>() != mesh) {
+      mesh = row["mesh"].get<std::string>();
+      text += fmt::format("{}{}: RMS jump {}, greatest {}, RMS error {}, near the surface {}, {}, built in {:.1f} s\n",
+                          text.empty() ? "" : "\n", mesh, shortNumber(number("jump_rms")),
+                          shortNumber(number("jump_max")), shortNumber(number("rms")), shortNumber(number("near_rms")),
+                          bytesText(number("bytes")), number("build_seconds"));
       text += fmt::format("  {:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>6} {:>9}\n", "", "weight", "RMS jump",
                           "max jump", "error", "near", "bytes", "steps", "time");
     }
+    const bool isSmoothed = !row["weight"].is_null();
     text += fmt::format("  {:<10} {:>9} {:>7.3f} × {:>7.3f} × {:>7.3f} × {:>7.3f} × {:>5.2f} ×",
-                        row.enriched ? "enriched" : "", row.weight > 0 ? shortNumber(row.weight) : "none", ratio.jump(),
-                        ratio.greatestJump(), ratio.rms(), ratio.nearRms(), ratio.bytes());
-    text += row.weight > 0 ? fmt::format(" {:>6} {:>7.2f} ×\n", row.iterations, ratio.time()) : "\n";
+                        row["enriched"].get<bool>() ? "enriched" : "",
+                        isSmoothed ? shortNumber(number("weight")) : "none", number("jump_rms_ratio"),
+                        number("jump_max_ratio"), number("rms_ratio"), number("near_rms_ratio"), number("bytes_ratio"));
+    text +=
+        isSmoothed ? fmt::format(" {:>6} {:>7.2f} ×\n", row["iterations"].get<int>(), number("seconds_ratio")) : "\n";
   }
   return text;
 }
@@ -183,19 +131,14 @@ std::string table(const std::vector<Compared>& rows) {
 void runContinuity(Session& session, const Arguments& arguments) {
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "continuity.csv");
-  const std::vector<std::string> meshes = arguments.texts("mesh");
-  for (std::size_t n = 0; n < meshes.size(); ++n)
-    buildArguments(session, arguments, n);  // reports mistakes before the long work
-  std::vector<std::vector<ContinuityRow>> all;
-  for (std::size_t n = 0; n < meshes.size(); ++n) all.push_back(ContinuityStudy(session, arguments, n).run());
-  std::vector<Compared> rows;
-  for (const auto& ofMesh : all)
-    for (const ContinuityRow& row : ofMesh) rows.push_back({row, ofMesh.front()});
+  const std::size_t count = checkedNames(session, arguments).size();
+  Json rows = Json::array();
+  for (std::size_t n = 0; n < count; ++n) ContinuityStudy(session, arguments, n).addRows(rows);
 
   folder.write("continuity.csv", csv(rows));
-  folder.write("continuity.json", json(rows).dump(2) + "\n");
+  folder.write("continuity.json", jsonText(rows));
   folder.commit();
-  if (session.wantsJson(arguments)) return printJson(session.console().out, json(rows));
+  if (session.wantsJson(arguments)) return printJson(session.console().out, rows);
   session.console().out << table(rows) << (folder.path() / "continuity.csv").string() << "\n"
                         << (folder.path() / "continuity.json").string() << "\n";
 }

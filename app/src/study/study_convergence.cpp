@@ -19,10 +19,9 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
-#include "language/script.h"
 #include "session/field_summary.h"
 #include "session/session.h"
-#include "study/study.h"
+#include "study/study_command.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -31,29 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kStrategies = {Strategy::hp, Strategy::h2, Strategy::h1};
 constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
-
-/// The figures of a field during its construction. Errors are scaled to a mesh with a longest side of 2.
-struct Stage {
-  std::uint64_t steps;
-  std::size_t leaves;
-  std::size_t coefficients;
-  double estimatedRms;
-  double measuredRms;
-  double measuredMax;
-};
-
-struct Curve {
-  Strategy strategy;
-  std::vector<Stage> stages;  ///< by ascending number of coefficients
-};
-
-struct Convergence {
-  std::string mesh;
-  std::string name;  ///< name for files
-  std::vector<Curve> curves;
-};
 
 /// Thrown to end a construction that has enough coefficients.
 struct LargeEnough {};
@@ -70,163 +47,134 @@ std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficient
   return steps;
 }
 
-Stage stageOf(const Field& field, const ExactSamples& samples, int threads) {
+/// The figures of a field during its construction. Errors are scaled to a mesh with a longest side of 2.
+Json stageOf(const Field& field, const ExactSamples& samples, int threads) {
   const double scale = field.metadata().referenceLength / 2;
   const FieldStatistics figures = statistics(field);
   const ErrorFigures error = measureError(field, samples, threads);
-  return {*field.metadata().steps, figures.leaves,
-          figures.coefficients,    field.metadata().rmsEstimate(field.domain()) / scale,
-          error.rms / scale,       error.max / scale};
+  return {
+      {"steps", *field.metadata().steps},     {"leaves", figures.leaves},
+      {"coefficients", figures.coefficients}, {"estimated_rms", field.metadata().rmsEstimate(field.domain()) / scale},
+      {"measured_rms", error.rms / scale},    {"measured_max", error.max / scale}};
 }
 
-Curve curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& samples, const Arguments& arguments,
-              const Progress& progress) {
+/// The stages of a construction, by ascending number of coefficients.
+Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& samples, const Arguments& arguments,
+             const Progress& progress) {
   const double growth = std::pow(10, 1 / arguments.number("stages"));
   const auto most = static_cast<std::size_t>(arguments.number("max-coefficients"));
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
   options.targetError = std::numeric_limits<double>::min();  // the construction refines until it is ended
-  Curve curve{strategy, {}};
+  Json stages = Json::array();
+  const auto inspect = [&](const Field& field) {
+    const std::size_t coefficients = statistics(field).coefficients;
+    if (coefficients > most) throw LargeEnough();
+    if (!stages.empty() && double(coefficients) < growth * numberIn(stages.back(), "coefficients")) return;
+    stages.push_back(stageOf(field, samples, options.threads));
+    if (progress.report)
+      progress.report(strategyName(strategy), std::log(double(coefficients)) / std::log(double(most)));
+  };
   try {
-    buildStages(*input.exact, input.domain, options, stageSteps(std::pow(growth, 0.25), most),
-                [&](const Field& field) {
-                  const std::size_t coefficients = statistics(field).coefficients;
-                  if (coefficients > most) throw LargeEnough();
-                  if (!curve.stages.empty() && double(coefficients) < growth * double(curve.stages.back().coefficients))
-                    return;
-                  curve.stages.push_back(stageOf(field, samples, options.threads));
-                  if (progress.report)
-                    progress.report(strategyName(strategy), std::log(double(coefficients)) / std::log(double(most)));
-                },
+    buildStages(*input.exact, input.domain, options, stageSteps(std::pow(growth, 0.25), most), inspect,
                 {.report = {}, .cancelled = progress.cancelled});
   } catch (const LargeEnough&) {
   }
-  if (curve.stages.empty())
+  if (stages.empty())
     throw Error(
         fmt::format("max-coefficients: the base cells of {} alone have more; give a larger number or a smaller "
                     "grid",
                     strategyName(strategy)));
-  return curve;
-}
-
-Convergence studied(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
-  const std::string surface = arguments.texts("mesh")[mesh];
-  const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
-  return withProgress(session.console(), [&](const Progress& progress) {
-    const SampleOptions sampling = sampleOptions(arguments, input.options.threads);
-    const ExactSamples samples = sampleUniform(*input.exact, input.domain, 0, sampling, progress);
-    Convergence convergence{surface, name, {}};
-    for (const Strategy strategy : kStrategies)
-      convergence.curves.push_back(curveOf(input, strategy, samples, arguments, progress));
-    return convergence;
-  });
+  return stages;
 }
 
 /// The smallest measured RMS error that all curves reach.
-double commonRms(const Convergence& convergence) {
+double commonRms(const Json& curves) {
   double common = 0;
-  for (const Curve& curve : convergence.curves)
-    common = std::max(common, std::ranges::min(curve.stages, {}, &Stage::measuredRms).measuredRms);
+  for (const Json& stages : curves) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Json& stage : stages) least = std::min(least, numberIn(stage, "measured_rms"));
+    common = std::max(common, least);
+  }
   return common;
 }
 
 /// The number of coefficients at which a curve has a measured RMS error, interpolated linearly in logarithms. Nothing
 /// if the curve does not reach the error, or starts below it.
-std::optional<double> coefficientsAt(const Curve& curve, double rms) {
-  for (std::size_t n = 0; n < curve.stages.size(); ++n) {
-    const Stage& after = curve.stages[n];
-    if (after.measuredRms > rms) continue;
-    if (after.measuredRms == rms) return double(after.coefficients);
+std::optional<double> coefficientsAt(const Json& stages, double rms) {
+  for (std::size_t n = 0; n < stages.size(); ++n) {
+    const double rmsAfter = numberIn(stages[n], "measured_rms"), after = numberIn(stages[n], "coefficients");
+    if (rmsAfter > rms) continue;
+    if (rmsAfter == rms) return after;
     if (n == 0) return std::nullopt;
-    const Stage& before = curve.stages[n - 1];
-    const double share = std::log(rms / before.measuredRms) / std::log(after.measuredRms / before.measuredRms);
-    return std::exp(std::lerp(std::log(double(before.coefficients)), std::log(double(after.coefficients)), share));
+    const double rmsBefore = numberIn(stages[n - 1], "measured_rms"), before = numberIn(stages[n - 1], "coefficients");
+    const double share = std::log(rms / rmsBefore) / std::log(rmsAfter / rmsBefore);
+    return std::exp(std::lerp(std::log(before), std::log(after), share));
   }
   return std::nullopt;
 }
 
-double comparedRms(const Convergence& convergence, const Arguments& arguments) {
-  return arguments.has("at") ? arguments.number("at") : commonRms(convergence);
-}
-
-std::string csvOf(const std::vector<Convergence>& all) {
-  std::string text = "mesh,strategy,steps,leaves,coefficients,estimated_rms,measured_rms,measured_max\n";
-  for (const Convergence& convergence : all)
-    for (const Curve& curve : convergence.curves)
-      for (const Stage& stage : curve.stages)
-        text += fmt::format("{},{},{},{},{},{},{},{}\n", convergence.name, strategyName(curve.strategy), stage.steps,
-                            stage.leaves, stage.coefficients, stage.estimatedRms, stage.measuredRms, stage.measuredMax);
-  return text;
-}
-
-Json comparisonJson(const Convergence& convergence, double rms) {
+/// The numbers of coefficients with which the curves have the same error.
+Json equalError(const Json& curves, double rms) {
   Json json = {{"measured_rms", rms}};
-  const auto ofHp = coefficientsAt(convergence.curves.front(), rms);
-  for (const Curve& curve : convergence.curves) {
-    const auto coefficients = coefficientsAt(curve, rms);
-    json[strategyName(curve.strategy)] = {{"coefficients", coefficients ? Json(*coefficients) : Json()},
-                                          {"over_hp", coefficients && ofHp ? Json(*coefficients / *ofHp) : Json()}};
+  const auto ofHp = coefficientsAt(curves.front(), rms);
+  for (const auto& [strategy, stages] : curves.items()) {
+    const auto coefficients = coefficientsAt(stages, rms);
+    json[strategy] = {{"coefficients", coefficients ? Json(*coefficients) : Json()},
+                      {"over_hp", coefficients && ofHp ? Json(*coefficients / *ofHp) : Json()}};
   }
   return json;
 }
 
-Json jsonOf(const std::vector<Convergence>& all, const Arguments& arguments, const Json& files) {
-  Json meshes = Json::array();
-  for (const Convergence& convergence : all) {
+/// The curves of a mesh, and the comparison between them; `name` is its name for files.
+Json studied(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
+  const std::string surface = arguments.texts("mesh")[mesh];
+  const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
+  const ExactSamples samples =
+      exactSamples(session.console(), arguments, *input.exact, input.domain, input.options.threads);
+  return withProgress(session.console(), [&](const Progress& progress) {
     Json curves = Json::object();
-    for (const Curve& curve : convergence.curves) {
-      Json stages = Json::array();
-      for (const Stage& stage : curve.stages)
-        stages.push_back({{"steps", stage.steps},
-                          {"leaves", stage.leaves},
-                          {"coefficients", stage.coefficients},
-                          {"estimated_rms", stage.estimatedRms},
-                          {"measured_rms", stage.measuredRms},
-                          {"measured_max", stage.measuredMax}});
-      curves[strategyName(curve.strategy)] = stages;
-    }
-    meshes.push_back({{"mesh", convergence.mesh},
-                      {"name", convergence.name},
-                      {"equal_error", comparisonJson(convergence, comparedRms(convergence, arguments))},
-                      {"curves", curves}});
-  }
-  return {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
-          {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
-          {"files", files},
-          {"meshes", meshes}};
+    for (const Strategy strategy : {Strategy::hp, Strategy::h2, Strategy::h1})
+      curves[strategyName(strategy)] = curveOf(input, strategy, samples, arguments, progress);
+    const double rms = arguments.has("at") ? arguments.number("at") : commonRms(curves);
+    return Json({{"mesh", surface}, {"name", name}, {"equal_error", equalError(curves, rms)}, {"curves", curves}});
+  });
 }
 
-std::string textOf(const Convergence& convergence, const Arguments& arguments) {
-  std::string text = fmt::format("{}\n  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", convergence.mesh, "strategy",
-                                 "coefficients", "cells", "estimated RMS", "measured RMS", "measured max");
-  for (const Curve& curve : convergence.curves) {
-    const Stage& last = curve.stages.back();
-    text += fmt::format("  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", strategyName(curve.strategy),
-                        grouped(last.coefficients), grouped(last.leaves), shortNumber(last.estimatedRms),
-                        shortNumber(last.measuredRms), shortNumber(last.measuredMax));
+std::string csvOf(const Json& meshes) {
+  std::string text = "mesh,strategy,steps,leaves,coefficients,estimated_rms,measured_rms,measured_max\n";
+  for (const Json& mesh : meshes)
+    for (const auto& [strategy, stages] : mesh["curves"].items())
+      for (const Json& stage : stages)
+        text += fmt::format("{},{},{}\n", mesh["name"].get<std::string>(), strategy, rowText(stage));
+  return text;
+}
+
+std::string textOf(const Json& mesh) {
+  std::string text = fmt::format("{}\n  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", mesh["mesh"].get<std::string>(),
+                                 "strategy", "coefficients", "cells", "estimated RMS", "measured RMS", "measured max");
+  for (const auto& [strategy, stages] : mesh["curves"].items()) {
+    const Json& last = stages.back();
+    text += fmt::format("  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", strategy,
+                        grouped(last["coefficients"].get<std::uint64_t>()),
+                        grouped(last["leaves"].get<std::uint64_t>()), shortNumber(numberIn(last, "estimated_rms")),
+                        shortNumber(numberIn(last, "measured_rms")), shortNumber(numberIn(last, "measured_max")));
   }
-  const double rms = comparedRms(convergence, arguments);
-  text += fmt::format("  coefficients at a measured RMS error of {}\n", shortNumber(rms));
-  const auto ofHp = coefficientsAt(convergence.curves.front(), rms);
-  for (const Curve& curve : convergence.curves) {
-    const auto coefficients = coefficientsAt(curve, rms);
-    text += fmt::format("  {:<9} {:>14}", strategyName(curve.strategy),
-                        coefficients ? grouped(std::uint64_t(std::llround(*coefficients))) : "out of reach");
-    text += coefficients && ofHp ? fmt::format("   {:.2f} × hp\n", *coefficients / *ofHp) : "\n";
+  const Json& equal = mesh["equal_error"];
+  text += fmt::format("  coefficients at a measured RMS error of {}\n", shortNumber(numberIn(equal, "measured_rms")));
+  for (const auto& [strategy, stages] : mesh["curves"].items()) {
+    const Json &coefficients = equal[strategy]["coefficients"], &overHp = equal[strategy]["over_hp"];
+    text += fmt::format(
+        "  {:<9} {:>14}{}\n", strategy,
+        coefficients.is_null() ? "out of reach" : grouped(std::uint64_t(std::llround(coefficients.get<double>()))),
+        overHp.is_null() ? "" : fmt::format("   {:.2f} × hp", overHp.get<double>()));
   }
   return text;
 }
 
-fs::path requireGnuplot() {
-  if (const auto found = findProgram("gnuplot")) return *found;
-  throw Error(
-      "study convergence: its pictures take the program gnuplot, which PATH does not have; install the package "
-      "gnuplot-nox, or give --no-plot");
-}
-
 /// The gnuplot script that draws a mesh's curves. The data of the n-th curve are the n-th block of plot.dat.
-std::string plotScript(const Convergence& convergence) {
+std::string plotScript(const Json& mesh) {
   std::string script = fmt::format(
       "set terminal pngcairo size 900,560 font \"DejaVu Sans,11\" background \"#fbfbf8\"\n"
       "set output \"plot.png\"\n"
@@ -241,59 +189,54 @@ std::string plotScript(const Convergence& convergence) {
       "set grid lt 1 lw 0.7 lc rgb \"#dcdcd8\"\n"
       "set key outside right top\n"
       "plot ",
-      convergence.name);
+      mesh["name"].get<std::string>());
   const std::array<std::array<std::string_view, 3>, 3> kinds = {
       {{"5", "measured RMS", "with linespoints lw 2 pt 7 ps 0.6"},
        {"4", "estimated RMS", "with lines lw 1.5 dt (8,5)"},
        {"6", "measured maximum", "with lines lw 2 dt (2,3)"}}};
   std::string separator;
-  for (std::size_t n = 0; n < convergence.curves.size(); ++n)
+  std::size_t n = 0;
+  for (const auto& [strategy, stages] : mesh["curves"].items()) {
     for (const auto& [column, what, style] : kinds) {
       script += fmt::format("{}\"plot.dat\" index {} using 3:{} {} lc rgb \"{}\" title \"{}, {}\"", separator, n,
-                            column, style, kCurveColors[n], strategyName(convergence.curves[n].strategy), what);
+                            column, style, kCurveColors[n], strategy, what);
       separator = ", \\\n     ";
     }
+    ++n;
+  }
   return script + "\n";
 }
 
-std::string plotData(const Convergence& convergence) {
-  std::string text;
-  for (const Curve& curve : convergence.curves) {
-    for (const Stage& stage : curve.stages)
-      text += fmt::format("{} {} {} {} {} {}\n", stage.steps, stage.leaves, stage.coefficients, stage.estimatedRms,
-                          stage.measuredRms, stage.measuredMax);
-    text += "\n\n";
-  }
-  return text;
-}
-
 /// Draws the curves of a mesh. Returns the bytes of the PNG file.
-std::string plotOf(const fs::path& gnuplot, const Convergence& convergence) {
+std::string plotOf(const fs::path& gnuplot, const Json& mesh) {
   const TemporaryFolder folder;
-  writeTextFile(folder.path() / "plot.dat", plotData(convergence));
-  writeTextFile(folder.path() / "plot.gp", plotScript(convergence));
-  const fs::path log = folder.path() / "gnuplot.txt", picture = folder.path() / "plot.png";
-  const int status = runOtherProgram(gnuplot, {"plot.gp"}, folder.path(), log, {});
-  if (status != 0 || !fs::exists(picture))
-    throw Error(fmt::format("study convergence: gnuplot failed with status {} ({}); give --no-plot", status,
-                            lastLine(readTextFile(log.string()))));
-  return readWholeFile(picture.string());
+  std::string data;
+  for (const Json& stages : mesh["curves"]) {
+    for (const Json& stage : stages) data += rowText(stage, " ") + "\n";
+    data += "\n\n";
+  }
+  writeTextFile(folder.path() / "plot.dat", data);
+  writeTextFile(folder.path() / "plot.gp", plotScript(mesh));
+  const std::string problem = runOtherProgram(gnuplot, {"plot.gp"}, folder.path(), "plot.png", {});
+  if (!problem.empty()) throw Error(fmt::format("study convergence: {}; give --no-plot", problem));
+  return readWholeFile((folder.path() / "plot.png").string());
 }
 
 void runConvergence(Session& session, const Arguments& arguments) {
   const bool plots = !arguments.flag("no-plot");
-  const fs::path gnuplot = plots ? requireGnuplot() : fs::path();
+  const fs::path gnuplot = findProgram("gnuplot").value_or("");
+  if (plots && gnuplot.empty())
+    throw Error(
+        "study convergence: its pictures take the program gnuplot, which PATH does not have; install the package "
+        "gnuplot-nox, or give --no-plot");
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "convergence.csv");
-  const std::vector<std::string> meshes = arguments.texts("mesh");
-  const std::vector<std::string> names = fileNames(meshes);
-  for (std::size_t n = 0; n < meshes.size(); ++n)
-    buildArguments(session, arguments, n);  // reports mistakes before the long work
-  std::vector<Convergence> all;
+  const std::vector<std::string> names = checkedNames(session, arguments);
+  Json meshes = Json::array();
   std::vector<std::string> pictures;
-  for (std::size_t n = 0; n < meshes.size(); ++n) {
-    all.push_back(studied(session, arguments, n, names[n]));
-    if (plots) pictures.push_back(plotOf(gnuplot, all.back()));
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    meshes.push_back(studied(session, arguments, n, names[n]));
+    if (plots) pictures.push_back(plotOf(gnuplot, meshes.back()));
   }
 
   Json files = Json::array();
@@ -302,14 +245,17 @@ void runConvergence(Session& session, const Arguments& arguments) {
     folder.write(file, bytes);
     files.push_back((folder.path() / file).string());
   };
-  write("convergence.csv", csvOf(all));
+  write("convergence.csv", csvOf(meshes));
   for (std::size_t n = 0; n < pictures.size(); ++n) write(fmt::format("convergence-{}.png", names[n]), pictures[n]);
   files.push_back((folder.path() / "convergence.json").string());
-  const Json json = jsonOf(all, arguments, files);
-  folder.write("convergence.json", json.dump(2) + "\n");
+  const Json json = {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
+                     {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
+                     {"files", files},
+                     {"meshes", meshes}};
+  folder.write("convergence.json", jsonText(json));
   folder.commit();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);
-  for (const Convergence& convergence : all) session.console().out << textOf(convergence, arguments);
+  for (const Json& mesh : meshes) session.console().out << textOf(mesh);
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
 }
 

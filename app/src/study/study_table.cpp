@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <array>
 #include <map>
 #include <set>
 
 #include "console/interrupt.h"
-#include "console/long_work.h"
 #include "console/version.h"
 #include "construction/build_field.h"
 #include "files/html_page.h"
@@ -18,21 +17,39 @@
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
-#include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
+#include "session/field_summary.h"
 #include "session/session.h"
-#include "study/study.h"
+#include "study/study_command.h"
 #include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr int kThumbnail = 200;  // side of a slice, pixels
 constexpr int kBar = 300;        // length of a bar, which shows the whole volume, pixels
+constexpr int kBarHeight = 18;
+
+using Shares = std::map<int, double>;
+using Colors = std::map<int, render::Color>;
+
+/// A number of each cell, which bars and slices show by colours.
+struct Level {
+  render::ColorBy color;
+  const char *name, *title;
+  Shares FieldStatistics::*volume;
+};
+constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
+                                Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
+
+/// A slice through the middle of the domain, and a bar that shows the shares of the volume in the same colours.
+struct LevelPicture {
+  std::string png = {};  ///< bytes of the slice's file
+  std::string svg = {};  ///< the bar
+  Colors colors = {};    ///< of the levels of all rows
+};
 
 /// A mesh and its field.
 struct TableRow {
@@ -40,51 +57,60 @@ struct TableRow {
   std::string name;  ///< name for files
   Field field;
   FieldStatistics figures;
-  double seconds;      ///< of the construction
-  ErrorFigures error;  ///< measured, in the field's units
+  double seconds;                                              ///< of the construction
+  ErrorFigures error;                                          ///< measured, in the field's units
+  std::array<LevelPicture, std::size(kLevels)> pictures = {};  ///< one for each of `kLevels`
 
   double scale() const { return field.metadata().referenceLength / 2; }
   double estimatedRms() const { return field.metadata().rmsEstimate(field.domain()) / scale(); }
 };
 
-using Shares = std::map<int, double>;
-using Colors = std::map<int, render::Color>;
-
 TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
   const std::string surface = arguments.texts("mesh")[mesh];
   const Arguments buildArgs = buildArguments(session, arguments, mesh);
   BuiltField built = buildField(session.console(), surface, buildArgs);
-  const SampleOptions sampling = sampleOptions(arguments, buildArgs.whole("threads"));
-  const ExactSamples samples = withProgress(session.console(), [&](const Progress& progress) {
-    return sampleUniform(*built.exact, built.field.domain(), 0, sampling, progress);
-  });
-  ErrorFigures error = measureError(built.field, samples, sampling.threads);
+  const int threads = buildArgs.whole("threads");
+  const ExactSamples samples = exactSamples(session.console(), arguments, *built.exact, built.field.domain(), threads);
+  ErrorFigures error = measureError(built.field, samples, threads);
   FieldStatistics figures = statistics(built.field);
   return {surface, name, std::move(built.field), std::move(figures), built.seconds, std::move(error)};
 }
 
-const Shares& sharesOf(const TableRow& row, render::ColorBy color) {
-  return color == render::ColorBy::degree ? row.figures.degreeVolume : row.figures.depthVolume;
+/// A row of rectangles in the colours of levels, each as wide as its share. They contain the level's number where there
+/// is room, and tell it, with the share if asked, where the pointer rests on them.
+std::string sharesSvg(int width, const Shares& shares, const Colors& colors, bool tellsShares) {
+  std::string parts;
+  double from = 0;
+  for (const auto& [level, share] : shares) {
+    const render::Color& color = colors.at(level);
+    parts +=
+        fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
+                    width * from, width * share, kBarHeight, colorText(color),
+                    tellsShares ? fmt::format("{}: {:.2f} %", level, 100 * share) : std::to_string(level));
+    const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
+    if (width * share > 12)
+      parts += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", width * from + width * share / 2,
+                           isLight ? "#000000" : "#ffffff", level);
+    from += share;
+  }
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
+      width, kBarHeight, parts);
 }
 
-/// The levels of all rows, so that a colour has the same meaning in every picture.
-std::vector<int> levelsOf(const std::vector<TableRow>& rows, render::ColorBy color) {
-  std::set<int> levels;
-  for (const TableRow& row : rows)
-    for (const auto& [level, share] : sharesOf(row, color)) levels.insert(level);
-  return {levels.begin(), levels.end()};
+/// The key to the colours of all levels.
+std::string legendSvg(const Colors& colors) {
+  constexpr int kWidth = 26;
+  Shares equal;
+  for (const auto& [level, color] : colors) equal[level] = 1 / double(colors.size());
+  return sharesSvg(kWidth * int(colors.size()), equal, colors, false);
 }
 
-/// A slice through the middle of the domain, with the levels that its colours show.
-struct Thumbnail {
-  std::string png;  ///< bytes of the PNG file
-  Colors colors;
-};
-
-Thumbnail thumbnailOf(render::Renderer& renderer, const TableRow& row, render::ColorBy color,
-                      const std::vector<int>& levels) {
+LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Level& level,
+                       const std::vector<int>& levels) {
   const render::SlicePicture picture{.plane = render::AxisPlane{2, defaultOffset(row.field.domain(), 2)},
-                                     .color = color,
+                                     .color = level.color,
                                      .width = kThumbnail,
                                      .height = kThumbnail,
                                      .samples = 2,
@@ -93,80 +119,24 @@ Thumbnail thumbnailOf(render::Renderer& renderer, const TableRow& row, render::C
   const render::Drawn drawn = render::drawSlice(renderer, row.field, picture);
   const TemporaryFolder folder;
   savePng(drawn.image, folder.path() / "slice.png");
-  Thumbnail thumbnail{readWholeFile((folder.path() / "slice.png").string()), {}};
-  for (const render::Legend::Level& level : drawn.legend.levels) thumbnail.colors[level.level] = level.color;
-  return thumbnail;
+  LevelPicture made{.png = readWholeFile((folder.path() / "slice.png").string())};
+  for (const render::Legend::Level& shown : drawn.legend.levels) made.colors[shown.level] = shown.color;
+  made.svg = sharesSvg(kBar, row.figures.*level.volume, made.colors, true);
+  return made;
 }
 
-std::string cssColor(const render::Color& color) {
-  return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
-}
-
-constexpr int kShareBarHeight = 18;
-
-/// An SVG picture of that width with the given elements.
-std::string rowSvg(int width, const std::string& parts) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
-      width, kShareBarHeight, parts);
-}
-
-/// A rectangle in a level's colour. It contains the level's number if there is room.
-std::string partSvg(double from, double width, int level, const render::Color& color, const std::string& title) {
-  std::string svg =
-      fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
-                  from, width, kShareBarHeight, cssColor(color), title);
-  const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
-  if (width > 12)
-    svg += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", from + width / 2,
-                       isLight ? "#000000" : "#ffffff", level);
-  return svg;
-}
-
-/// A bar that shows the shares of the volume.
-std::string barSvg(const Shares& shares, const Colors& colors) {
-  std::string parts;
-  double from = 0;
-  for (const auto& [level, share] : shares) {
-    parts +=
-        partSvg(kBar * from, kBar * share, level, colors.at(level), fmt::format("{}: {:.2f} %", level, 100 * share));
-    from += share;
-  }
-  return rowSvg(kBar, parts);
-}
-
-/// The key to the colours of all levels.
-std::string legendSvg(const Colors& colors) {
-  constexpr int kWidth = 26;
-  std::string parts;
-  int from = 0;
-  for (const auto& [level, color] : colors) {
-    parts += partSvg(from, kWidth, level, color, std::to_string(level));
-    from += kWidth;
-  }
-  return rowSvg(from, parts);
-}
-
-/// The pictures of a row.
-struct RowPictures {
-  Thumbnail degree, depth;
-
-  std::string degreeBar(const TableRow& row) const { return barSvg(row.figures.degreeVolume, degree.colors); }
-  std::string depthBar(const TableRow& row) const { return barSvg(row.figures.depthVolume, depth.colors); }
-};
-
-std::vector<RowPictures> picturesOf(Session& session, const Backend& backend, std::vector<TableRow>& rows) {
-  using enum render::ColorBy;
-  const std::vector<int> degrees = levelsOf(rows, degree), depths = levelsOf(rows, depth);
-  std::vector<RowPictures> pictures;
+void drawPictures(Session& session, const Backend& backend, std::vector<TableRow>& rows) {
+  std::array<std::set<int>, kLevels.size()> levels;  // those of all rows, so that a colour has one meaning
+  for (const TableRow& row : rows)
+    for (std::size_t k = 0; k < kLevels.size(); ++k)
+      for (const auto& [level, share] : row.figures.*kLevels[k].volume) levels[k].insert(level);
   for (TableRow& row : rows) {
     Session stage(session.registry(), session.console());
     stage.setField({row.field, row.mesh});
-    render::Renderer& renderer = stage.renderer(backend);
-    pictures.push_back({thumbnailOf(renderer, row, degree, degrees), thumbnailOf(renderer, row, depth, depths)});
+    for (std::size_t k = 0; k < kLevels.size(); ++k)
+      row.pictures[k] =
+          pictureOf(stage.renderer(backend), row, kLevels[k], std::vector(levels[k].begin(), levels[k].end()));
   }
-  return pictures;
 }
 
 std::string gridText(const TableRow& row) {
@@ -191,8 +161,6 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"measured max", shortNumber(row.error.max / row.scale())}};
 }
 
-constexpr const char* kDegreeLegend = "degree-legend.svg";
-constexpr const char* kDepthLegend = "depth-legend.svg";
 constexpr const char* kErrorsNote =
     "Errors are at the scale where the mesh's longest side is 2; measured ones at random points in the domain. Bars: "
     "shares of the volume by polynomial degree and by depth. Slices: through the middle, by degree and by depth.";
@@ -211,15 +179,10 @@ std::string markdownOf(const std::vector<TableRow>& rows) {
         line, row.name);
   }
   return fmt::format(
-      "{} degrees | depths | slice by degree | by depth |\n{}---|---|---|---|\n{}\nDegree ![]({})\nDepth "
-      "![]({})\n\n{}\n",
-      head, rule, body, kDegreeLegend, kDepthLegend, kErrorsNote);
-}
-
-Json levelsJson(const Shares& shares) {
-  Json json = Json::object();
-  for (const auto& [level, share] : shares) json[std::to_string(level)] = share;
-  return json;
+      "{} degrees | depths | slice by degree | by depth |\n{}---|---|---|---|\n{}\nDegree "
+      "![](degree-legend.svg)\nDepth "
+      "![](depth-legend.svg)\n\n{}\n",
+      head, rule, body, kErrorsNote);
 }
 
 Json jsonOf(const TableRow& row) {
@@ -253,31 +216,26 @@ td svg { display: block; margin: .3rem 0; }
 .legend svg { margin-left: .5rem; vertical-align: middle; border-radius: 3px; }
 )";
 
-std::string legendHtml(const std::string& title, const Colors& colors) {
-  return fmt::format("<p class=\"legend\">{} {}</p>\n", title, legendSvg(colors));
-}
-
-std::string htmlOf(const std::vector<TableRow>& rows, const std::vector<RowPictures>& pictures) {
+std::string htmlOf(const std::vector<TableRow>& rows) {
   std::string html =
       htmlHead("What hp-adaptive signed distance fields cost",
                fmt::format("{} meshes, as in Table 1 of Koschier, Deul and Bender (2016)", rows.size()), kTableStyle);
-  html += legendHtml("Degree", pictures.front().degree.colors) + legendHtml("Depth", pictures.front().depth.colors);
-  const auto addCells = [&](const char* tag, const TableRow& row, bool names) {
-    for (const auto& [name, value] : cellsOf(row))
-      html += fmt::format("<{0}{1}>{2}</{0}>", tag, name == "mesh" ? "" : " class=\"figure\"",
-                          htmlEscaped(names ? name : value));
-  };
-  html += "<table>\n<tr>";
-  addCells("th", rows.front(), true);
-  html += "<th>degrees, depths</th><th>slice by degree</th><th>by depth</th></tr>\n";
-  for (std::size_t n = 0; n < rows.size(); ++n) {
+  for (std::size_t k = 0; k < kLevels.size(); ++k)
+    html +=
+        fmt::format("<p class=\"legend\">{} {}</p>\n", kLevels[k].title, legendSvg(rows.front().pictures[k].colors));
+  std::string head;
+  for (const auto& [name, value] : cellsOf(rows.front()))
+    head += fmt::format("<th{}>{}</th>", name == "mesh" ? "" : " class=\"figure\"", htmlEscaped(name));
+  html += "<table>\n<tr>" + head + "<th>degrees, depths</th><th>slice by degree</th><th>by depth</th></tr>\n";
+  for (const TableRow& row : rows) {
     html += "<tr>";
-    addCells("td", rows[n], false);
-    html += fmt::format(
-        "<td>{}{}</td><td><img src=\"{}\" alt=\"slice by degree\"></td><td><img src=\"{}\" alt=\"slice "
-        "by depth\"></td></tr>\n",
-        pictures[n].degreeBar(rows[n]), pictures[n].depthBar(rows[n]), htmlPng(pictures[n].degree.png),
-        htmlPng(pictures[n].depth.png));
+    for (const auto& [name, value] : cellsOf(row))
+      html += fmt::format("<td{}>{}</td>", name == "mesh" ? "" : " class=\"figure\"", htmlEscaped(value));
+    html += fmt::format("<td>{}{}</td>", row.pictures[0].svg, row.pictures[1].svg);
+    for (std::size_t k = 0; k < kLevels.size(); ++k)
+      html +=
+          fmt::format("<td><img src=\"{}\" alt=\"slice by {}\"></td>", htmlPng(row.pictures[k].png), kLevels[k].name);
+    html += "</tr>\n";
   }
   return html + fmt::format("</table>\n<p>{}</p>\n", htmlEscaped(kErrorsNote)) + htmlFoot(versionText());
 }
@@ -296,30 +254,26 @@ void runTable(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "index.html");
-  const std::vector<std::string> meshes = arguments.texts("mesh");
-  const std::vector<std::string> names = fileNames(meshes);
-  for (std::size_t n = 0; n < meshes.size(); ++n)
-    buildArguments(session, arguments, n);  // reports mistakes before the long work
+  const std::vector<std::string> names = checkedNames(session, arguments);
   std::vector<TableRow> rows;
-  for (std::size_t n = 0; n < meshes.size(); ++n) rows.push_back(rowOf(session, arguments, n, names[n]));
-  const std::vector<RowPictures> pictures = picturesOf(session, chosen, rows);
+  for (std::size_t n = 0; n < names.size(); ++n) rows.push_back(rowOf(session, arguments, n, names[n]));
+  drawPictures(session, chosen, rows);
 
   Json json = {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
                {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
                {"meshes", Json::array()}};
   for (const TableRow& row : rows) json["meshes"].push_back(jsonOf(row));
   const InterruptGuard guard;  // Ctrl-C must not interrupt the writing of the files
-  for (std::size_t n = 0; n < rows.size(); ++n) {
-    folder.write(names[n] + "-degree.png", pictures[n].degree.png);
-    folder.write(names[n] + "-depth.png", pictures[n].depth.png);
-    folder.write(names[n] + "-degree.svg", pictures[n].degreeBar(rows[n]));
-    folder.write(names[n] + "-depth.svg", pictures[n].depthBar(rows[n]));
+  for (std::size_t k = 0; k < kLevels.size(); ++k) {
+    for (const TableRow& row : rows) {
+      folder.write(fmt::format("{}-{}.png", row.name, kLevels[k].name), row.pictures[k].png);
+      folder.write(fmt::format("{}-{}.svg", row.name, kLevels[k].name), row.pictures[k].svg);
+    }
+    folder.write(fmt::format("{}-legend.svg", kLevels[k].name), legendSvg(rows.front().pictures[k].colors));
   }
-  folder.write(kDegreeLegend, legendSvg(pictures.front().degree.colors));
-  folder.write(kDepthLegend, legendSvg(pictures.front().depth.colors));
   folder.write("table.md", markdownOf(rows));
-  folder.write("table.json", json.dump(2) + "\n");
-  folder.write("index.html", htmlOf(rows, pictures));
+  folder.write("table.json", jsonText(json));
+  folder.write("index.html", htmlOf(rows));
   folder.commit();
   json["page"] = (folder.path() / "index.html").string();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);

@@ -20,6 +20,10 @@ std::string vectorText(const Vector3& v, const Box& box) {
   return fmt::format("({1:.{0}g}, {2:.{0}g}, {3:.{0}g})", std::min(6 + extraDigits, 17), v.x(), v.y(), v.z());
 }
 
+std::string colorText(const std::array<std::uint8_t, 3>& color) {
+  return fmt::format("#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
+}
+
 std::string summaryRow(std::string_view label, const std::string& value) {
   return fmt::format("  {:<22} {}\n", label, value);
 }
@@ -54,6 +58,19 @@ std::string shellWord(const std::string& word) {
   std::string quoted = "'";
   for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";
+}
+
+std::string printable(std::string_view text) {
+  std::string line;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : '\0');
+    const bool isC1Control =
+        byte == 0xc2 && next >= 0x80 && next < 0xa0;  // control characters U+0080 to U+009F in UTF-8
+    line += std::iscntrl(byte) != 0 || isC1Control ? ' ' : text[i];
+    if (isC1Control) ++i;
+  }
+  return line;
 }
 
 std::string plainName(const std::string& source) {

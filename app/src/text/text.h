@@ -1,6 +1,7 @@
 #pragma once
 // Formats numbers, names and points for people.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,6 +15,9 @@ namespace hpsdf::app {
 /// True for the digits and for the letters of ASCII and _; unlike the functions of <cctype>, in every locale.
 constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
+/// Writes a colour as "#rrggbb".
+std::string colorText(const std::array<std::uint8_t, 3>& color);
 
 /// Separates thousands by commas: 1234567 becomes "1,234,567".
 std::string grouped(std::uint64_t number);
@@ -39,6 +43,10 @@ std::string plainName(const std::string& source);
 
 /// Quotes a word for a shell where it contains characters that a shell would interpret.
 std::string shellWord(const std::string& word);
+
+/// Replaces control characters by blanks, so that text from other people's files can neither break a line nor control
+/// the terminal.
+std::string printable(std::string_view text);
 
 /// Formats one indented line of a summary: a label and its value.
 std::string summaryRow(std::string_view label, const std::string& value);
