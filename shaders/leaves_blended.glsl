@@ -113,6 +113,17 @@ bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int 
   return !any(greaterThan(min(offset, cell - (cell >> up << up)), ivec3(0)));
 }
 
+// Finds the node of the candidate cell `cell` below the first level, where `parents` are the first children of the nodes
+// one level above. Returns whether there is such a node.
+bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell, out Node node) {
+  ivec3 parent = (cell >> 1) - parentFirst;
+  if (any(lessThan(parent, ivec3(0))) || any(greaterThan(parent, parentMore))) return false;
+  uint children = parents[candidateNumber(parent)];
+  if (children == kNoCell) return false;
+  node = fetchNode(children + uint(candidateNumber(cell & 1)));
+  return true;
+}
+
 // Sums the leaves with a weight at a point of a leaf. The search goes down level by level, with the nodes near the point
 // on each level as candidates; whole numbers and the fraction within the own leaf tell which nodes are near, so that
 // single precision is enough. Leaves are evaluated in one place in the code, and the leaves found are not kept in an
@@ -136,15 +147,13 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
       ivec3 cell = first + offset;
       Node node;
       int up = 0;
+      bool counts;
       if (level == depth) {
-        if (!firstLevelNode(cell, offset, level, node, up)) continue;
+        counts = firstLevelNode(cell, offset, level, node, up);
       } else {
-        ivec3 parent = (cell >> 1) - parentFirst;
-        if (any(lessThan(parent, ivec3(0))) || any(greaterThan(parent, parentMore))) continue;
-        uint children = parents[candidateNumber(parent)];
-        if (children == kNoCell) continue;
-        node = fetchNode(children + uint(candidateNumber(cell & 1)));
+        counts = nodeBelow(parents, parentFirst, parentMore, cell, node);
       }
+      if (!counts) continue;
       if (node.leaf) {
         addLeaf(total, node, ivec4(cell >> up, level - up), cellIndex, depth, local, margin, withGradient);
       } else {

@@ -49,7 +49,7 @@ double differenceAt(const Field& smooth, const Field& plain, const Cell& cell, c
   return smooth.value(x) - plain.value(x);
 }
 
-TEST(BlendZoneBounds, HoldWithinTheWholeLeaf) {
+TEST(BlendZoneBounds, holdWithinTheWholeLeaf) {
   for (const unsigned seed : {1u, 2u, 3u})
     for (const double width : {0.05, 0.25}) {
       const Field plain = jumping(seed, 1), smooth = blended(plain, width);
@@ -117,7 +117,7 @@ TEST(BlendZoneBounds, HoldWithinTheWholeLeaf) {
   EXPECT_TRUE(blendZoneBounds(jumping(1)).empty());
 }
 
-TEST(Blended, TheOraclesSlicesAreWhatTheFieldAnswers) {
+TEST(BlendedSlice, ofTheOracleHasTheFieldsValues) {
   for (const unsigned seed : {4u, 5u}) {
     const Field field = jumping(seed), smooth = blended(field, 0.1);
     std::size_t changed = 0;
@@ -137,7 +137,7 @@ TEST(Blended, TheOraclesSlicesAreWhatTheFieldAnswers) {
   }
 }
 
-TEST(Blended, TheOracleFindsTheFirstCrossing) {
+TEST(BlendedTrace, ofTheOracleFindsTheFirstCrossing) {
   for (const unsigned seed : {6u, 7u}) {
     const Field smooth = blended(jumping(seed, 0.1), 0.1);
     const auto renderer = makeCpuRenderer(smooth);
@@ -169,7 +169,7 @@ TEST(Blended, TheOracleFindsTheFirstCrossing) {
   }
 }
 
-TEST(Blended, OpenGlDrawsWhatTheOracleDoes) {
+TEST(BlendedOpenGl, drawsWhatTheOracleDraws) {
   HPSDF_REQUIRE_GL();
   for (const unsigned seed : {8u})
     for (const double width : {kDefaultBlend, 0.25}) {
@@ -185,7 +185,7 @@ TEST(Blended, OpenGlDrawsWhatTheOracleDoes) {
 }
 
 /// The same check on a field that is blended otherwise, and on one that is not.
-TEST(Blended, OpenGlNegativeControl) {
+TEST(BlendedOpenGl, differsForAWrongField) {
   HPSDF_REQUIRE_GL();
   const Field field = jumping(10);
   const SliceView view = slices(field).front();
@@ -198,7 +198,7 @@ TEST(Blended, OpenGlNegativeControl) {
 }
 
 /// Where leaves of depths far apart meet, single precision tells the weights of the smallest less exactly.
-TEST(Blended, DeepOctreesInOpenGl) {
+TEST(BlendedOpenGl, drawsDeepOctrees) {
   HPSDF_REQUIRE_GL();
   const Field smooth = blended(
       randomField(4, {.grid = {3, 3, 3}, .refinement = 0.1, .maxDepth = 12, .deepAt = Vector3(0.1, 0.2, 0.3)}), 0.2);
@@ -215,7 +215,7 @@ TEST(Blended, DeepOctreesInOpenGl) {
                     makeGlRenderer(smooth, GlChoice::software)->slice(close, kWidth, kHeight), {.value = 5e-5}));
 }
 
-TEST(Blended, HasNoCracks) {
+TEST(BlendedField, hasNoCracks) {
   const auto count = [](const Field& field, bool gl) {
     std::size_t cracks = 0;
     const auto renderer = gl ? makeGlRenderer(field, GlChoice::software) : makeCpuRenderer(field);

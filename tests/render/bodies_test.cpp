@@ -158,7 +158,7 @@ constexpr BodyTolerance kTolerance{.position = 2e-6};
 // --- Normals
 // ----------------------------------------------------------------------------------------------------------
 
-TEST(BodyNormals, AreSmoothOnASphereAndFlatOnABox) {
+TEST(BodyNormals, areSmoothOnASphereAndFlatOnABox) {
   const BodyMesh sphere(shapes::mesh("sphere"));
   const Vector3 third = Vector3::Constant(1.0 / 3);
   for (std::uint32_t t = 0; t < sphere.triangles().size(); t += 7)
@@ -175,7 +175,7 @@ TEST(BodyNormals, AreSmoothOnASphereAndFlatOnABox) {
   }
 }
 
-TEST(BodyNormals, AFanOfSmallTrianglesWeighsNoMoreThanItsAngle) {
+TEST(BodyNormals, weighAFanOfSmallTrianglesByItsAngle) {
   // a roof of two slopes at 10 degrees; one of them is cut into many triangles at the vertex on the ridge
   const double slope = 10 * std::numbers::pi / 180;
   TriangleMesh mesh{.vertices = {Vector3::Zero()}, .triangles = {}, .name = "roof"};
@@ -192,7 +192,7 @@ TEST(BodyNormals, AFanOfSmallTrianglesWeighsNoMoreThanItsAngle) {
   EXPECT_LT((roof.normal(0, Vector3::UnitX()) - Vector3::UnitZ()).norm(), 1e-3);
 }
 
-TEST(BodyNormals, TrianglesWithoutAreaSpoilNone) {
+TEST(BodyNormals, ignoreDegenerateTriangles) {
   TriangleMesh mesh = shapes::mesh("box");
   mesh.triangles.push_back({0, 0, 1});
   mesh.triangles.push_back({2, 2, 2});
@@ -223,7 +223,7 @@ std::optional<Entry> enter(const Vector3& half, const Vector3& start, const Vect
   return Entry{distance, static_cast<int>(last - in.begin()), leaves - distance};
 }
 
-TEST(CpuBodies, BoxesAreWhereTheirSlabsAre) {
+TEST(CpuBodies, showBoxesWhereTheirSlabsAre) {
   const TriangleMesh mesh = shapes::mesh("box");
   const Vector3 half = 0.5 * boundingBox(mesh).sizes();
   const auto cpu = makeCpuBodyRenderer({mesh});
@@ -279,7 +279,7 @@ std::optional<double> meetByVolumes(const Vector3& start, const Vector3& ray, co
   return (point - start).dot(ray);
 }
 
-TEST(CpuBodies, ShowWhateverTriangleIsNearestFromWithinTheCrowdToo) {
+TEST(CpuBodies, showTheNearestTriangleEvenFromAmongTheBodies) {
   const std::vector<TriangleMesh> meshes = testMeshes();
   const auto cpu = makeCpuBodyRenderer(meshes);
   const std::vector<Body> bodies = crowd(5, 16, 4);
@@ -314,7 +314,7 @@ TEST(CpuBodies, ShowWhateverTriangleIsNearestFromWithinTheCrowdToo) {
     }
 }
 
-TEST(CpuBodies, NormalsFaceTheEyeOnBothSidesOfASheet) {
+TEST(CpuBodies, haveNormalsThatFaceTheEyeOnBothSidesOfASheet) {
   const auto cpu = makeCpuBodyRenderer({sheet(40, 1)});
   const std::vector<Body> bodies = {Body{}};
   for (const double elevation : {80.0, -80.0}) {
@@ -330,7 +330,7 @@ TEST(CpuBodies, NormalsFaceTheEyeOnBothSidesOfASheet) {
   }
 }
 
-TEST(CpuBodies, TheNumberOfThreadsChangesNothing) {
+TEST(CpuBodies, areTheSameForAnyNumberOfThreads) {
   const auto cpu = makeCpuBodyRenderer(testMeshes());
   const std::vector<Body> bodies = crowd(9, 12, 4);
   const auto look = [&] { return cpu->view(cameraFrom(Projection::perspective), bodies, kWidth, kHeight); };
@@ -355,7 +355,7 @@ class GlBodies : public testing::Test {
   }
 };
 
-TEST_F(GlBodies, AreThoseOfTheOracle) {
+TEST_F(GlBodies, areThoseOfTheOracle) {
   const auto cpu = makeCpuBodyRenderer(testMeshes());
   const auto device = gl(testMeshes());
   EXPECT_THAT(device->description(), HasSubstr("llvmpipe"));
@@ -373,7 +373,7 @@ TEST_F(GlBodies, AreThoseOfTheOracle) {
   }
 }
 
-TEST_F(GlBodies, AWrongPictureFails) {
+TEST_F(GlBodies, differForAWrongScene) {
   const auto cpu = makeCpuBodyRenderer(testMeshes());
   const auto device = gl(testMeshes());
   const std::vector<Body> bodies = crowd(1, 40, 4);
@@ -402,7 +402,7 @@ TEST_F(GlBodies, AWrongPictureFails) {
   EXPECT_FALSE(agree(expected, device->view(aside, bodies, kWidth, kHeight), camera, kTolerance));
 }
 
-TEST_F(GlBodies, ViewsOfSeveralTilesHaveNoSeams) {
+TEST_F(GlBodies, haveNoSeamsInViewsOfSeveralTiles) {
   const auto cpu = makeCpuBodyRenderer(testMeshes());
   const auto device = gl(testMeshes());
   const std::vector<Body> bodies = crowd(2, 40, 4);
@@ -419,7 +419,7 @@ TEST_F(GlBodies, ViewsOfSeveralTilesHaveNoSeams) {
     }
 }
 
-TEST_F(GlBodies, AMeshWhoseVerticesMoveIsAsOneMadeOfThem) {
+TEST_F(GlBodies, showMovedVerticesAsAMeshMadeOfThem) {
   const Camera camera = cameraFrom(Projection::perspective, 20, 40, 0.9);
   std::vector<Body> bodies = crowd(4, 8, 2);
   bodies[1].worldFromBody = placed(Vector3(0, 0, 0.2), 1, Vector3::UnitX());
@@ -444,7 +444,7 @@ TEST_F(GlBodies, AMeshWhoseVerticesMoveIsAsOneMadeOfThem) {
   EXPECT_TRUE(result) << result.message();
 }
 
-TEST_F(GlBodies, NoDistanceIsBeyondATriangleSeenAlongItsPlane) {
+TEST_F(GlBodies, haveDistancesWithinATriangleSeenAlongItsPlane) {
   const auto device = gl({sheet(1, 0)});
   const std::vector<Body> bodies = {{0, placed(Vector3(0.1, 0.2, 0.3), std::numbers::pi / 2 + 0.4, Vector3::UnitX())}};
   const Vector3 alongPlane = bodies[0].worldFromBody.linear() * Vector3(0.3, 1, 0).normalized();
@@ -474,7 +474,7 @@ TEST_F(GlBodies, NoDistanceIsBeyondATriangleSeenAlongItsPlane) {
   EXPECT_GT(hits, 100);
 }
 
-TEST_F(GlBodies, HundredsOfThem) {
+TEST_F(GlBodies, mayBeHundreds) {
   const std::vector<TriangleMesh> meshes = {testMeshes()[0], smallBox()};
   const auto cpu = makeCpuBodyRenderer(meshes);
   const auto device = gl(meshes);
@@ -490,7 +490,7 @@ TEST_F(GlBodies, HundredsOfThem) {
   EXPECT_GT(std::set(actual.body.begin(), actual.body.end()).size(), 150u);
 }
 
-TEST_F(GlBodies, NoneAtAllAndNoneInView) {
+TEST_F(GlBodies, mayBeNoneOrOutsideTheView) {
   const auto device = gl(testMeshes());
   const Camera camera = cameraFrom(Projection::perspective);
   const std::vector<Body> behind = {{0, placed(camera.eye - 2 * camera.forward)}};
@@ -505,7 +505,7 @@ TEST_F(GlBodies, NoneAtAllAndNoneInView) {
 // --- Errors
 // -----------------------------------------------------------------------------------------------------------------
 
-TEST(Bodies, MeshesThatCannotBeDrawnAreRefused) {
+TEST(Bodies, rejectMeshesThatCannotBeDrawn) {
   const auto making = [](const auto& change) {
     TriangleMesh mesh = shapes::mesh("box");
     mesh.name = "crate";
@@ -523,7 +523,7 @@ TEST(Bodies, MeshesThatCannotBeDrawnAreRefused) {
   EXPECT_THAT([] { checkTriangleCount(67108865); }, ThrowsMessage<Error>(HasSubstr("have 67108865 triangles")));
 }
 
-TEST(Bodies, PlacesThatAreNoneAreRefused) {
+TEST(Bodies, rejectInvalidTransforms) {
   const auto cpu = makeCpuBodyRenderer({shapes::mesh("box")});
   const auto drawing = [&](const auto& change) {
     std::vector<Body> bodies = crowd(1, 3, 1);
@@ -540,7 +540,7 @@ TEST(Bodies, PlacesThatAreNoneAreRefused) {
               ThrowsMessage<Error>(HasSubstr("body 2 is scaled or sheared")));
 }
 
-TEST(Bodies, ViewsAndVerticesThatDoNotFitAreRefused) {
+TEST(Bodies, rejectViewsAndVerticesThatDoNotFit) {
   const auto cpu = makeCpuBodyRenderer({shapes::mesh("box")});
   const std::vector<Body> bodies = {Body{}};
   Camera camera = cameraFrom(Projection::perspective);
@@ -579,7 +579,7 @@ std::vector<Body> aboutTheBall() {
   return bodies;
 }
 
-TEST(BodyPictures, TheNearerOfSurfaceAndBodyIsSeen) {
+TEST(BodyPictures, showTheNearerOfSurfaceAndBody) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
   const std::vector<Body> bodies = aboutTheBall();
@@ -638,7 +638,7 @@ double hueOf(Color color) {
 
 double hueDifference(Color a, Color b) { return std::abs(std::remainder(hueOf(a) - hueOf(b), 360)); }
 
-TEST(BodyPictures, BodiesHaveTheirColorsWhateverThoseOfTheFieldMean) {
+TEST(BodyPictures, keepTheColorsOfBodiesForAnyColorsOfTheField) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
   const std::vector<Body> bodies = aboutTheBall();
@@ -667,7 +667,7 @@ TEST(BodyPictures, BodiesHaveTheirColorsWhateverThoseOfTheFieldMean) {
   }
 }
 
-TEST(BodyPictures, SamplesAreAveragedInLinearLight) {
+TEST(BodyPictures, averageSamplesInLinearLight) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
   const std::vector<Body> bodies = aboutTheBall();
@@ -701,7 +701,7 @@ TEST(BodyPictures, SamplesAreAveragedInLinearLight) {
   EXPECT_GT(silhouettes, 100);
 }
 
-TEST(BodyPictures, BodiesHideLinesAndOutlinesAndBoxes) {
+TEST(BodyPictures, hideLinesOutlinesAndBoxesBehindBodies) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
   const std::vector<Body> bodies = {{0, placed(Vector3(0.2, 0.1, 2.4), 0.4)}};  // before the domain
@@ -731,14 +731,14 @@ TEST(BodyPictures, BodiesHideLinesAndOutlinesAndBoxes) {
   }
 }
 
-TEST(BodyPictures, NoRendererMeansNoBodies) {
+TEST(BodyPictures, haveNoBodiesWithoutARenderer) {
   const auto cpu = makeCpuRenderer(ball());
   const Drawn drawn = drawSurface(*cpu, ball(), {.camera = {}, .width = 100, .height = 80});
   EXPECT_TRUE(drawn.buffers.body.empty());
   for (const std::string& detail : drawn.details) EXPECT_THAT(detail, testing::Not(HasSubstr("bod")));
 }
 
-TEST(BodyColors, KeepApartFromClayAndFromTheirNeighbours) {
+TEST(BodyColors, differFromClayAndFromTheirNeighbours) {
   const Oklab clay = toOklab(decodeSrgb({210, 153, 119}));
   const auto lab = [](std::size_t i) { return toOklab(decodeSrgb(bodyColor(i))); };
   for (std::size_t i = 0; i < 1000; ++i) {

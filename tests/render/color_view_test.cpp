@@ -51,7 +51,7 @@ double inkAt(const Image& image, int x, int y, double value, const DistanceScale
   return toOklab(divergingColor(value / scale.range)).lightness - lightnessOf(image.at(x, y));
 }
 
-TEST(LevelSlice, CellsHaveTheColorOfTheirLevelAndADarkOutline) {
+TEST(LevelSlice, givesCellsTheColorOfTheirLevelAndADarkOutline) {
   const Image image = degrees(twoCells(64));
   EXPECT_EQ(image.at(16, 40), encodeSrgb(kMap(2)));
   EXPECT_EQ(image.at(45, 40), encodeSrgb(kMap(5)));
@@ -62,13 +62,13 @@ TEST(LevelSlice, CellsHaveTheColorOfTheirLevelAndADarkOutline) {
   EXPECT_EQ(image.at(33, 40), image.at(45, 40));
 }
 
-TEST(LevelSlice, DepthReadsTheOtherBuffer) {
+TEST(LevelSlice, readsTheDepthsForColorsOfDepth) {
   const ViewBuffers buffers = twoCells(64);
   const Image image = colorCellSlice(buffers, levelColors(buffers, kMap, ColorBy::depth), {1, 1, 0.01});
   EXPECT_EQ(image.at(16, 40), encodeSrgb(kMap(3)));
 }
 
-TEST(LevelSlice, SwappedLevelsAndUnknownLevelsShow) {
+TEST(LevelSlice, revealsSwappedAndUnknownLevels) {
   ViewBuffers wrong = twoCells(64);
   for (auto& degree : wrong.degree) degree = degree == 2 ? 5 : degree == 5 ? 2 : degree;
   const Image right = degrees(twoCells(64)), swapped = degrees(wrong);
@@ -80,7 +80,7 @@ TEST(LevelSlice, SwappedLevelsAndUnknownLevelsShow) {
   EXPECT_EQ(degrees(wrong).at(10, 10), (Color{255, 0, 255}));
 }
 
-TEST(LevelSlice, OutlinesOfTinyCellsFade) {
+TEST(LevelSlice, fadesTheOutlinesOfTinyCells) {
   const auto meanOf = [](int cellSize) {
     ViewBuffers buffers = blank(96, 96);
     forEachSample(buffers, [&](int x, int y, std::size_t i) { buffers.cell[i] = y / cellSize * 96 + x / cellSize; });
@@ -95,7 +95,7 @@ TEST(LevelSlice, OutlinesOfTinyCellsFade) {
   EXPECT_GT(colorDifference(meanOf(12), toOklab(kMap(2))), 0.01) << "cells of 12 pixels have outlines";
 }
 
-TEST(LevelSlice, OutlinesAreAsWideInAnyNumberOfSamples) {
+TEST(LevelSlice, hasOutlinesOfOneWidthForAnyNumberOfSamples) {
   const auto darkness = [](int samples) {
     const Image image = degrees(twoCells(64 * samples), samples);
     const double full = decodeSrgb(image.at(45, 40)).sum();
@@ -108,7 +108,7 @@ TEST(LevelSlice, OutlinesAreAsWideInAnyNumberOfSamples) {
   EXPECT_NEAR(darkness(5), darkness(1), 0.02);
 }
 
-TEST(LevelSlice, SamplesAreAveragedInLinearLight) {
+TEST(LevelSlice, averagesSamplesInLinearLight) {
   // columns one sample wide, so that every pixel holds as much of either level and no outline
   ViewBuffers buffers = blank(32, 32);
   forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.cell[i] = x, buffers.degree[i] = x % 2 ? 5 : 2; });
@@ -120,7 +120,7 @@ TEST(LevelSlice, SamplesAreAveragedInLinearLight) {
   for (const Color& pixel : image.pixels) EXPECT_EQ(pixel, expected);
 }
 
-TEST(LevelSlice, ShowsTheSurfaceAsALine) {
+TEST(LevelSlice, showsTheSurfaceAsALine) {
   ViewBuffers buffers = blank(64, 64);
   forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = 0.01F * float(x - 32); });
   const Image image = degrees(buffers);
@@ -139,7 +139,7 @@ ViewBuffers ramp(double slope) {
 
 constexpr DistanceScale kScale = {1, 0.1, -0.32, 0.32};
 
-TEST(DistanceSlice, TheZeroLineIsDarkAndAlikeOnBothSides) {
+TEST(DistanceSlice, hasADarkZeroLineThatIsAlikeOnBothSides) {
   const ViewBuffers buffers = ramp(0.01);
   const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
   EXPECT_LT(lightnessOf(image.at(31, 30)), 0.25);
@@ -151,7 +151,7 @@ TEST(DistanceSlice, TheZeroLineIsDarkAndAlikeOnBothSides) {
   EXPECT_NEAR(inkAt(image, 36, 30, 0.045, kScale), 0, 0.01) << "the line is too wide";
 }
 
-TEST(DistanceSlice, IsoLinesStandAtMultiplesOfTheStep) {
+TEST(DistanceSlice, hasIsoLinesAtMultiplesOfTheStep) {
   const Image image = colorDistanceSlice(ramp(0.01), kScale, {1, 1, 0.01});
   for (int x = 0; x < 64; ++x) {
     const double value = 0.01 * (x - 31.5);
@@ -165,7 +165,7 @@ TEST(DistanceSlice, IsoLinesStandAtMultiplesOfTheStep) {
   }
 }
 
-TEST(DistanceSlice, LinesKeepTheirWidthWhateverTheSlope) {
+TEST(DistanceSlice, hasLinesOfOneWidthForAnySlope) {
   for (double slope : {0.003, 0.01, 0.02}) {
     const Image image = colorDistanceSlice(ramp(slope), kScale, {1, 1, 0.01});
     double ink = 0;
@@ -174,7 +174,7 @@ TEST(DistanceSlice, LinesKeepTheirWidthWhateverTheSlope) {
   }
 }
 
-TEST(DistanceSlice, JumpsAtCellFacesMakeNoBlots) {
+TEST(DistanceSlice, hasNoBlotsAtJumps) {
   // two cells whose values jump by half a step where they meet, and pass a line each
   ViewBuffers buffers = ramp(0.01);
   forEachSample(buffers, [&](int x, int, std::size_t i) {
@@ -189,7 +189,7 @@ TEST(DistanceSlice, JumpsAtCellFacesMakeNoBlots) {
   EXPECT_NEAR(ink(45), 0, 0.01);
 }
 
-TEST(DistanceSlice, TheZeroLineHasNoGapWhereTheFieldJumpsOverIt) {
+TEST(DistanceSlice, hasNoGapInTheZeroLineWhereTheFieldJumpsOverZero) {
   ViewBuffers buffers = blank(64, 64);
   forEachSample(buffers, [&](int x, int, std::size_t i) {
     buffers.cell[i] = x < 32 ? 0 : 1;
@@ -199,7 +199,7 @@ TEST(DistanceSlice, TheZeroLineHasNoGapWhereTheFieldJumpsOverIt) {
   EXPECT_LT(std::min(lightnessOf(image.at(31, 30)), lightnessOf(image.at(32, 30))), 0.3);
 }
 
-TEST(DistanceSlice, AlmostFlatValuesMakeNoBlots) {
+TEST(DistanceSlice, hasNoBlotsWhereTheDistanceIsAlmostConstant) {
   ViewBuffers buffers = blank(64, 64);
   forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = 0.1F + 1e-4F * float(x - 32); });
   const Image image = colorDistanceSlice(buffers, kScale, {1, 1, 0.01});
@@ -209,7 +209,7 @@ TEST(DistanceSlice, AlmostFlatValuesMakeNoBlots) {
   EXPECT_GE(dark, 1);
 }
 
-TEST(Surface, ShowsTheBackdropWhereARayMisses) {
+TEST(Surface, showsTheBackdropWhereARayMisses) {
   ViewBuffers buffers = blank(16, 16);
   std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
   const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
@@ -218,7 +218,7 @@ TEST(Surface, ShowsTheBackdropWhereARayMisses) {
   EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
 }
 
-TEST(Surface, LightComesFromAboveLeftOfTheCameraWhereverItLooks) {
+TEST(Surface, isLitFromAboveLeftOfTheCameraInAnyDirection) {
   // the same scene before two cameras: its normals turned along
   const Eigen::Matrix3f turn = Eigen::AngleAxisf(1.3F, Eigen::Vector3f(1, 2, -1).normalized()).toRotationMatrix();
   const auto shaded = [&](const Eigen::Vector3f& normal, const Eigen::Matrix3f& rotation) {
@@ -251,7 +251,7 @@ Image groove(double depth, ColorBy color, Projection projection) {
   return colorSurface(buffers, camera, levelColors(buffers, kMap, color), {1, 1, 1});
 }
 
-TEST(Surface, FoldsAreDarkerThanTheOpen) {
+TEST(Surface, isDarkerInFoldsThanInTheOpen) {
   for (ColorBy color : {ColorBy::normal, ColorBy::depth})
     for (Projection projection : {Projection::perspective, Projection::orthographic}) {
       const Image flat = groove(0, color, projection), folded = groove(0.1, color, projection);
@@ -261,13 +261,13 @@ TEST(Surface, FoldsAreDarkerThanTheOpen) {
     }
 }
 
-TEST(Surface, ParallelRaysShadeAFlatWallAlike) {
+TEST(Surface, hasEvenLightOnAFlatWallForParallelRays) {
   const Image flat = groove(0, ColorBy::normal, Projection::orthographic);
   for (int x : {0, 50, 150, 199}) EXPECT_EQ(flat.at(x, 20), flat.at(100, 20)) << x;
   EXPECT_NE(groove(0, ColorBy::normal, Projection::perspective).at(0, 20), flat.at(0, 20));
 }
 
-TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
+TEST(Surface, hasNoBlackSpecksWhereNormalsFaceAway) {
   const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
   const auto shaded = [&](const Eigen::Vector3f& normal) {
     ViewBuffers buffers = blank(1, 1);
@@ -277,7 +277,7 @@ TEST(Surface, NormalsThatFaceAwayMakeNoBlackSpecks) {
   EXPECT_NEAR(shaded({0, -1, -0.6F}), shaded({0, -1, 0}), 0.01);
 }
 
-TEST(Surface, LevelColorsStayRecognisableUnderShading) {
+TEST(Surface, keepsLevelColorsRecognisableUnderShading) {
   const std::vector<int> levels = {2, 3, 4, 5, 6, 7};
   const LevelMap map(levels);
   const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};

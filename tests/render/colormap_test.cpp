@@ -47,7 +47,7 @@ std::vector<int> firstLevels(int count) {
   return levels;
 }
 
-TEST(Color, SrgbComesBack) {
+TEST(Color, returnsUnchangedFromLinearLight) {
   for (int value = 0; value < 256; ++value) {
     const auto v = static_cast<std::uint8_t>(value);
     EXPECT_EQ(encodeSrgb(decodeSrgb({v, 0, v})), (Color{v, 0, v}));
@@ -56,7 +56,7 @@ TEST(Color, SrgbComesBack) {
             (Color{0, 255, 127}));  // half of the code range, from the standard's curve
 }
 
-TEST(Color, OklabComesBackAndKnowsItsCorners) {
+TEST(Color, returnsUnchangedFromOklabAndHasItsKnownCorners) {
   const Oklab white = toOklab({1, 1, 1});
   EXPECT_NEAR(white.lightness, 1, 1e-6);
   EXPECT_NEAR(std::hypot(white.a, white.b), 0, 1e-6);
@@ -71,7 +71,7 @@ TEST(Color, OklabComesBackAndKnowsItsCorners) {
   EXPECT_NEAR(std::atan2(vivid.b, vivid.a), 145 * 3.14159265 / 180, 0.01);
 }
 
-TEST(LevelMap, LightnessRisesStrictlyForUpTo29Levels) {
+TEST(LevelMap, risesStrictlyInLightnessForUpTo29Levels) {
   for (int count = 2; count <= 29; ++count) {
     const LevelMap map(firstLevels(count));
     for (int level = 3; level < count + 2; ++level) {
@@ -83,7 +83,7 @@ TEST(LevelMap, LightnessRisesStrictlyForUpTo29Levels) {
   }
 }
 
-TEST(LevelMap, NeighboursAreToldApartByEveryEye) {
+TEST(LevelMap, hasNeighboursThatEveryEyeDistinguishes) {
   for (Vision vision : {Vision::normal, Vision::protan, Vision::deutan, Vision::tritan})
     for (int count = 2; count <= 10; ++count) {
       const LevelMap map(firstLevels(count));
@@ -95,7 +95,7 @@ TEST(LevelMap, NeighboursAreToldApartByEveryEye) {
 }
 
 /// From what surfaces are coloured with: the map of levels and quantities, shaded, and clay from light to dark.
-TEST(CrackColor, IsToldFromEveryOtherByEveryEye) {
+TEST(CrackColor, differsFromEveryOtherForEveryEye) {
   std::vector<LinearColor> others;
   for (double t = 0; t <= 1; t += 0.02)
     for (const float light : {0.5F, 0.75F, 1.0F, 1.08F}) others.push_back(orderedColor(t) * light);
@@ -108,7 +108,7 @@ TEST(CrackColor, IsToldFromEveryOtherByEveryEye) {
           << "vision " << static_cast<int>(vision) << ", " << other.transpose();
 }
 
-TEST(LevelMap, TheSimulationSeesWhatDichromatsConfuse) {
+TEST(ColorVisionSimulation, confusesTheColorsThatDichromatsConfuse) {
   // negative control of the test above: a red and a green that are one colour without M cones
   const LinearColor red = fromOklch(0.60, 0.12, 30), green = fromOklch(0.60, 0.12, 135);
   const auto difference = [&](Vision v) { return colorDifference(toOklab(seen(red, v)), toOklab(seen(green, v))); };
@@ -117,7 +117,7 @@ TEST(LevelMap, TheSimulationSeesWhatDichromatsConfuse) {
   EXPECT_LT((seen({1, 1, 1}, Vision::protan) - LinearColor(1, 1, 1)).norm(), 1e-4);
 }
 
-TEST(LevelMap, SpreadsTheLevelsThatOccur) {
+TEST(LevelMap, spreadsTheLevelsThatOccur) {
   const std::vector<int> levels = {9, 2, 5, 2};
   const LevelMap map(levels);
   EXPECT_EQ(map.levels(), (std::vector<int>{2, 5, 9}));
@@ -128,7 +128,7 @@ TEST(LevelMap, SpreadsTheLevelsThatOccur) {
   EXPECT_EQ(LevelMap(std::vector<int>{4})(4), orderedColor(0.5));
 }
 
-TEST(ColorScale, SpansPowersOfTenOrStartsAtZero) {
+TEST(ColorScale, spansPowersOfTenOrStartsAtZero) {
   const ColorScale decades = ColorScale::around(3e-5, 0.02, true);
   EXPECT_DOUBLE_EQ(decades.low(), 1e-5);
   EXPECT_DOUBLE_EQ(decades.high(), 0.1);
@@ -150,7 +150,7 @@ TEST(ColorScale, SpansPowersOfTenOrStartsAtZero) {
   for (const bool logarithmic : {false, true}) EXPECT_EQ(ColorScale::around(0, 0, logarithmic).high(), 1);
 }
 
-TEST(ColorScale, MarksArePowersOfTenOrEvenSteps) {
+TEST(ColorScale, hasMarksAtPowersOfTenOrEvenSteps) {
   using testing::DoubleNear;
   using testing::Pointwise;
   EXPECT_THAT(scaleMarks(ColorScale(1e-3, 1, true)), Pointwise(DoubleNear(1e-12), {1e-3, 1e-2, 1e-1, 1.0}));
@@ -159,7 +159,7 @@ TEST(ColorScale, MarksArePowersOfTenOrEvenSteps) {
   EXPECT_THAT(scaleMarks(ColorScale(2, 6, true)), Pointwise(DoubleNear(1e-12), {2.0, 3.0, 4.0, 5.0, 6.0}));
 }
 
-TEST(DivergingMap, IsWhiteAtZeroAndDarkensAlike) {
+TEST(DivergingMap, isWhiteAtZeroAndDarkensAlike) {
   EXPECT_GT(toOklab(divergingColor(0)).lightness, 0.97);
   for (double t = 0.05; t <= 1; t += 0.05) {
     const Oklab inside = toOklab(divergingColor(-t)), outside = toOklab(divergingColor(t));
@@ -173,7 +173,7 @@ TEST(DivergingMap, IsWhiteAtZeroAndDarkensAlike) {
   EXPECT_EQ(divergingColor(7), divergingColor(1));
 }
 
-TEST(DivergingMap, SidesAreToldApartByEveryEye) {
+TEST(DivergingMap, hasSidesThatEveryEyeDistinguishes) {
   for (Vision vision : {Vision::protan, Vision::deutan, Vision::tritan})
     for (double t : {0.3, 0.6, 1.0})
       EXPECT_GT(colorDifference(toOklab(seen(divergingColor(-t), vision)), toOklab(seen(divergingColor(t), vision))),
@@ -181,7 +181,7 @@ TEST(DivergingMap, SidesAreToldApartByEveryEye) {
           << t;
 }
 
-TEST(DistanceScale, HasANiceRangeAndAboutTwelveLines) {
+TEST(DistanceScale, hasARangeOfFewDigitsAndAboutTwelveLines) {
   for (double size : {1e-5, 0.013, 0.4, 1.0, 1.109, 7.3, 355.0, 2e6})
     for (double minimum : {-1.0, -0.3, 0.0, 0.6}) {
       const DistanceScale scale = distanceScale(minimum * size, size);

@@ -20,7 +20,7 @@ std::string problemWith(const Image& actual, double budget = kPixelBudget) {
   return problem(compare(grey(), actual), budget);
 }
 
-TEST(Compare, AgreesWithItself) {
+TEST(Comparison, findsNoDifferenceOfAPictureToItself) {
   const Comparison same = compare(grey(), grey());
   EXPECT_EQ(same.compared, 1000u);
   EXPECT_EQ(same.differing, 0u);
@@ -28,26 +28,26 @@ TEST(Compare, AgreesWithItself) {
   EXPECT_EQ(problem(same, 0), "");
 }
 
-TEST(Compare, ThreeLevelsAreFreeAndFourAreNot) {
+TEST(Comparison, toleratesADifferenceOfThreeButNotOfFour) {
   EXPECT_EQ(problemWith(Image(50, 20, {103, 97, 100}), 0), "");
   EXPECT_NE(problemWith(Image(50, 20, {100, 100, 104})), "");
   EXPECT_NE(problemWith(Image(50, 20, {96, 100, 100})), "");
   EXPECT_NE(problemWith(Image(50, 20, {100, 96, 100})), "");
 }
 
-TEST(Compare, TheBudgetIsAShareOfThePixels) {
+TEST(Comparison, allowsAShareOfThePixels) {
   EXPECT_EQ(problemWith(withSpots(2, {255, 0, 0})), "");
   EXPECT_EQ(problemWith(withSpots(3, {255, 0, 0})), "3 of 1000 pixels differ by more than 3/255, at most by 155");
   EXPECT_EQ(problemWith(withSpots(3, {255, 0, 0}), 0.003), "");
   EXPECT_NE(problemWith(withSpots(1, {255, 0, 0}), 0), "");
 }
 
-TEST(Compare, AnotherSizeIsAProblemWhateverTheBudget) {
+TEST(Comparison, rejectsAnotherSizeWhateverTheBudget) {
   EXPECT_EQ(problemWith(Image(20, 50, kGrey), 1), "the sizes differ: 50x20 and 20x50");
   EXPECT_NE(problemWith(Image(), 1), "");
 }
 
-TEST(Compare, TheDifferencePictureTellsFreeFromNot) {
+TEST(DifferencePicture, distinguishesToleratedDifferences) {
   Image actual = grey();
   actual.at(1, 2) = {100, 101, 100};
   actual.at(3, 4) = {100, 100, 103};
@@ -64,7 +64,7 @@ TEST(Compare, TheDifferencePictureTellsFreeFromNot) {
   EXPECT_EQ(differencePicture(Image(1, 1, {0, 0, 0}), Image(1, 1, {255, 0, 0})).at(0, 0), (Color{255, 255, 255}));
 }
 
-TEST(Compare, WorstPixelsAreSortedAndApart) {
+TEST(WorstPixels, areSortedAndApart) {
   Image actual = grey();
   actual.at(2, 3) = {100, 100, 140};
   actual.at(3, 3) = {100, 100, 139};  // beside it: not listed

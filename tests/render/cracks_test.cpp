@@ -24,7 +24,7 @@ ViewBuffers torn(int width, int height, const std::set<std::pair<int, int>>& sam
   return buffers;
 }
 
-TEST(CracksOfAView, AreCountedInPixelsAndMeasuredFromTheOffset) {
+TEST(CracksOfAView, areCountedInPixelsAndMeasuredFromTheOffset) {
   ViewBuffers buffers = torn(12, 9, {{0, 0}, {1, 2}, {2, 2}, {11, 8}}, 0.3F);
   buffers.value[0] = 0.02F;
   EXPECT_EQ(cracksOf(buffers, 0.1, 1).pixels, 4u);
@@ -35,7 +35,7 @@ TEST(CracksOfAView, AreCountedInPixelsAndMeasuredFromTheOffset) {
   EXPECT_EQ(none.widest, 0);
 }
 
-TEST(MarkedCracks, AreAPixelWiderOnEverySide) {
+TEST(MarkedCracks, areAPixelWiderOnEverySide) {
   Image picture(20, 12, kGrey);  // of which the view is a part
   markCracks(picture, torn(16, 9, {{7, 4}, {0, 0}, {15, 8}}, 1), {1, 1, 1});
   for (int y = 0; y < 12; ++y)
@@ -46,7 +46,7 @@ TEST(MarkedCracks, AreAPixelWiderOnEverySide) {
     }
 }
 
-TEST(MarkedCracks, OfASingleSampleFillAPixelAndFadeBesideIt) {
+TEST(MarkedCracks, ofASingleSampleFillAPixelAndFadeBesideIt) {
   Image picture(9, 9, kGrey);
   markCracks(picture, torn(27, 27, {{13, 13}}, 1), {3, 1, 1});
   EXPECT_EQ(picture.at(4, 4), kCrackColor);
@@ -59,7 +59,7 @@ TEST(MarkedCracks, OfASingleSampleFillAPixelAndFadeBesideIt) {
   EXPECT_EQ(picture.at(4, 6), kGrey);
 }
 
-TEST(MarkedCracks, AreAsBroadAsThePicturesLines) {
+TEST(MarkedCracks, areAsBroadAsThePicturesLines) {
   Image picture(30, 30, kGrey);
   markCracks(picture, torn(30, 30, {{15, 15}}, 1), {1, 3, 1});
   EXPECT_EQ(picture.at(18, 15), kCrackColor);

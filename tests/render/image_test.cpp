@@ -37,7 +37,7 @@ std::string messageOf(const std::function<void()>& action) {
   return {};
 }
 
-TEST(Image, ComesBackFromPngAsItWas) {
+TEST(Image, returnsUnchangedFromPng) {
   const TemporaryDirectory directory;
   for (const auto& [width, height] : {std::pair{1, 1}, {3, 7}, {257, 31}}) {
     const Image image = noise(width, height, 11);
@@ -49,7 +49,7 @@ TEST(Image, ComesBackFromPngAsItWas) {
   }
 }
 
-TEST(Image, TheSamePictureGivesTheSameBytesAndReplacesAnOlderFile) {
+TEST(Image, hasTheSameBytesEachTimeAndReplacesAnOlderFile) {
   const TemporaryDirectory directory;
   savePng(noise(40, 30, 1), directory / "a.png");
   savePng(noise(40, 30, 2), directory / "a.png");
@@ -59,7 +59,7 @@ TEST(Image, TheSamePictureGivesTheSameBytesAndReplacesAnOlderFile) {
   EXPECT_EQ(files, 2) << "a temporary file was left behind";
 }
 
-TEST(Image, AnUnwritablePathIsNamed) {
+TEST(Image, namesAPathThatCannotBeWritten) {
   const TemporaryDirectory directory;
   const Image image(4, 4, Color{});
   const auto missing = directory / "no" / "such" / "a.png";
@@ -69,7 +69,7 @@ TEST(Image, AnUnwritablePathIsNamed) {
   EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
 }
 
-TEST(Image, WhatIsNoWholePngIsRefusedByName) {
+TEST(Image, namesAFileThatIsNoWholePng) {
   const TemporaryDirectory directory;
   savePng(noise(64, 64, 3), directory / "whole.png");
   const std::string whole = bytesOf(directory / "whole.png");

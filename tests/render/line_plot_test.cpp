@@ -39,7 +39,7 @@ std::set<std::string> textsOf(const LineLayout& layout) {
   return texts;
 }
 
-TEST(LinePlot, AJumpIsAnUprightStepInItsPlace) {
+TEST(LinePlot, showsAJumpAsAnUprightStepInItsPlace) {
   const Field field = stepField();
   const Line line = sampleLine(field, {-1, 0.5, 0.5}, {1, 0.5, 0.5}, 20);
   const LineLayout layout = layOutLine(frame(1280, 720), field, line, {});
@@ -66,7 +66,7 @@ TEST(LinePlot, AJumpIsAnUprightStepInItsPlace) {
   EXPECT_GT(stem.points[0].y() - stem.points[1].y(), 0.8 * layout.charts[1].height());
 }
 
-TEST(LinePlot, EachNumberStandsAtItsLevel) {
+TEST(LinePlot, hasEachNumberAtItsLevel) {
   const Field field = stepField();
   const Line line = sampleLine(field, {-1, 0.5, 0.5}, {1, 0.5, 0.5}, 20);
   const LineLayout layout = layOutLine(frame(1280, 720), field, line, {});
@@ -84,7 +84,7 @@ TEST(LinePlot, EachNumberStandsAtItsLevel) {
   EXPECT_NEAR(rowOf("1"), points.back().y(), 1e-9);
 }
 
-TEST(LinePlot, BandsHaveTheColorsOfTheFieldsLevels) {
+TEST(LinePlot, hasBandsInTheColorsOfTheFieldsLevels) {
   const Field field = stepField();
   const Line line = sampleLine(field, {-1.5, 0.5, 0.5}, {1, 0.5, 0.5}, 20);
   const Image image = drawLine(field, line, {}, 1280, 720);
@@ -99,7 +99,7 @@ TEST(LinePlot, BandsHaveTheColorsOfTheFieldsLevels) {
   EXPECT_NE(image.at(at(0.1), y), paperColor());
 }
 
-TEST(LinePlot, WithTheExactDistanceThereIsItsCurveAndTheError) {
+TEST(LinePlot, showsTheExactDistanceAndTheErrorWhereTheyAreKnown) {
   const Field field = randomField(4);
   const Line line = sampleLine(field, {-0.9, -0.8, -0.7}, {0.9, 0.7, 0.8}, 200);
   const LineLayout with = layOutLine(frame(1280, 720), field, line, exactAlong(line));
@@ -114,7 +114,7 @@ TEST(LinePlot, WithTheExactDistanceThereIsItsCurveAndTheError) {
   EXPECT_NE(drawLine(field, line, exactAlong(line), 640, 360).pixels, drawLine(field, line, {}, 640, 360).pixels);
 }
 
-TEST(LinePlot, NothingIsCutOrOverlapsAtAnySize) {
+TEST(LinePlot, clipsAndOverlapsNothingAtAnySize) {
   RandomFieldOptions large;
   large.domain = Box(Vector3::Constant(-3e5), Vector3::Constant(2e5));
   large.radius = 1e5;
@@ -169,7 +169,7 @@ TEST(LinePlot, NothingIsCutOrOverlapsAtAnySize) {
       }
 }
 
-TEST(LinePlot, EverySizeIsDrawnAndOthersAreRefused) {
+TEST(LinePlot, isDrawnInEverySizeAndRejectsOthers) {
   const Field field = randomField(1);
   const Line line = sampleLine(field, {-0.9, -0.8, -0.7}, {0.9, 0.7, 0.8}, 50);
   for (const auto& [width, height] : {std::pair{16, 16}, {64, 700}, {700, 64}, {320, 240}, {1920, 1080}}) {
@@ -181,7 +181,7 @@ TEST(LinePlot, EverySizeIsDrawnAndOthersAreRefused) {
   EXPECT_THROW(drawLine(field, line, {}, 100, 16385), Error);
 }
 
-TEST(LinePlot, ACurveIsAsWideAsItSays) {
+TEST(Curve, hasItsStatedWidth) {
   CurveItem curve{{{5, 10.5}, {15, 10.5}, {15, 4}, {15, 10.5}}, 3, {0, 0, 0}, {0, 0, 20, 20}};
   Image image(20, 20, {255, 255, 255});
   paintCurve(image, curve);

@@ -60,7 +60,7 @@ int differenceOf(const Color& a, const Color& b) {
 bool isBlue(const Color& color) { return color[2] > color[0] + 20; }
 bool isClay(const Color& color) { return color[0] > color[2] + 20 && color[1] > color[2]; }
 
-TEST(MeshPicture, ShowsWhichWayFacesLook) {
+TEST(MeshPicture, showsTheOrientationOfFaces) {
   const MeshPicture above = pictureFrom(20, 75);
   const TriangleMesh open = openBox();
   EXPECT_TRUE(isBlue(colorAt(drawn(open, above), open, above, {0, 0, -1}))) << "the floor, seen through the hole";
@@ -84,7 +84,7 @@ int nearestTo(const Color& color, const Image& image, const TriangleMesh& mesh, 
   return least;
 }
 
-TEST(MeshPicture, DrawsEdgesInTheirColour) {
+TEST(MeshPicture, drawsEdgesInTheirColor) {
   const TriangleMesh open = openBox();
   const Color yellow = defectColor(DefectKind::boundaryEdge);
   const Vector3 onRim(0, -1, 1);  // in front
@@ -93,7 +93,7 @@ TEST(MeshPicture, DrawsEdgesInTheirColour) {
   EXPECT_GT(nearestTo(yellow, drawn(boxOfTwo(), above), boxOfTwo(), above, onRim), 200);
 }
 
-TEST(MeshPicture, DashesWhatIsHiddenAndKeepsItsHue) {
+TEST(MeshPicture, dashesHiddenMarksAndKeepsTheirHue) {
   MeshPicture below = pictureFrom(0, -30);
   below.width = 1280;
   below.height = 720;
@@ -115,7 +115,7 @@ TEST(MeshPicture, DashesWhatIsHiddenAndKeepsItsHue) {
   EXPECT_GT(dashes, kPlaces / 3);
 }
 
-TEST(MeshPicture, DrawsEdgesThatBeginBehindTheEye) {
+TEST(MeshPicture, drawsEdgesThatBeginBehindTheEye) {
   const TriangleMesh open = openBox();
   MeshPicture within = pictureFrom(0, 10);
   within.camera.target = Vector3(0.8, 0, 1.1);
@@ -129,7 +129,7 @@ TEST(MeshPicture, DrawsEdgesThatBeginBehindTheEye) {
     EXPECT_LT(nearestTo(yellow, drawn(open, within), open, within, {1, y, 1}), 150) << y;
 }
 
-TEST(MeshPicture, RingsWhatIsSmall) {
+TEST(MeshPicture, putsRingsAroundSmallDefects) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=5");
   const MeshPicture front = pictureFrom(0, 0);
   const auto facing = std::ranges::min_element(mesh.triangles, {}, [&](const auto& t) {
@@ -153,7 +153,7 @@ TEST(MeshPicture, RingsWhatIsSmall) {
   EXPECT_LT(farthest, 20);
 }
 
-TEST(MeshPicture, ReddensFacesThatMeet) {
+TEST(MeshPicture, showsCrossingFacesInRed) {
   const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1, 1, 1}));
   const MeshPicture above = pictureFrom(20, 40);
   const Color meeting = colorAt(drawn(mesh, above), mesh, above, {-0.5, -0.7, 1});
@@ -171,7 +171,7 @@ Eigen::AlignedBox2i differenceBox(const Image& a, const Image& b) {
   return box;
 }
 
-TEST(MeshPicture, ShowsTheWholeMeshWhateverItsShapeAndTheViews) {
+TEST(MeshPicture, showsTheWholeMeshForAnyShapeOfMeshAndView) {
   for (const Vector3& sizes : {Vector3(1, 1, 1), Vector3(1, 9, 1), Vector3(9, 1, 1), Vector3(3, 1, 3)})
     for (const auto& [width, height] : {std::pair(480, 300), std::pair(150, 400)})
       for (const Projection projection : {Projection::perspective, Projection::orthographic})
@@ -210,7 +210,7 @@ std::size_t differentPixels(const Image& a, const Image& b, int limit) {
   return different;
 }
 
-TEST(MeshPicture, IsTheSameAtAnySizeAndPlace) {
+TEST(MeshPicture, isTheSameAtAnySizeAndPlace) {
   HPSDF_REQUIRE_GL();
   const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   for (const Projection projection : {Projection::perspective, Projection::orthographic})
@@ -232,7 +232,7 @@ TEST(MeshPicture, IsTheSameAtAnySizeAndPlace) {
     }
 }
 
-TEST(MeshPicture, OpenGlAgrees) {
+TEST(MeshPicture, isTheSameWithOpenGl) {
   HPSDF_REQUIRE_GL();
   const TriangleMesh mesh = joined(openBox(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   const MeshPicture above = pictureFrom(20, 40);
@@ -241,7 +241,7 @@ TEST(MeshPicture, OpenGlAgrees) {
   EXPECT_LT(differentPixels(cpu, gl, 40), std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
 }
 
-TEST(MeshPicture, LegendIsTidyAtAnySize) {
+TEST(MeshPicture, hasATidyLegendAtAnySize) {
   MeshDefects defects;
   defects.counts = {1234567, 89, 1, 12, 1000000};
   defects.allCrossings = false;
@@ -259,7 +259,7 @@ TEST(MeshPicture, LegendIsTidyAtAnySize) {
   }
 }
 
-TEST(MeshPicture, TellsWhereSomeCrossingsWereLeftOut) {
+TEST(MeshPicture, tellsWhereTheSearchForCrossingsWasCutShort) {
   MeshDefects defects;
   defects.counts = {12, 0, 0, 0, 1234};
   for (const bool all : {true, false}) {
@@ -275,7 +275,7 @@ TEST(MeshPicture, TellsWhereSomeCrossingsWereLeftOut) {
   }
 }
 
-TEST(MeshPicture, RefusesSizesAndTargetsOutOfRange) {
+TEST(MeshPicture, rejectsSizesAndTargetsOutOfRange) {
   TriangleMesh mesh = boxOfTwo();
   MeshPicture picture = pictureFrom(0, 0);
   picture.width = 8;

@@ -108,6 +108,14 @@ SlicePicture slice(ColorBy color, int width = 640, int height = 360, int samples
   return {AxisPlane{2, 0.5}, color, width, height, samples};
 }
 
+/// The size of the view in a picture of this size.
+ViewSize viewSize(int pictureWidth, int pictureHeight) {
+  SurfacePicture picture;
+  picture.width = pictureWidth;
+  picture.height = pictureHeight;
+  return render::viewSize(picture);
+}
+
 // The pixel that shows a point of the slice.
 Color colorAt(const Image& image, const Field& field, const SlicePicture& picture, const Vector3& point) {
   const SliceView view = sliceView(field, picture);
@@ -136,7 +144,7 @@ std::string messageOf(const std::function<void()>& action) {
   return {};
 }
 
-TEST(Picture, DegreeSliceHasTheColorsOfItsCells) {
+TEST(DegreeSlice, hasTheColorsOfItsCells) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   const LevelMap map(std::vector<int>{2, 3, 5});
@@ -153,7 +161,7 @@ TEST(Picture, DegreeSliceHasTheColorsOfItsCells) {
   }
 }
 
-TEST(Picture, DepthSliceShowsDepths) {
+TEST(DepthSlice, showsDepths) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   const SlicePicture picture = slice(ColorBy::depth);
@@ -162,7 +170,7 @@ TEST(Picture, DepthSliceShowsDepths) {
   EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(orderedColor(1)));
 }
 
-TEST(Picture, DistanceSliceIsBlueInsideRedOutsideAndDarkAtZero) {
+TEST(DistancePicture, isBlueInsideRedOutsideAndDarkAtZero) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   const SlicePicture picture = slice(ColorBy::distance);
@@ -173,7 +181,7 @@ TEST(Picture, DistanceSliceIsBlueInsideRedOutsideAndDarkAtZero) {
   EXPECT_EQ(image.at(3, 3), paperColor());
 }
 
-TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
+TEST(SurfacePicture, showsTheSurfaceBeforeItsBackdrop) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   SurfacePicture picture;
@@ -191,7 +199,7 @@ TEST(Picture, SurfaceStandsBeforeItsBackdrop) {
   EXPECT_EQ(pictures.size(), 3U);
 }
 
-TEST(Picture, CracksAreMarkedWhereAsked) {
+TEST(SurfacePicture, marksCracksOnRequest) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   for (const int samples : {1, 2}) {
@@ -206,7 +214,7 @@ TEST(Picture, CracksAreMarkedWhereAsked) {
   }
 }
 
-TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {
+TEST(Legend, hasTheLevelsOfTheWholeFieldAndNoOthers) {
   const Field field = planeField({2, 3, 5});
   FakeRenderer renderer(field);
   SlicePicture picture = slice(ColorBy::degree);
@@ -219,7 +227,7 @@ TEST(Picture, LegendHoldsTheLevelsOfTheWholeFieldAndNoOthers) {
 }
 
 /// What a picture was drawn with, asked for, gives the same picture; and another field's, its colours.
-TEST(Picture, TheScaleOfOnePictureServesAnother) {
+TEST(Scale, ofOnePictureAppliesToAnother) {
   const Field field = planeField({2, 3, 5}), other = planeField({3, 3, 4});
   FakeRenderer renderer(field), otherRenderer(other);
   const DistanceFunction exact{[](const Vector3& x) { return 3 * x.x(); }};
@@ -247,7 +255,7 @@ TEST(Picture, TheScaleOfOnePictureServesAnother) {
   EXPECT_EQ(drawSurface(renderer, field, surface).scale.levels, (std::vector<int>{2, 3, 4, 5}));
 }
 
-TEST(Picture, LegendNamesEachLevelAndItsShare) {
+TEST(Legend, namesEachLevelAndItsShare) {
   const std::map<int, double> shares = {{2, 0.14}, {3, 0.6396}, {5, 0.22}, {12, 0.0004}};
   Overlay overlay;
   static const std::string titles[] = {"polynomial degree", "degree"};
@@ -258,7 +266,7 @@ TEST(Picture, LegendNamesEachLevelAndItsShare) {
                                              "3", "64.0 %", "2", "14.0 %"}));
 }
 
-TEST(Picture, AWrongFieldGivesAnotherPicture) {
+TEST(Picture, differsForAnotherField) {
   const Field right = planeField({2, 3, 5}), wrong = planeField({3, 2, 5});
   FakeRenderer ofRight(right), ofWrong(wrong);
   const Image expected = draw(ofRight, right, slice(ColorBy::degree));
@@ -269,7 +277,7 @@ TEST(Picture, AWrongFieldGivesAnotherPicture) {
   EXPECT_EQ(draw(ofRight, right, slice(ColorBy::degree)).pixels, expected.pixels);
 }
 
-TEST(Picture, MoreSamplesKeepTheAverageColor) {
+TEST(Picture, keepsItsAverageColorWithMoreSamples) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   for (ColorBy color : {ColorBy::degree, ColorBy::distance}) {
@@ -283,7 +291,7 @@ TEST(Picture, MoreSamplesKeepTheAverageColor) {
   }
 }
 
-TEST(Picture, TheRendererIsAskedForTheViewAlone) {
+TEST(Picture, asksTheRendererForTheViewAlone) {
   const Field field = planeField(), other = planeField({7, 8, 9}, "a very long name of a field");
   for (const auto& [width, height] : {std::pair{64, 64}, {320, 240}, {640, 360}, {1280, 720}}) {
     const ViewSize size = viewSize(width, height);
@@ -299,7 +307,7 @@ TEST(Picture, TheRendererIsAskedForTheViewAlone) {
   }
 }
 
-TEST(Picture, ABarePictureIsTheViewAloneAndItsLegendComesWithIt) {
+TEST(BarePicture, isTheViewAloneAndKeepsItsLegendAsData) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   SlicePicture picture{AxisPlane{2, 0.5}, ColorBy::degree, 320, 240};
@@ -323,27 +331,27 @@ TEST(Picture, ABarePictureIsTheViewAloneAndItsLegendComesWithIt) {
   EXPECT_NEAR(bar.marks[1].t, 1 / 3.0, 1e-12);
 }
 
-TEST(Picture, ACaptionOfOnesOwnStandsInPlaceOfWhatIsKnownOfTheField) {
+TEST(Caption, ofTheCallerReplacesTheFactsAboutTheField) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   SurfacePicture picture{.camera = {}, .width = 400, .height = 240};
   const Drawn plain = drawSurface(renderer, field, picture);
-  EXPECT_EQ(viewSize(picture).width, plain.buffers.width);
+  EXPECT_EQ(render::viewSize(picture).width, plain.buffers.width);
   picture.caption = Caption{"a scene", {"t = 1 s"}};
   const Drawn drawn = drawSurface(renderer, field, picture);
   EXPECT_EQ(drawn.details, std::vector<std::string>{"t = 1 s"});
   EXPECT_EQ(drawn.buffers.width, 400) << "no legend: the view has its room";
   EXPECT_EQ(drawn.buffers.height, plain.buffers.height);
-  EXPECT_EQ(viewSize(picture).width, 400);
+  EXPECT_EQ(render::viewSize(picture).width, 400);
   picture.caption->details = {"t = 2 s"};
   EXPECT_NE(drawSurface(renderer, field, picture).image.pixels, drawn.image.pixels);
   picture.color = ColorBy::degree;
   EXPECT_EQ(drawSurface(renderer, field, picture).buffers.width, plain.buffers.width) << "its colours have a legend";
   picture.bare = true;
-  EXPECT_EQ(viewSize(picture).height, 240);
+  EXPECT_EQ(render::viewSize(picture).height, 240);
 }
 
-TEST(Picture, ASliceIsZoomedAboutItsTargetWithinItsPlane) {
+TEST(Slice, isZoomedAboutItsTargetWithinItsPlane) {
   const Field field = planeField();
   SlicePicture picture{AxisPlane{2, 0.5}, ColorBy::degree, 320, 240};
   const SliceView whole = sliceView(field, picture);
@@ -360,7 +368,7 @@ TEST(Picture, ASliceIsZoomedAboutItsTargetWithinItsPlane) {
   EXPECT_THROW(sliceView(field, picture), Error);
 }
 
-TEST(Picture, SizesOutOfRangeAreRefusedBeforeAnythingIsDone) {
+TEST(Picture, rejectsSizesOutOfRangeBeforeItDraws) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   struct Case {
@@ -386,7 +394,7 @@ TEST(Picture, SizesOutOfRangeAreRefusedBeforeAnythingIsDone) {
   EXPECT_EQ(renderer.calls, 0);
 }
 
-TEST(Picture, QuantitiesHaveTheColorsOfTheirScale) {
+TEST(Picture, showsQuantitiesInTheColorsOfTheirScale) {
   const Field field = planeField({2, 3, 5});
   FakeRenderer renderer(field);
   const Jumps jumps = findJumps(field);
@@ -412,7 +420,7 @@ TEST(Picture, QuantitiesHaveTheColorsOfTheirScale) {
             encodeSrgb(ColorScale(0, 5, false)(float(ofCells[field.cellAt(point).id]))));
 }
 
-TEST(Picture, ColorsWithoutTheirEvidenceOrOnTheWrongViewAreRefused) {
+TEST(Picture, rejectsColorsWithoutReferenceDataOrOnTheWrongView) {
   const Field field = planeField({2, 3, 5});
   FakeRenderer renderer(field);
   const auto refusal = [&](const auto& picture) { return messageOf([&] { draw(renderer, field, picture); }); };
@@ -429,7 +437,7 @@ TEST(Picture, ColorsWithoutTheirEvidenceOrOnTheWrongViewAreRefused) {
   }
 }
 
-TEST(Picture, EverySizeIsDrawn) {
+TEST(Picture, isDrawnInEverySize) {
   const Field field = planeField({2, 3, 5}, "a name · with ünicode that is far too long for any caption strip.obj");
   FakeRenderer renderer(field);
   for (const auto& [width, height] : {std::pair{16, 16},
@@ -451,7 +459,7 @@ TEST(Picture, EverySizeIsDrawn) {
   }
 }
 
-TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
+TEST(Layout, clipsAndOverlapsNothingAtAnySize) {
   static const std::string titles[] = {"polynomial degree", "degree"};
   const std::string longName(300, 'W');
   const std::vector<std::string> details = {"distance",
@@ -523,7 +531,7 @@ TEST(Layout, NothingIsCutOrOverlapsAtAnySize) {
   }
 }
 
-TEST(Layout, LegendAndCaptionAreThereAt320x240) {
+TEST(Layout, hasLegendAndCaptionAt320x240) {
   const Frame f = frame(320, 240);
   EXPECT_FALSE(f.panel.empty());
   EXPECT_FALSE(f.caption.empty());
@@ -531,7 +539,7 @@ TEST(Layout, LegendAndCaptionAreThereAt320x240) {
   EXPECT_EQ(frame(64, 64).view, (PixelRect{0, 0, 64, 64}));
 }
 
-TEST(Layout, NarrowPicturesKeepALegend) {
+TEST(Layout, keepsTheLegendInNarrowPictures) {
   EXPECT_FALSE(frame(200, 1000).panel.empty());
   EXPECT_TRUE(frame(199, 1000).panel.empty());
 }
@@ -558,7 +566,7 @@ std::optional<double> numberOf(std::string text) {
 
 double middleOf(const TextItem& item) { return item.baseline - capHeight(item.size) / 2; }
 
-TEST(Layout, EachLevelsNumberStandsAtItsColor) {
+TEST(LevelLegend, hasEachNumberAtItsColor) {
   static const std::string titles[] = {"polynomial degree", "degree"};
   // at 320 × 240, 31 levels leave no room for shares: the swatches touch
   for (const auto& [width, height, count] :
@@ -584,7 +592,7 @@ TEST(Layout, EachLevelsNumberStandsAtItsColor) {
   }
 }
 
-TEST(Layout, EachDistancesNumberStandsAtItsColor) {
+TEST(DistanceBar, hasEachNumberAtItsColor) {
   for (const auto& [width, height] : {std::pair{1280, 720}, {320, 240}, {200, 1000}})
     for (const DistanceScale& scale : {distanceScale(-0.4, 1.1), distanceScale(-3e4, 1e3), distanceScale(1e-6, 2e-5),
                                        distanceScale(0.4648, 0.4715)}) {
@@ -613,7 +621,7 @@ TEST(Layout, EachDistancesNumberStandsAtItsColor) {
     }
 }
 
-TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
+TEST(Axes, areBesideTheSectionOrOnAPlate) {
   for (const auto& [width, height] : {std::pair{480, 270}, {640, 360}, {1280, 720}, {4096, 2160}, {300, 1000}}) {
     const Frame f = frame(width, height);
     const int w = f.view.width(), h = f.view.height(), side = static_cast<int>(0.94 * std::min(w, h));
@@ -654,7 +662,7 @@ TEST(Layout, AxesStandBesideTheSectionOrOnAPlate) {
   EXPECT_TRUE(none.boxes.empty() && none.texts.empty());
 }
 
-TEST(Picture, SlicesAlongAnAxisNameTheAxesAcross) {
+TEST(Slice, namesItsAxesWhereItsPlaneIsAcrossOne) {
   const Field field = planeField();
   FakeRenderer renderer(field);
   const char* const names[] = {"yz", "xz", "xy"};
@@ -705,7 +713,7 @@ Field ball(double radius, const Vector3& center = Vector3::Zero()) {
                 .metadata = {}});
 }
 
-TEST(Surface, SaysWhetherItIsSeen) {
+TEST(DrawnSurface, tellsWhetherThePictureShowsTheField) {
   const Field field = ball(0.8);
   const auto renderer = makeCpuRenderer(field);
   SurfacePicture picture;
@@ -719,7 +727,7 @@ TEST(Surface, SaysWhetherItIsSeen) {
   EXPECT_FALSE(drawSurface(*renderer, field, picture).seen);
 }
 
-TEST(Surface, SaysWhetherTheWallsCutIt) {
+TEST(MeetsWalls, tellsWhetherTheDomainCutsTheSurface) {
   EXPECT_FALSE(meetsWalls(ball(0.8), 0));
   EXPECT_FALSE(meetsWalls(ball(0.8), 0.35));
   EXPECT_TRUE(meetsWalls(ball(0.8), 0.37)) << "a cap of a tenth of the wall";
@@ -732,7 +740,7 @@ TEST(Surface, SaysWhetherTheWallsCutIt) {
     for (double toOneWall : {-0.3, 0.3}) EXPECT_TRUE(meetsWalls(ball(0.8, toOneWall * Vector3::Unit(axis)), 0));
 }
 
-TEST(Layout, CaptionsKeepWhatFits) {
+TEST(Caption, keepsTheDetailsThatFit) {
   const std::vector<std::string> details = {"distance", std::string(200, 'x'), "7 cells"};
   Overlay overlay;
   addCaption(overlay, frame(320, 240), "bunny.obj", details);
@@ -741,7 +749,7 @@ TEST(Layout, CaptionsKeepWhatFits) {
   EXPECT_EQ(overlay.texts[1].text, "distance · 7 cells");
 }
 
-TEST(Layout, NumbersAreWrittenAsReadersExpect) {
+TEST(Numbers, areFormattedAsReadersExpect) {
   EXPECT_EQ(formatNumber(0), "0");
   EXPECT_EQ(formatNumber(-0.25), "−0.25");
   EXPECT_EQ(formatNumber(1.10849), "1.108");

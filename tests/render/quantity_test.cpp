@@ -22,7 +22,7 @@ Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
-TEST(Quantity, OfASliceIsThatOfItsPoints) {
+TEST(Quantity, ofASliceIsThatOfItsPoints) {
   const Seen seen;
   const SliceView view = planeSlice(seen.field.domain(), {0.1, 0, 0.05}, {1, 2, 3}, 60, 40);
   const ViewBuffers buffers = makeCpuRenderer(seen.field)->slice(view, 60, 40);
@@ -56,7 +56,7 @@ TEST(Quantity, OfASliceIsThatOfItsPoints) {
   EXPECT_GT(misses, 50);
 }
 
-TEST(Quantity, TheDifferenceOfTwoFieldsIsThatOfTheirValues) {
+TEST(Difference, ofTwoFieldsIsThatOfTheirValues) {
   const Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
   FieldData data = field.data();
   auto& coefficients = std::get<std::vector<double>>(data.coefficients);
@@ -79,7 +79,7 @@ TEST(Quantity, TheDifferenceOfTwoFieldsIsThatOfTheirValues) {
   EXPECT_THROW(quantityAt(field, view, buffers, ColorBy::difference, {}), Error);
 }
 
-TEST(Quantity, OfASurfaceIsThatOfItsHits) {
+TEST(Quantity, ofASurfaceIsThatOfItsHits) {
   const Seen seen;
   const SurfaceView view{cameraOf({}, seen.field.domain(), 50, 50), 0};
   const ViewBuffers buffers = makeCpuRenderer(seen.field)->surface(view, 50, 50);
@@ -97,7 +97,7 @@ TEST(Quantity, OfASurfaceIsThatOfItsHits) {
   EXPECT_GT(hits, 200);
 }
 
-TEST(Quantity, TheScaleFollowsTheCellsOrThePointsOrWhatIsAsked) {
+TEST(ScaleOfAQuantity, dependsOnTheCellsOrThePointsOrTheLimits) {
   // a cell of half the domain, and one divided once
   FieldData data;
   data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
@@ -116,7 +116,7 @@ TEST(Quantity, TheScaleFollowsTheCellsOrThePointsOrWhatIsAsked) {
   EXPECT_EQ(colorScale({.logarithmic = false}, field, cells, samples).low(), 0);
 }
 
-TEST(Quantity, ManyTinyCellsDoNotStretchTheScale) {
+TEST(ScaleOfAQuantity, isNotStretchedByManyTinyCells) {
   // leaves deeper than 4 are a third of all, but fill a four-thousandth of the volume
   const Field field =
       randomField(4, {.grid = {1, 1, 1}, .refinement = 0, .maxDepth = 6, .deepAt = Vector3(-0.99, -0.99, -0.99)});

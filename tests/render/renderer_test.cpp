@@ -157,7 +157,7 @@ void expectFieldsAnswers(const Field& field, SliceView view) {
   EXPECT_LE(otherCells, kWidth * kHeight / 1000);
 }
 
-TEST(CpuSlice, IsWhatTheFieldAnswers) {
+TEST(CpuSlice, hasTheFieldsValues) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     for (int axis = 0; axis < 3; ++axis)
@@ -167,7 +167,7 @@ TEST(CpuSlice, IsWhatTheFieldAnswers) {
   }
 }
 
-TEST(CpuSlice, PlaneOnFacesShowsTheUpperCells) {
+TEST(CpuSlice, showsTheUpperCellsInAPlaneOnFaces) {
   // z = 0 is a face of the even base grid, and of every child of it
   const Field& field = shape("torus");
   const ViewBuffers at = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, 0, kWidth, kHeight), kWidth, kHeight);
@@ -177,7 +177,7 @@ TEST(CpuSlice, PlaneOnFacesShowsTheUpperCells) {
   EXPECT_NE(at.cell, below.cell);
 }
 
-TEST(CpuSlice, BoxDomainsAndBothKindsOfCoefficients) {
+TEST(CpuSlice, acceptsBoxDomainsAndBothKindsOfCoefficients) {
   RandomFieldOptions options{.domain = Box(Vector3(-3, 10, 0.5), Vector3(4, 11, 2)), .grid = {5, 1, 3}};
   for (const bool single : {false, true}) {
     options.single = single;
@@ -233,7 +233,7 @@ void expectNothingPassed(const Field& field, const SurfaceView& view, const View
   }
 }
 
-TEST(CpuTrace, FindsTheFirstCrossingOfTheField) {
+TEST(CpuTrace, findsTheFirstCrossingOfTheField) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     const auto renderer = makeCpuRenderer(field);
@@ -249,7 +249,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheField) {
   }
 }
 
-TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
+TEST(CpuTrace, findsTheFirstCrossingOfFieldsWithRandomCoefficients) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     const Field field = randomField(seed, {.roughness = seed % 2 ? 1.0 : 0.2, .maxDepth = 5, .maxDegree = 8});
     const auto renderer = makeCpuRenderer(field);
@@ -261,7 +261,7 @@ TEST(CpuTrace, FindsTheFirstCrossingOfTheRudestFields) {
   }
 }
 
-TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
+TEST(ClippingPlane, removesTheHalfOnTheEyesSide) {
   const Field field = randomField(5, {.roughness = 0.05});
   const auto cpu = makeCpuRenderer(field);
   const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
@@ -290,7 +290,7 @@ TEST(Surface, AClippingPlaneLeavesOutTheEyesHalf) {
   EXPECT_THROW(cpu->surface({camera, 0, ClipPlane{0, std::nan("")}}, 8, 8), Error);
 }
 
-TEST(Surface, AlongAClippingPlaneParallelRaysSeeTheSideThatPerspectiveSees) {
+TEST(ClippingPlane, removesTheSameSideForParallelRaysAlongItAsInPerspective) {
   const Field field = randomField(5, {.roughness = 0.05});
   const auto cpu = makeCpuRenderer(field);
   for (const double azimuth : {-90.0, 90.0, 270.0})  // along x, but for rounding
@@ -343,7 +343,7 @@ void expectSectionWhereTheSolidIsCut(Projection projection) {
   EXPECT_TRUE(whole.shown.empty());
 }
 
-TEST(Surface, TheSectionShowsTheSolidWhereItIsCut) {
+TEST(Section, showsTheSolidWhereItIsCut) {
   for (const Projection projection : kProjections) expectSectionWhereTheSolidIsCut(projection);
 }
 
@@ -394,10 +394,10 @@ void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(con
     }
 }
 
-TEST(CpuTrace, SeesASurfaceThatIsGrazedTwiceWithinAStep) { expectGrazedSurfaceIsSeen(makeCpuRenderer); }
+TEST(CpuTrace, findsASurfaceThatIsGrazedTwiceWithinAStep) { expectGrazedSurfaceIsSeen(makeCpuRenderer); }
 
 /// Never past the true surface by more than the field's own error there.
-TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
+TEST(CpuTrace, neverPassesTheTrueSurfaceOfTheBuiltInShapes) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     const DistanceFunction exact = shapes::analytic(name);
@@ -431,7 +431,7 @@ TEST(CpuTrace, NeverPassesTheTrueSurfaceOfTheBuiltInShapes) {
   }
 }
 
-TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
+TEST(CpuTrace, hitsTheSphereWhereTheFormulaSays) {
   const double radius = 0.8;
   const Field& field = shape("sphere,radius=0.8");
   const Camera camera = cameraOf({}, kCube, kWidth, kHeight);
@@ -461,7 +461,7 @@ TEST(CpuTrace, HitsTheSphereWhereTheFormulaSays) {
 }
 
 /// Parallel rays, by the formula; and however far away the camera is said to be, hits are as precise.
-TEST(CpuTrace, HitsTheSphereOrthographically) {
+TEST(CpuTrace, hitsTheSphereOrthographically) {
   const double radius = 0.8;
   const Field& field = shape("sphere,radius=0.8");
   const auto cpu = makeCpuRenderer(field);
@@ -495,7 +495,7 @@ TEST(CpuTrace, HitsTheSphereOrthographically) {
   }
 }
 
-TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
+TEST(CpuTrace, startsInsideAndHandlesOffsetsAndTheDomainsBoundary) {
   const Field& field = shape("sphere,radius=0.8");
   const auto renderer = makeCpuRenderer(field);
   // a camera at the centre sees the inside all around
@@ -519,7 +519,7 @@ TEST(CpuTrace, FromInsideOffsetsAndTheDomainsBoundary) {
   EXPECT_EQ(hits(renderer->surface({lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.1), 0}, kWidth, kHeight)), 0u);
 }
 
-TEST(CpuRenderer, RefusesViewsThatAreNone) {
+TEST(CpuRenderer, rejectsInvalidViews) {
   const Field field = randomField(1);
   const auto renderer = makeCpuRenderer(field);
   const SliceView slice = axisSlice(field.domain(), 2, 0, 8, 8);
@@ -595,7 +595,7 @@ std::size_t crackCount(const ViewBuffers& buffers) {
 
 /// The same polynomial everywhere, a kink at faces, and a surface that lies in faces, which rays meet just behind them;
 /// solids that the walls cut, so that rays enter within them.
-TEST(Cracks, AreNoneInAContinuousField) {
+TEST(Cracks, areNoneInAContinuousField) {
   struct Continuous {
     const char* name;
     Field field;
@@ -629,7 +629,7 @@ TEST(Cracks, AreNoneInAContinuousField) {
 }
 
 /// f = z − 0.1 where x < 0, z + 0.1 elsewhere: seen from above and +x a cliff at x = 0.
-TEST(Cracks, AreExactlyWhereTheStepIs) {
+TEST(Cracks, areExactlyWhereTheJumpIs) {
   const Field field = pieces(
       [](const Vector3& c, double half) { return linear(c.z() + (c.x() < 0 ? -0.1 : 0.1), Vector3::UnitZ(), half); });
   for (const Projection projection : kProjections) {
@@ -679,7 +679,7 @@ TEST(Cracks, AreExactlyWhereTheStepIs) {
 }
 
 /// Steps a little higher than what the march cannot tell from none, and a little lower.
-TEST(Cracks, OfHardlyAnyHeightAreNone) {
+TEST(Cracks, needALeastHeight) {
   const auto stepped = [](double step) {
     return pieces([step](const Vector3& c, double half) {
       return linear(c.x() + 0.5 * (c.x() < 0 ? -step : step), Vector3::UnitX(), half);
@@ -699,7 +699,7 @@ TEST(Cracks, OfHardlyAnyHeightAreNone) {
   }
 }
 
-TEST(Cracks, AreNotOnTheSectionOfAClippingPlane) {
+TEST(Cracks, areNotOnTheSectionOfAClippingPlane) {
   const Field field = randomField(5, {.roughness = 0.2});
   const SurfaceView view{cameraOf({}, field.domain(), kWidth, kHeight), 0, ClipPlane{2, 0.1}};
   ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
@@ -724,7 +724,7 @@ class Gl : public testing::Test {
 };
 
 /// Squares of such lengths are beyond float.
-TEST_F(Gl, FieldsOfAnySizeLookTheSame) {
+TEST_F(Gl, drawsFieldsOfAnySizeAlike) {
   const Field field = randomField(5, {.roughness = 0.05});
   for (const double size : {0x1p-120, 0x1p-70, 0x1p70, 0x1p120}) {
     FieldData data = field.data();
@@ -756,7 +756,7 @@ TEST_F(Gl, FieldsOfAnySizeLookTheSame) {
   }
 }
 
-TEST_F(Gl, SlicesOfBuiltInShapes) {
+TEST_F(Gl, drawsSlicesOfBuiltInShapes) {
   BufferTolerance tolerance = kSliceTolerance;
   tolerance.pixels = 0;  // positions are in double precision on both sides
   for (const std::string& name : kShapes) {
@@ -769,7 +769,7 @@ TEST_F(Gl, SlicesOfBuiltInShapes) {
   }
 }
 
-TEST_F(Gl, SlicesOfDegreesUpTo30) {
+TEST_F(Gl, drawsSlicesOfDegreesUpTo30) {
   for (const int degree : {0, 1, 2, 3, 4, 5, 13, 30}) {
     const Field field = randomField(degree, {.roughness = 1, .maxDepth = 1, .minDegree = degree, .maxDegree = degree});
     const ViewBuffers buffers =
@@ -779,7 +779,7 @@ TEST_F(Gl, SlicesOfDegreesUpTo30) {
   }
 }
 
-TEST_F(Gl, SlicesOfDeepOctreesAndBoxDomains) {
+TEST_F(Gl, drawsSlicesOfDeepOctreesAndBoxDomains) {
   // a magnified corner of a tree 12 levels deep
   const Field deep =
       randomField(4, {.grid = {3, 3, 3}, .refinement = 0.1, .maxDepth = 12, .deepAt = Vector3(0.1, 0.2, 0.3)});
@@ -803,7 +803,7 @@ TEST_F(Gl, SlicesOfDeepOctreesAndBoxDomains) {
                   kSliceTolerance);
 }
 
-TEST_F(Gl, ViewsLargerThanATile) {
+TEST_F(Gl, drawsViewsLargerThanATile) {
   const Field& field = shape("torus");
   expectSameSlice(field, axisSlice(kCube, 2, 0, 4500, 9), kSliceTolerance, 4500, 9);
   expectSameSlice(field, axisSlice(kCube, 2, 0, 5, 4500), kSliceTolerance, 5, 4500);
@@ -813,7 +813,7 @@ TEST_F(Gl, ViewsLargerThanATile) {
                     &camera));
 }
 
-TEST_F(Gl, SurfacesOfBuiltInShapesFromAnywhere) {
+TEST_F(Gl, drawsSurfacesOfBuiltInShapesFromAnywhere) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     const auto cpu = makeCpuRenderer(field);
@@ -831,7 +831,7 @@ TEST_F(Gl, SurfacesOfBuiltInShapesFromAnywhere) {
 }
 
 /// Rays that run along faces of cells: cameras on the axes, pictures with a middle row and column and without.
-TEST_F(Gl, SurfacesSeenAlongAnAxis) {
+TEST_F(Gl, drawsSurfacesSeenAlongAnAxis) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     const auto cpu = makeCpuRenderer(field);
@@ -860,11 +860,11 @@ TEST_F(Gl, SurfacesSeenAlongAnAxis) {
   }
 }
 
-TEST_F(Gl, SeesASurfaceThatIsGrazedTwiceWithinAStep) {
+TEST_F(Gl, findsASurfaceThatIsGrazedTwiceWithinAStep) {
   expectGrazedSurfaceIsSeen([](const Field& field) { return makeGlRenderer(field, GlChoice::software); });
 }
 
-TEST_F(Gl, SurfacesOfTheRudestFields) {
+TEST_F(Gl, drawsSurfacesOfFieldsWithRandomCoefficients) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     const Field field = randomField(
         seed,
@@ -884,7 +884,7 @@ TEST_F(Gl, SurfacesOfTheRudestFields) {
 }
 
 /// Degree 30 takes the march many passes: see shaders/surface_march.frag.
-TEST_F(Gl, SurfacesOfDegree30) {
+TEST_F(Gl, drawsSurfacesOfDegree30) {
   const Field field = randomField(9, {.grid = {1, 1, 1}, .maxDepth = 1, .minDegree = 30, .maxDegree = 30});
   const auto cpu = makeCpuRenderer(field);
   const auto gl = makeGlRenderer(field, GlChoice::software);
@@ -895,7 +895,7 @@ TEST_F(Gl, SurfacesOfDegree30) {
 }
 
 /// Slightly wrong buffers must not pass: one coefficient of one visible cell is changed a little.
-TEST_F(Gl, NegativeControl) {
+TEST_F(Gl, differsForAWrongField) {
   const Field field = randomField(2);
   const SliceView slice = axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
   const Camera camera = cameraOf({}, field.domain(), kWidth, kHeight);
@@ -921,7 +921,7 @@ TEST_F(Gl, NegativeControl) {
       agree(expectedSurface, rendered(expectedSurface.cell[hit], 2e-5).second, surfaceTolerance(field), &camera));
 }
 
-TEST_F(Gl, SeveralRenderersAtOnceAndOnAnyThread) {
+TEST_F(Gl, allowsSeveralRenderersAtOnceAndOnAnyThread) {
   const Field a = randomField(12);
   const Field b = randomField(13);
   const SliceView view = axisSlice(a.domain(), 1, 0.2, kWidth, kHeight);
@@ -938,7 +938,7 @@ TEST_F(Gl, SeveralRenderersAtOnceAndOnAnyThread) {
   EXPECT_TRUE(agree(expectedB, second->slice(view, kWidth, kHeight), kSliceTolerance));
 }
 
-TEST_F(Gl, RepeatsItselfBitByBit) {
+TEST_F(Gl, repeatsItselfBitByBit) {
   const Field& field = shape("torus");
   const SurfaceView view{cameraOf({}, kCube, kWidth, kHeight), 0};
   const auto gl = makeGlRenderer(field, GlChoice::software);
@@ -949,13 +949,13 @@ TEST_F(Gl, RepeatsItselfBitByBit) {
   EXPECT_EQ(once.value, again.value);
 }
 
-TEST_F(Gl, NamesItsDevice) {
+TEST_F(Gl, namesItsDevice) {
   EXPECT_THAT(glDescription(GlChoice::software), HasSubstr("llvmpipe"));
   const Field field = randomField(1);
   EXPECT_EQ(makeGlRenderer(field, GlChoice::software)->description(), glDescription(GlChoice::software));
 }
 
-TEST_F(Gl, RefusesViewsThatAreNone) {
+TEST_F(Gl, rejectsInvalidViews) {
   const Field field = randomField(1);
   const auto renderer = makeGlRenderer(field, GlChoice::software);
   EXPECT_THROW(renderer->slice(axisSlice(field.domain(), 2, 0, 8, 8), 0, 8), Error);
@@ -963,7 +963,7 @@ TEST_F(Gl, RefusesViewsThatAreNone) {
 }
 
 /// In a fresh process, so that EGL looks for its drivers again: there are none, and the error says all that was tried.
-TEST(GlDeathTest, WithoutADriverTheErrorSaysWhatWasTriedAndWhatToDo) {
+TEST(GlDeathTest, namesTheDevicesTriedAndTheRemedyWithoutADriver) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto withoutDrivers = [](GlChoice choice) {
     ::setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);
@@ -983,7 +983,7 @@ TEST(GlDeathTest, WithoutADriverTheErrorSaysWhatWasTriedAndWhatToDo) {
 }
 
 /// Only where there is no graphics hardware does the choice fail; elsewhere it must not give a software device.
-TEST(GlHardware, IsHardwareOrAnError) {
+TEST(GlHardware, isHardwareOrAnError) {
   try {
     EXPECT_THAT(glDescription(GlChoice::hardware), testing::Not(HasSubstr("llvmpipe")));
   } catch (const Error& error) {

@@ -18,7 +18,6 @@
 #include "picture/arrows.h"
 #include "scene/cell_boxes.h"
 #include "scene/cell_lines.h"
-#include "scene/cell_selection.h"
 #include "scene/section.h"
 #include "support/random_field.h"
 
@@ -92,7 +91,7 @@ std::optional<Box> kept(const SurfaceView& view, Box box) {
   return box;
 }
 
-TEST(Scene, EachPixelShowsTheNearestOfSurfacePlaneAndBoxes) {
+TEST(Scene, showsTheNearestOfSurfacePlaneAndBoxesInEachPixel) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   const ShownCells choice{CellStyle::boxes, {2, 4}, {1, 2}};
@@ -165,7 +164,7 @@ TEST(Scene, EachPixelShowsTheNearestOfSurfacePlaneAndBoxes) {
     EXPECT_GT(seen[shown], 500) << int(shown);
 }
 
-TEST(Scene, OnlyChosenCellsStandInIt) {
+TEST(Scene, showsOnlyTheChosenCells) {
   const Field field = testField();
   const auto cells = [&](std::vector<int> degrees, std::vector<int> depths) {
     return chosenCells(field, {CellStyle::boxes, std::move(degrees), std::move(depths)});
@@ -180,7 +179,7 @@ TEST(Scene, OnlyChosenCellsStandInIt) {
   EXPECT_TRUE(cells({7}, {}).empty());
 }
 
-TEST(Scene, ABoxThatHoldsTheEyeIsLeftOut) {
+TEST(Scene, omitsABoxThatContainsTheEye) {
   const Field field = testField();
   const std::vector<Cell> cells = chosenCells(field, {});
   Camera camera = cameraAt(field, Projection::perspective);
@@ -206,7 +205,7 @@ void alongEdges(const Box& box, const Visit& visit) {
     }
 }
 
-TEST(Scene, LinesRunAlongTheEdgesThatNothingHides) {
+TEST(CellLines, followTheEdgesThatNothingHides) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   const std::vector<Cell> cells = chosenCells(field, {CellStyle::lines, {}, {0, 1}});
@@ -252,7 +251,7 @@ TEST(Scene, LinesRunAlongTheEdgesThatNothingHides) {
     }
 }
 
-TEST(Scene, LinesOfSmallCellsFadeAndThoseOfTheNearestAreStrongest) {
+TEST(CellLines, fadeForSmallCellsAndAreStrongestForTheNearest) {
   const Field field = testField();
   const SurfaceView view{cameraAt(field, Projection::perspective)};
   ViewBuffers empty = makeCpuRenderer(field)->surface({view.camera, 50}, kWidth, kHeight);
@@ -267,7 +266,7 @@ TEST(Scene, LinesOfSmallCellsFadeAndThoseOfTheNearestAreStrongest) {
   EXPECT_EQ(strongest(3, 3), 0.0F);
 }
 
-TEST(Scene, IsTheSameForAnyNumberOfThreads) {
+TEST(Scene, isTheSameForAnyNumberOfThreads) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   SurfacePicture picture;
@@ -287,7 +286,7 @@ TEST(Scene, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Scene, PicksTellWhatEachKindOfPixelShows) {
+TEST(Pick, tellsTheContentOfEachKindOfPixel) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   SurfacePicture picture;
@@ -331,7 +330,7 @@ class NoRenderer : public Renderer {
   std::string description() const override { return "none"; }
 };
 
-TEST(Scene, TheSurfaceCanBeLeftOut) {
+TEST(Scene, omitsTheSurfaceOnRequest) {
   const Field field = testField();
   NoRenderer none;
   SurfacePicture picture;
@@ -348,7 +347,7 @@ TEST(Scene, TheSurfaceCanBeLeftOut) {
   EXPECT_THROW(picture.surface = true; drawSurface(none, field, picture), std::logic_error);
 }
 
-TEST(Scene, APlaneHasTheColorsOfItsCellsAndALineWhereTheSurfaceIs) {
+TEST(Scene, showsAPlaneInTheColorsOfItsCellsAndTheSurfaceAsALine) {
   const Field field = testField();
   NoRenderer none;
   SurfacePicture picture;
@@ -381,7 +380,7 @@ TEST(Scene, APlaneHasTheColorsOfItsCellsAndALineWhereTheSurfaceIs) {
   EXPECT_GT(light, 0.9 * onLine);
 }
 
-TEST(Scene, RefusesWhatCannotBeDrawn) {
+TEST(Scene, rejectsSettingsThatCannotBeDrawn) {
   const Field field = testField();
   NoRenderer none;
   const auto drawing = [&](auto change) {
@@ -400,7 +399,7 @@ TEST(Scene, RefusesWhatCannotBeDrawn) {
   EXPECT_THAT(drawing([](auto& p) { p.clip = ClipPlane{0, kInfinity}; }), ThrowsMessage<Error>(HasSubstr("clipping")));
 }
 
-TEST(Arrows, InASliceFollowTheGradientsProjection) {
+TEST(Arrows, followTheProjectionOfTheGradientInASlice) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   const SliceView view = planeSlice(field.domain(), {0.1, 0, 0}, {1, 0.5, 2}, kWidth, kHeight);
@@ -427,7 +426,7 @@ TEST(Arrows, InASliceFollowTheGradientsProjection) {
   }
 }
 
-TEST(Arrows, OnASurfaceStartWhereItIsSeenAndFollowTheGradient) {
+TEST(Arrows, startAtTheVisiblePointOfASurfaceAndFollowTheGradient) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   for (const Projection projection : kProjections) {
@@ -450,7 +449,7 @@ TEST(Arrows, OnASurfaceStartWhereItIsSeenAndFollowTheGradient) {
   }
 }
 
-TEST(Arrows, AreFaintWhereSomethingIsNearer) {
+TEST(Arrows, areFaintWhereSomethingIsNearer) {
   const Field field = testField();
   const SurfaceView view{cameraAt(field, Projection::perspective)};
   ViewBuffers buffers = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
@@ -465,7 +464,7 @@ TEST(Arrows, AreFaintWhereSomethingIsNearer) {
   for (const Arrow& arrow : arrows) EXPECT_EQ(arrow.strength(0, int(arrow.from.x()), int(arrow.from.y())), 1.0F);
 }
 
-TEST(Arrows, AreDarkInALightCasingAndStayWithinTheirRectangle) {
+TEST(Arrows, areDarkInALightCasingAndStayWithinTheirRectangle) {
   for (const Color ground : {Color{20, 10, 40}, Color{250, 250, 250}, Color{60, 160, 90}}) {
     Image image(100, 60, ground);
     paintArrows(image, {0, 0, 100, 40}, {{{20, 20}, {60, 20}}, {{50, 30}, {50, 55}}}, 2);

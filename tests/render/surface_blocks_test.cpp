@@ -70,7 +70,7 @@ Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) 
   return {eye, unit, right * (halfHeight * kWidth / kHeight), right.cross(unit) * halfHeight};
 }
 
-TEST(SurfaceBlocks, LeaveNothingOutFromAnywhere) {
+TEST(SurfaceBlocks, includeAllThatIsVisibleFromAnywhere) {
   std::mt19937 random(17);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (unsigned seed = 0; seed < 4; ++seed) {
@@ -92,7 +92,7 @@ TEST(SurfaceBlocks, LeaveNothingOutFromAnywhere) {
   }
 }
 
-TEST(SurfaceBlocks, OfACameraWithoutWidthAreTheWholeView) {
+TEST(SurfaceBlocks, areTheWholeViewForACameraWithoutWidth) {
   const Field field = randomField(1);
   const Camera flat{Vector3(3, 0.1, 0.2), Vector3(-1, 0, 0), Vector3::Zero(), Vector3(0, 0, 0.1)};
   for (const float start : find(field, {flat, 0}).starts) EXPECT_LT(start, 3);
@@ -121,12 +121,12 @@ void expectBlocksHugTheSurface(Projection projection) {
   EXPECT_LT(ahead / hit, 0.1 * field.domain().sizes().norm());
 }
 
-TEST(SurfaceBlocks, HugTheSurface) {
+TEST(SurfaceBlocks, areFewBesideTheSurface) {
   expectBlocksHugTheSurface(Projection::perspective);
   expectBlocksHugTheSurface(Projection::orthographic);
 }
 
-TEST(SurfaceBlocks, AreNoneWhereThereIsNothingToSee) {
+TEST(SurfaceBlocks, areNoneWhereNothingIsVisible) {
   const Field field = sphere();
   const auto count = [&](const SurfaceView& view) {
     const Found found = find(field, view);

@@ -117,7 +117,7 @@ void forEachLeaf(const Field& field, const Visit& visit) {
   }
 }
 
-TEST(SurfaceBounds, HoldAtEveryPointOfALeaf) {
+TEST(SurfaceBounds, holdAtEveryPointOfALeaf) {
   constexpr int kSteps = 6;
   for (unsigned seed = 0; seed < 8; ++seed) {
     const Field field = randomField(
@@ -142,7 +142,7 @@ TEST(SurfaceBounds, HoldAtEveryPointOfALeaf) {
 }
 
 // One pair of axes at a time: f = c·L_1·L_1 has no other second derivatives.
-TEST(SurfaceBounds, HoldForMixedDerivatives) {
+TEST(SurfaceBounds, holdForMixedDerivatives) {
   for (int missing = 0; missing < 3; ++missing) {
     std::vector<double> c;
     forEachTerm(2, [&](int i, int j, int k) {
@@ -162,7 +162,7 @@ TEST(SurfaceBounds, HoldForMixedDerivatives) {
   }
 }
 
-TEST(SurfaceBounds, AreReachedButForRounding) {
+TEST(SurfaceBounds, areReachedUpToRounding) {
   constexpr double kSlack = 1 + 2e-5;
   for (const int degree : {0, 1, 2, 3, 5, 8, 13, 30}) {
     const Field field =
@@ -188,7 +188,7 @@ TEST(SurfaceBounds, AreReachedButForRounding) {
 }
 
 // Where a ray looks is decided by what single precision makes of the field.
-TEST(SurfaceBounds, HoldForValuesInSinglePrecision) {
+TEST(SurfaceBounds, holdForValuesInSinglePrecision) {
   int leaves = 0;
   for (const int degree : {0, 1, 2, 4, 7, 12, 20, 30}) {
     const Field field = withoutNegatives(
@@ -209,7 +209,7 @@ TEST(SurfaceBounds, HoldForValuesInSinglePrecision) {
   EXPECT_EQ(leaves, 8 * 27);
 }
 
-TEST(SurfaceBounds, OfANodeSpanThoseOfItsChildren) {
+TEST(SurfaceBounds, ofANodeContainThoseOfItsChildren) {
   const Field field = randomField(5, {.refinement = 0.5, .maxDepth = 3});
   const std::vector<SurfaceBounds> bounds = surfaceBounds(field.data());
   int internal = 0;
@@ -233,7 +233,7 @@ SurfaceBounds unpacked(std::uint32_t packed) {
   return {std::bit_cast<float>(packed << 16), std::bit_cast<float>(packed & 0xffff0000U), 0, 0, 0, {}};
 }
 
-TEST(PackOutwards, HoldsTheRangeAndLittleMore) {
+TEST(PackOutwards, containsTheRangeAndLittleMore) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> mantissa(-1, 1);
   std::uniform_int_distribution<int> exponent(-140, 120);
@@ -249,7 +249,7 @@ TEST(PackOutwards, HoldsTheRangeAndLittleMore) {
   }
 }
 
-TEST(PackOutwards, KeepsWhatFits) {
+TEST(PackOutwards, keepsNumbersThatFit) {
   for (const auto& [lo, hi] : {std::pair(0.0F, 0.0F), {-1.0F, 1.0F}, {-0.375F, -0.25F}, {1024.0F, 1.5e30F}}) {
     const float shortHi = std::bit_cast<float>(std::bit_cast<std::uint32_t>(hi) & 0xffff0000U);
     const SurfaceBounds range = unpacked(packOutwards(lo, shortHi));

@@ -30,7 +30,7 @@ Image drawn(std::string_view text, double size, double x = 20, double baseline =
 const char* const kSamples[] = {
     "degree · slice z = 0 · 54,935 cells · τ = 1e-6", "−0.25 °", "ε ≤ τ", "jÄgy|Å", "AVATAR To", "…", "fi", "łódź.obj"};
 
-TEST(Text, LeavesNoInkOutsideOfItsMeasure) {
+TEST(Text, hasNoInkOutsideOfItsMeasure) {
   for (const char* text : kSamples)
     for (double size : {8.0, 13.3, 15.0, 27.5})
       for (double x : {20.0, 20.37, 20.5, 20.99}) {
@@ -45,27 +45,27 @@ TEST(Text, LeavesNoInkOutsideOfItsMeasure) {
       }
 }
 
-TEST(Text, AdvanceGrowsInProportionToSize) {
+TEST(Text, advancesInProportionToItsSize) {
   for (const char* text : kSamples)
     EXPECT_NEAR(measureText(text, 30).advance, 2 * measureText(text, 15).advance, 1e-3) << text;
   EXPECT_EQ(measureText("", 15).advance, 0);
   EXPECT_TRUE(measureText("", 15).ink.empty());
 }
 
-TEST(Text, TheFontHasTheSignsThatCaptionsUse) {
+TEST(Font, hasTheSignsThatCaptionsUse) {
   const Image missing = drawn("\uE123", 20);  // of the private use area: no glyph
   std::set<std::vector<Color>> shapes = {missing.pixels};
   for (const char* sign : {"τ", "ε", "°", "·", "−", "–", "…", "×"})
     EXPECT_TRUE(shapes.insert(drawn(sign, 20).pixels).second) << sign;
 }
 
-TEST(Text, CapitalsAreAsHighAsTheySay) {
+TEST(CapHeight, isTheHeightOfCapitals) {
   const PixelRect ink = inkOf(drawn("H", 40));
   EXPECT_EQ(ink.y1, 60);
   EXPECT_NEAR(ink.height(), capHeight(40), 1);
 }
 
-TEST(Text, IsAntiAliasedAndReachesItsColor) {
+TEST(Text, isAntiAliasedAndReachesItsColor) {
   const Image image = drawn("Hx/", 40);
   std::set<int> greys;
   for (const Color& pixel : image.pixels) greys.insert(pixel[0]);
@@ -73,14 +73,14 @@ TEST(Text, IsAntiAliasedAndReachesItsColor) {
   EXPECT_GT(greys.size(), 20U);
 }
 
-TEST(Text, ImageEdgesCutIt) {
+TEST(Text, isClippedAtTheImagesEdges) {
   Image image(30, 12, kPaper);
   for (double x : {-20.0, 25.0, 400.0})
     for (double baseline : {-3.0, 5.0, 14.0, 300.0}) drawText(image, "gÅ cut", 15, x, baseline, kInk);
   EXPECT_NE(inkOf(image).x1, 0);
 }
 
-TEST(Text, BrokenUtf8IsDrawnAsReplacementSigns) {
+TEST(Text, drawsBrokenUtf8AsReplacementSigns) {
   const Image replacement = drawn("a\uFFFDb", 20);
   for (std::string_view broken : {"a\x80"
                                   "b",
@@ -93,7 +93,7 @@ TEST(Text, BrokenUtf8IsDrawnAsReplacementSigns) {
   EXPECT_EQ(drawn("a\xe2\x82", 20).pixels, drawn("a\uFFFD\uFFFD", 20).pixels);
 }
 
-TEST(Text, FitsWithAnEllipsisAtACharacter) {
+TEST(Text, fitsWithAnEllipsisAfterAWholeCharacter) {
   const std::string name = "ßéτ−ßéτ−ßéτ−ßéτ−ßéτ−.obj";
   EXPECT_EQ(fitText(name, 15, 1000), name);
   std::size_t longest = 0;

@@ -24,7 +24,7 @@ Vector3 pixelCenter(const SliceView& view, int width, int height, int x, int y) 
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
-TEST(AxisSlice, AxesOnScreen) {
+TEST(AxisSlice, hasItsAxesOnScreen) {
   const SliceView x = axisSlice(kBox, 0, 0.5, 200, 100);
   EXPECT_TRUE(x.right.normalized().isApprox(Vector3::UnitY()));
   EXPECT_TRUE(x.up.normalized().isApprox(Vector3::UnitZ()));
@@ -36,7 +36,7 @@ TEST(AxisSlice, AxesOnScreen) {
   EXPECT_TRUE(z.up.normalized().isApprox(Vector3::UnitY()));
 }
 
-TEST(AxisSlice, SquarePixelsAndTheSectionInTheMiddleWithASmallBorder) {
+TEST(AxisSlice, hasSquarePixelsAndTheSectionInTheMiddle) {
   for (const auto& [width, height] : {std::pair(640, 360), std::pair(100, 900), std::pair(1, 1)}) {
     for (int axis = 0; axis < 3; ++axis) {
       const SliceView view = axisSlice(kBox, axis, kBox.center()[axis], width, height);
@@ -50,7 +50,7 @@ TEST(AxisSlice, SquarePixelsAndTheSectionInTheMiddleWithASmallBorder) {
   }
 }
 
-TEST(AxisSlice, EveryPixelLiesExactlyOnThePlane) {
+TEST(AxisSlice, hasEveryPixelExactlyOnThePlane) {
   for (const double offset : {0.0, 0.1, 2.0}) {
     const SliceView view = axisSlice(kBox, 2, offset, 33, 17);
     for (int y = 0; y < 17; ++y)
@@ -58,7 +58,7 @@ TEST(AxisSlice, EveryPixelLiesExactlyOnThePlane) {
   }
 }
 
-TEST(AxisSlice, RefusesWhatCannotBeShown) {
+TEST(AxisSlice, rejectsInvalidArguments) {
   EXPECT_THAT([] { axisSlice(kBox, 2, 2.001, 64, 64); }, ThrowsMessage<Error>(HasSubstr("outside of the domain")));
   EXPECT_THAT([] { axisSlice(kBox, 2, -0.001, 64, 64); }, ThrowsMessage<Error>(HasSubstr("give 0 to 2")));
   EXPECT_THROW(axisSlice(kBox, 2, kNaN, 64, 64), Error);
@@ -69,7 +69,7 @@ TEST(AxisSlice, RefusesWhatCannotBeShown) {
   EXPECT_THROW(axisSlice(Box(), 0, 0, 64, 64), Error);
 }
 
-TEST(PlaneSlice, AlongAnAxisItIsTheAxisSlice) {
+TEST(PlaneSlice, acrossAnAxisIsTheAxisSlice) {
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {1.0, -3.0}) {
       const SliceView plane = planeSlice(kBox, Vector3(0.5, 0.25, 0.125), sign * Vector3::Unit(axis), 300, 200);
@@ -80,7 +80,7 @@ TEST(PlaneSlice, AlongAnAxisItIsTheAxisSlice) {
     }
 }
 
-TEST(PlaneSlice, ShowsTheWholeSectionAndLittleElse) {
+TEST(PlaneSlice, showsTheWholeSectionAndLittleElse) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> unit(0, 1);
@@ -109,7 +109,7 @@ TEST(PlaneSlice, ShowsTheWholeSectionAndLittleElse) {
   }
 }
 
-TEST(PlaneSlice, RefusesWhatCannotBeShown) {
+TEST(PlaneSlice, rejectsInvalidArguments) {
   const Vector3 inside = kBox.center();
   EXPECT_THAT([&] { planeSlice(kBox, inside, Vector3::Zero(), 64, 64); }, ThrowsMessage<Error>(HasSubstr("normal")));
   EXPECT_THROW(planeSlice(kBox, inside, Vector3(1, kNaN, 0), 64, 64), Error);
@@ -121,7 +121,7 @@ TEST(PlaneSlice, RefusesWhatCannotBeShown) {
   EXPECT_THROW(planeSlice(kBox, kBox.max(), Vector3(1, 1, 1), 64, 64), Error);
 }
 
-TEST(Camera, LooksFromWhereTheAnglesSay) {
+TEST(Camera, looksFromWhereTheAnglesSay) {
   const Box box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   const double diagonal = std::sqrt(12.0);
   OrbitCamera camera{.azimuthDegrees = 0, .elevationDegrees = 0, .distance = 2, .up = UpAxis::y};
@@ -143,7 +143,7 @@ TEST(Camera, LooksFromWhereTheAnglesSay) {
   EXPECT_TRUE(view.up.normalized().isApprox(Vector3::UnitY()));
 }
 
-TEST(Camera, CirclesItsTarget) {
+TEST(Camera, circlesItsTarget) {
   const Vector3 target(0.3, -0.2, 0.7);
   const Camera view =
       cameraOf({.azimuthDegrees = 50, .elevationDegrees = 10, .distance = 0.1, .target = target}, kBox, 64, 64);
@@ -152,7 +152,7 @@ TEST(Camera, CirclesItsTarget) {
   EXPECT_THROW(cameraOf({.target = Vector3(kNaN, 0, 0)}, kBox, 64, 64), Error);
 }
 
-TEST(Camera, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
+TEST(Camera, hasOrthogonalRightHandedAxesScaledByTheFieldOfView) {
   for (const UpAxis up : {UpAxis::y, UpAxis::z})
     for (const double azimuth : {-200.0, 0.0, 30.0, 1000.0})
       for (const double elevation : {-90.0, -30.0, 0.0, 20.0, 90.0}) {
@@ -171,7 +171,7 @@ TEST(Camera, AxesAreOrthogonalRightHandedAndScaledByTheFieldOfView) {
 
 /// What lies in the plane through the target is where perspective shows it; and rays start before the domain, but not
 /// far from it.
-TEST(Camera, OrthographicKeepsTheFramingAndStartsBeforeTheDomain) {
+TEST(OrthographicCamera, keepsTheFramingAndStartsBeforeTheDomain) {
   const double diagonal = kBox.sizes().norm();
   for (const double distance : {0.01, 1.1, 1e9})
     for (const Vector3& target : {Vector3(kBox.center()), Vector3(0.3, -0.2, 0.7), Vector3(50, -60, 70)})
@@ -202,7 +202,7 @@ TEST(Camera, OrthographicKeepsTheFramingAndStartsBeforeTheDomain) {
         }
 }
 
-TEST(Camera, ProjectsPointsToThePixelsThatSeeThem) {
+TEST(Camera, projectsPointsToThePixelsThatSeeThem) {
   for (const Projection projection : {Projection::perspective, Projection::orthographic})
     for (const double distance : {0.6, 1.1, 4.0}) {
       const Camera view = cameraOf({.azimuthDegrees = 70,
@@ -226,7 +226,7 @@ TEST(Camera, ProjectsPointsToThePixelsThatSeeThem) {
     }
 }
 
-TEST(Camera, RefusesNumbersOutOfRange) {
+TEST(Camera, rejectsNumbersOutOfRange) {
   const auto with = [](auto change) {
     OrbitCamera camera;
     change(camera);

@@ -1,6 +1,5 @@
 #include "coloring/color_view.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -39,22 +38,17 @@ constexpr double kOutlineGoneBelow = 3;
 // medial axis, on a tangent plane) lines would otherwise grow into blots.
 constexpr double kFlattestSlope = 0.25;
 
-// Calls colorRow(y, row) for each row of samples, in several threads, and averages the samples of each pixel.
-template <typename ColorRow>
-Image average(const ViewBuffers& buffers, int samples, const ColorRow& colorRow) {
+// Averages the samples of each pixel in several threads, where colorOf(x, y, i) is the colour of sample i at (x, y).
+template <typename ColorOf>
+Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   Image image(buffers.width / samples, buffers.height / samples, kPaper);
   const float share = 1.0F / float(samples * samples);
-  tbb::parallel_for(tbb::blocked_range<int>(0, image.height), [&](const tbb::blocked_range<int>& rows) {
-    std::vector<LinearColor> row(buffers.width);
-    std::vector<LinearColor> sums(image.width);
-    for (int y = rows.begin(); y < rows.end(); ++y) {
-      std::fill(sums.begin(), sums.end(), LinearColor::Zero());
-      for (int sampleRow = 0; sampleRow < samples; ++sampleRow) {
-        colorRow(y * samples + sampleRow, row);
-        for (int x = 0; x < image.width * samples; ++x) sums[x / samples] += row[x];
-      }
-      for (int x = 0; x < image.width; ++x) image.at(x, y) = encodeSrgb(share * sums[x]);
-    }
+  tbb::parallel_for(0, image.height, [&](int row) {
+    std::vector<LinearColor> sums(image.width, LinearColor::Zero());
+    for (int y = row * samples; y < (row + 1) * samples; ++y)
+      for (int x = 0; x < image.width * samples; ++x)
+        sums[x / samples] += colorOf(x, y, std::size_t(y) * buffers.width + x);
+    for (int x = 0; x < image.width; ++x) image.at(x, row) = encodeSrgb(share * sums[x]);
   });
   return image;
 }
@@ -184,12 +178,12 @@ class Contours {
     hasAfter = hasAfter && joined(i, i + step);
     const bool before = hasBefore && cell[i - step] == cell[i];
     const bool after = hasAfter && cell[i + step] == cell[i];
-    if (before && after) return (double(value[i + step]) - value[i - step]) / 2;
-    if (after) return double(value[i + step]) - value[i];
-    if (before) return double(value[i]) - value[i - step];
-    if (hasBefore && hasAfter) return (double(value[i + step]) - value[i - step]) / 2;
-    if (hasAfter) return double(value[i + step]) - value[i];
-    return hasBefore ? double(value[i]) - value[i - step] : 0;
+    if (before || after) {
+      hasBefore = before;
+      hasAfter = after;
+    }
+    const double from = value[hasBefore ? i - step : i], to = value[hasAfter ? i + step : i];
+    return hasBefore && hasAfter ? (to - from) / 2 : to - from;
   }
 
   double toCrossing(std::size_t i, std::size_t neighbour) const {
@@ -246,15 +240,10 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
   const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
   const SurfaceLine lines(sampling);
-  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
-    for (int x = 0; x < buffers.width; ++x) {
-      const std::size_t i = std::size_t(y) * buffers.width + x;
-      LinearColor& sample = row[x];
-      sample = buffers.hit(i) ? color(i) : paper;
-      sample = mix(sample, outline, float(kOutlineStrength) * outlines(x, y));
-      if (!buffers.hit(i)) continue;
-      sample = lines(sample, contours.toZero(x, y, contours.slope(x, y, sampling.sampleSize)));
-    }
+  return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) -> LinearColor {
+    const LinearColor ground = buffers.hit(i) ? color(i) : paper;
+    const LinearColor sample = mix(ground, outline, float(kOutlineStrength) * outlines(x, y));
+    return buffers.hit(i) ? lines(sample, contours.toZero(x, y, contours.slope(x, y, sampling.sampleSize))) : sample;
   });
 }
 
@@ -266,28 +255,24 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(kPaper), isoLine = decodeSrgb(kIsoLine), zeroLine = decodeSrgb(kZeroLine);
   const double thin = sampling.lineWidth * sampling.samples;
-  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
-    for (int x = 0; x < buffers.width; ++x) {
-      const std::size_t i = std::size_t(y) * buffers.width + x;
-      LinearColor& sample = row[x];
-      sample = paper;
-      if (!buffers.hit(i)) continue;
-      const double value = buffers.value[i];
-      sample = table[static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps)) + kSteps];
-      const double slope = contours.slope(x, y, sampling.sampleSize);
-      const double nearest = std::round(value / scale.step);
-      if (nearest != 0) {
-        const double distance = std::abs(value - nearest * scale.step) / slope;
-        sample = mix(sample, isoLine, float(kIsoStrength) * coverage(distance, thin));
-      }
-      sample = mix(sample, zeroLine, coverage(contours.toZero(x, y, slope), kZeroWidth * thin));
+  return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) -> LinearColor {
+    if (!buffers.hit(i)) return paper;
+    const double value = buffers.value[i];
+    const int step = static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps));
+    LinearColor sample = table[step + kSteps];
+    const double slope = contours.slope(x, y, sampling.sampleSize);
+    const double nearest = std::round(value / scale.step);
+    if (nearest != 0) {
+      const double distance = std::abs(value - nearest * scale.step) / slope;
+      sample = mix(sample, isoLine, float(kIsoStrength) * coverage(distance, thin));
     }
+    return mix(sample, zeroLine, coverage(contours.toZero(x, y, slope), kZeroWidth * thin));
   });
 }
 
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
                    double offset, const std::vector<float>& lines, std::span<const LinearColor> bodies) {
-  const SurfaceShader shader(buffers, camera, color, bodies);
+  const auto shader = surfaceShader(buffers, camera, color, bodies);
   const Contours contours(buffers, offset);
   const SurfaceLine surfaceLine(sampling);
   std::optional<CellOutlines> outlines;
@@ -296,19 +281,16 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Sampl
   const auto flatColor = [&](std::size_t i) {
     return color ? color(i) : buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
   };
-  return average(buffers, sampling.samples, [&](int y, std::vector<LinearColor>& row) {
-    const LinearColor ground = backdropColor((y + 0.5) / buffers.height);
-    for (int x = 0; x < buffers.width; ++x) {
-      const std::size_t i = std::size_t(y) * buffers.width + x;
-      LinearColor& sample = row[x];
-      sample = !buffers.covered(i) ? ground : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
-      if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
-      if (buffers.shows(i, Shown::plane)) {
-        const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));
-        sample = surfaceLine(sample, contours.toZero(x, y, slope));
-      }
-      if (!lines.empty()) sample = mix(sample, outline, float(kOutlineStrength) * lines[i]);
+  std::vector<LinearColor> backdrop;
+  for (int y = 0; y < buffers.height; ++y) backdrop.push_back(backdropColor((y + 0.5) / buffers.height));
+  return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) {
+    LinearColor sample = !buffers.covered(i) ? backdrop[y] : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
+    if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
+    if (buffers.shows(i, Shown::plane)) {
+      const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));
+      sample = surfaceLine(sample, contours.toZero(x, y, slope));
     }
+    return lines.empty() ? sample : mix(sample, outline, float(kOutlineStrength) * lines[i]);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "hpsdf/render/bodies.h"
 
@@ -17,111 +18,160 @@ constexpr double kOcclusionRadius = 0.035;  // radius of the outer ring of taps,
 constexpr double kFlatRise = 0.06;  // sine of the angle above the tangent plane up to which a tap counts as flat
 constexpr double kOcclusionStrength = 2.6;
 
+/// Positions and normals that the samples of a view show, in the camera's frame: x right, y up, z towards the eye. The
+/// origin is the eye; for parallel rays, the centre of the plane where they start.
+class CameraFrame {
+ public:
+  CameraFrame(const ViewBuffers& buffers, const Camera& camera)
+      : buffers_(buffers),
+        parallel_(camera.projection == Projection::orthographic),
+        halfWidth_(static_cast<float>(camera.right.norm())),
+        halfHeight_(static_cast<float>(camera.up.norm())) {
+    axes_.row(0) = camera.right.normalized().cast<float>();
+    axes_.row(1) = camera.up.normalized().cast<float>();
+    axes_.row(2) = -camera.forward.normalized().cast<float>();
+  }
+
+  /// Unit direction of the ray of a sample.
+  Eigen::Vector3f ray(int x, int y) const {
+    return parallel_ ? Eigen::Vector3f(0, 0, -1) : onPicture(x, y, -1).normalized();
+  }
+
+  Eigen::Vector3f position(int x, int y) const {
+    const float distance = buffers_.distance[std::size_t(y) * buffers_.width + x];
+    return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
+  }
+
+  /// The normal that a sample shows. A normal that jumps of the field turn away from the eye is replaced by the nearest
+  /// one perpendicular to the ray; otherwise single dark samples speckle the silhouettes.
+  Eigen::Vector3f normal(int x, int y, const Eigen::Vector3f& toEye) const {
+    const Eigen::Vector3f n = axes_ * buffers_.normal[std::size_t(y) * buffers_.width + x];
+    const float facing = n.dot(toEye);
+    return facing >= 0 ? n : (n - facing * toEye).normalized();
+  }
+
+  /// Height of the view at this depth before the eye.
+  float heightAt(float depth) const { return parallel_ ? 2 * halfHeight_ : 2 * halfHeight_ * depth; }
+
+ private:
+  Eigen::Vector3f onPicture(int x, int y, float z) const {
+    const float u = 2 * (float(x) + 0.5F) / float(buffers_.width) - 1;
+    const float v = 1 - 2 * (float(y) + 0.5F) / float(buffers_.height);
+    return {u * halfWidth_, v * halfHeight_, z};
+  }
+
+  const ViewBuffers& buffers_;
+  bool parallel_;                 // true for an orthographic camera
+  Eigen::Matrix3f axes_;          // its rows are the camera's axes
+  float halfWidth_, halfHeight_;  // half the view's extent, in perspective at depth 1
+};
+
+/// Lamps that move with the camera, in its frame, as in portrait photography: a warm key light from the upper left, a
+/// cool fill light from the right, a rim light from behind, and the sky above the ground.
+struct Lights {
+  Eigen::Vector3f key = Eigen::Vector3f(-0.55F, 0.62F, 0.56F).normalized();
+  Eigen::Vector3f fill = Eigen::Vector3f(0.85F, 0.10F, 0.52F).normalized();
+  Eigen::Vector3f rim = Eigen::Vector3f(0.35F, 0.55F, -0.76F).normalized();
+  LinearColor keyColor = {0.98F, 0.91F, 0.80F};
+  LinearColor fillColor = {0.12F, 0.16F, 0.23F};
+  LinearColor rimColor = {0.26F, 0.30F, 0.36F};
+  LinearColor sky = {0.26F, 0.29F, 0.34F};
+  LinearColor ground = {0.10F, 0.08F, 0.07F};
+
+  /// Light on a matt surface with unit normal n, of which the share `open` of the ambient light arrives.
+  LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
+    const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
+    const LinearColor lamps =
+        keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
+    // Occlusion removes all of the sky's light and a part of the lamps'.
+    return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
+  }
+
+  /// Blinn-Phong highlight of the key light, and the sky mirrored at grazing angles (Schlick's Fresnel term).
+  LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
+    const Eigen::Vector3f half = (key + toEye).normalized();
+    const float highlight = 0.13F * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
+    const float facing = 1 - std::clamp(n.dot(toEye), 0.0F, 1.0F);
+    const float fresnel = 0.12F * facing * facing * facing * facing;
+    return keyColor * highlight + sky * fresnel;
+  }
+};
+
+class SurfaceShader {
+ public:
+  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const std::function<LinearColor(std::size_t)>& color,
+                std::span<const LinearColor> bodies)
+      : buffers_(buffers), frame_(buffers, camera), color_(color), bodies_(bodies) {
+    // Rotate each ring of taps against the one within it. All pixels have the same taps, so that there is no noise.
+    for (int ring = 1; ring <= kRings; ++ring)
+      for (int i = 0; i < kTapsInRing; ++i) {
+        const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;
+        const double radius = kOcclusionRadius * buffers.height * ring * ring / (kRings * kRings);
+        taps_.push_back({static_cast<int>(std::lround(radius * std::cos(angle))),
+                         static_cast<int>(std::lround(radius * std::sin(angle)))});
+      }
+  }
+
+  LinearColor operator()(int x, int y) const {
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    const Eigen::Vector3f toEye = -frame_.ray(x, y);
+    const Eigen::Vector3f n = frame_.normal(x, y, toEye);
+    const float open = openness(x, y, frame_.position(x, y), n);
+    if (!color_ || buffers_.showsBody(i)) {
+      const LinearColor& material = materialAt(i);
+      return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
+    }
+    // Light colours by a quantity softly and with white light, so that they match the legend's.
+    const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
+    return color_(i) * light * (0.35F + 0.65F * open) +
+           LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
+  }
+
+ private:
+  /// The share of ambient light that arrives: 1 on open ground, towards 0 in a deep fold. Neighbours on the screen that
+  /// rise above a point's tangent plane take ambient light from it. Folds and contacts darken, which shows shape better
+  /// than lamps do.
+  float openness(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
+    const float radius = float(kOcclusionRadius) * frame_.heightAt(-position.z());
+    float occluded = 0;
+    for (const auto& [dx, dy] : taps_) {
+      const int tapX = x + dx, tapY = y + dy;
+      if (tapX < 0 || tapX >= buffers_.width || tapY < 0 || tapY >= buffers_.height) continue;
+      if (!buffers_.covered(std::size_t(tapY) * buffers_.width + tapX)) continue;
+      const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
+      const float distance = towards.norm();
+      if (distance <= 0) continue;
+      // A distant thing in front of the point hides it from the eye but not from the light.
+      const float near = std::max(0.0F, 1 - distance / (3 * radius));
+      occluded += near * std::max(0.0F, towards.dot(normal) / distance - float(kFlatRise));
+    }
+    return std::max(0.0F, 1 - float(kOcclusionStrength) * occluded / float(taps_.size()));
+  }
+
+  const LinearColor& materialAt(std::size_t i) const {
+    if (buffers_.showsBody(i)) return bodies_[buffers_.body[i]];
+    return buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
+  }
+
+  struct Tap {
+    int dx, dy;
+  };
+
+  const ViewBuffers& buffers_;
+  CameraFrame frame_;
+  const std::function<LinearColor(std::size_t)>& color_;
+  std::span<const LinearColor> bodies_;
+  std::vector<Tap> taps_;
+  Lights lights_;
+  LinearColor clay_ = decodeSrgb(kClay), plainBox_ = decodeSrgb(kPlainBox);
+};
+
 }  // namespace
 
-CameraFrame::CameraFrame(const ViewBuffers& buffers, const Camera& camera)
-    : buffers_(buffers), parallel_(camera.projection == Projection::orthographic) {
-  axes_.row(0) = camera.right.normalized().cast<float>();
-  axes_.row(1) = camera.up.normalized().cast<float>();
-  axes_.row(2) = -camera.forward.normalized().cast<float>();
-  halfWidth_ = static_cast<float>(camera.right.norm());
-  halfHeight_ = static_cast<float>(camera.up.norm());
-}
-
-Eigen::Vector3f CameraFrame::ray(int x, int y) const {
-  return parallel_ ? Eigen::Vector3f(0, 0, -1) : onPicture(x, y, -1).normalized();
-}
-
-Eigen::Vector3f CameraFrame::position(int x, int y) const {
-  const float distance = buffers_.distance[std::size_t(y) * buffers_.width + x];
-  return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
-}
-
-Eigen::Vector3f CameraFrame::normal(int x, int y, const Eigen::Vector3f& toEye) const {
-  const Eigen::Vector3f n = axes_ * buffers_.normal[std::size_t(y) * buffers_.width + x];
-  const float facing = n.dot(toEye);
-  return facing >= 0 ? n : (n - facing * toEye).normalized();
-}
-
-Eigen::Vector3f CameraFrame::onPicture(int x, int y, float z) const {
-  const float u = 2 * (float(x) + 0.5F) / float(buffers_.width) - 1;
-  const float v = 1 - 2 * (float(y) + 0.5F) / float(buffers_.height);
-  return {u * halfWidth_, v * halfHeight_, z};
-}
-
-AmbientOcclusion::AmbientOcclusion(const ViewBuffers& buffers, const CameraFrame& frame)
-    : buffers_(buffers), frame_(frame) {
-  // Rotate each ring of taps against the one within it. All pixels have the same taps, so that there is no noise.
-  for (int ring = 1; ring <= kRings; ++ring)
-    for (int i = 0; i < kTapsInRing; ++i) {
-      const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;
-      const double radius = kOcclusionRadius * buffers.height * ring * ring / (kRings * kRings);
-      taps_.push_back({static_cast<int>(std::lround(radius * std::cos(angle))),
-                       static_cast<int>(std::lround(radius * std::sin(angle)))});
-    }
-}
-
-float AmbientOcclusion::operator()(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
-  const float radius = float(kOcclusionRadius) * frame_.heightAt(-position.z());
-  float occluded = 0;
-  for (const auto& [dx, dy] : taps_) {
-    const int tapX = x + dx, tapY = y + dy;
-    if (tapX < 0 || tapX >= buffers_.width || tapY < 0 || tapY >= buffers_.height) continue;
-    if (!buffers_.covered(std::size_t(tapY) * buffers_.width + tapX)) continue;
-    const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
-    const float distance = towards.norm();
-    if (distance <= 0) continue;
-    // A distant thing in front of the point hides it from the eye but not from the light.
-    const float near = std::max(0.0F, 1 - distance / (3 * radius));
-    occluded += near * std::max(0.0F, towards.dot(normal) / distance - float(kFlatRise));
-  }
-  return std::max(0.0F, 1 - float(kOcclusionStrength) * occluded / float(taps_.size()));
-}
-
-LinearColor Lights::diffuse(const Eigen::Vector3f& n, float open) const {
-  const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
-  const LinearColor lamps =
-      keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
-  // Occlusion removes all of the sky's light and a part of the lamps'.
-  return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
-}
-
-LinearColor Lights::gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
-  const Eigen::Vector3f half = (key + toEye).normalized();
-  const float highlight = 0.13F * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
-  const float facing = 1 - std::clamp(n.dot(toEye), 0.0F, 1.0F);
-  const float fresnel = 0.12F * facing * facing * facing * facing;
-  return keyColor * highlight + sky * fresnel;
-}
-
-SurfaceShader::SurfaceShader(const ViewBuffers& buffers, const Camera& camera,
-                             const std::function<LinearColor(std::size_t)>& color, std::span<const LinearColor> bodies)
-    : buffers_(buffers),
-      frame_(buffers, camera),
-      occlusion_(buffers, frame_),
-      color_(color),
-      bodies_(bodies),
-      clay_(decodeSrgb(kClay)),
-      plainBox_(decodeSrgb(kPlainBox)) {}
-
-LinearColor SurfaceShader::operator()(int x, int y) const {
-  const std::size_t i = std::size_t(y) * buffers_.width + x;
-  const Eigen::Vector3f toEye = -frame_.ray(x, y);
-  const Eigen::Vector3f n = frame_.normal(x, y, toEye);
-  const float open = occlusion_(x, y, frame_.position(x, y), n);
-  if (!color_ || buffers_.showsBody(i)) {
-    const LinearColor& material = materialAt(i);
-    return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
-  }
-  // Light colours by a quantity softly and with white light, so that they match the legend's.
-  const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
-  return color_(i) * light * (0.35F + 0.65F * open) +
-         LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
-}
-
-const LinearColor& SurfaceShader::materialAt(std::size_t i) const {
-  if (buffers_.showsBody(i)) return bodies_[buffers_.body[i]];
-  return buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
+std::function<LinearColor(int x, int y)> surfaceShader(const ViewBuffers& buffers, const Camera& camera,
+                                                       const std::function<LinearColor(std::size_t)>& color,
+                                                       std::span<const LinearColor> bodies) {
+  return SurfaceShader(buffers, camera, color, bodies);
 }
 
 Color surfaceColor() { return kClay; }

@@ -37,35 +37,24 @@ struct Legendre {
   std::array<double, kMaxDegree + 1> derivative;
 };
 
-template <typename T>
-Sample evaluateWithGradient(const T* c, int degree, const Vector3& local) {
+/// The value of a polynomial and, where asked for, its gradient.
+template <bool withGradient, typename T>
+Sample evaluate(const T* c, int degree, const Vector3& local) {
   const Legendre x(local.x(), degree), y(local.y(), degree), z(local.z(), degree);
   Sample result{0, Vector3::Zero()};
   for (int i = 0; i <= degree; ++i)
     for (int j = 0; j <= degree - i; ++j) {
       double line = 0, lineDz = 0;
-      for (int k = 0; k <= degree - i - j; ++k) {
+      for (int k = 0; k <= degree - i - j; ++k, ++c) {
         line += *c * z.value[k];
-        lineDz += *c++ * z.derivative[k];
+        if (withGradient) lineDz += *c * z.derivative[k];
       }
       result.value += line * y.value[j] * x.value[i];
-      result.gradient += Vector3(line * y.value[j] * x.derivative[i], line * y.derivative[j] * x.value[i],
-                                 lineDz * y.value[j] * x.value[i]);
+      if (withGradient)
+        result.gradient += Vector3(line * y.value[j] * x.derivative[i], line * y.derivative[j] * x.value[i],
+                                   lineDz * y.value[j] * x.value[i]);
     }
   return result;
-}
-
-template <typename T>
-double evaluate(const T* c, int degree, const Vector3& local) {
-  const Legendre x(local.x(), degree), y(local.y(), degree), z(local.z(), degree);
-  double value = 0;
-  for (int i = 0; i <= degree; ++i)
-    for (int j = 0; j <= degree - i; ++j) {
-      double line = 0;
-      for (int k = 0; k <= degree - i - j; ++k) line += *c++ * z.value[k];
-      value += line * y.value[j] * x.value[i];
-    }
-  return value;
 }
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
@@ -223,7 +212,7 @@ CellPoint TraceField::relevantNodeAt(const Vector3& p, double offset) const {
 }
 
 Sample TraceField::samplePolynomial(std::uint32_t leaf, const Vector3& local) const {
-  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluateWithGradient(c, degree(leaf), local); });
+  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluate<true>(c, degree(leaf), local); });
 }
 
 Sample TraceField::sample(const CellPoint& leaf, const Vector3& local) const {
@@ -232,7 +221,8 @@ Sample TraceField::sample(const CellPoint& leaf, const Vector3& local) const {
 
 double TraceField::value(const CellPoint& leaf, const Vector3& local) const {
   if (field_.blend > 0) return sampleBlended(leaf, local).value;
-  return withCoefficients(field_, leaf.node, [&](const auto* c) { return evaluate(c, degree(leaf.node), local); });
+  return withCoefficients(field_, leaf.node,
+                          [&](const auto* c) { return evaluate<false>(c, degree(leaf.node), local).value; });
 }
 
 Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {

@@ -21,14 +21,9 @@ struct Candidate {
   std::function<EGLDisplay()> display;
 };
 
-bool hasExtension(const char* list, std::string_view name) {
-  std::string_view rest = list == nullptr ? "" : list;
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find(' '), rest.size());
-    if (rest.substr(0, end) == name) return true;
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  return false;
+/// `list` separates names by spaces, or is null.
+bool hasExtension(const char* list, const std::string& name) {
+  return (" " + std::string(list == nullptr ? "" : list) + " ").find(" " + name + " ") != std::string::npos;
 }
 
 std::string eglErrorText() {
@@ -97,29 +92,22 @@ std::vector<Candidate> candidatesFor(GlChoice choice, std::string& tried) {
   return candidates;
 }
 
-/// A context, or EGL_NO_CONTEXT and the reason.
-struct Attempt {
-  EGLContext context;
-  std::string reason;
-};
-
-Attempt failed(std::string reason) { return {EGL_NO_CONTEXT, std::move(reason)}; }
-
-Attempt createContext(EGLDisplay display) {
-  if (display == EGL_NO_DISPLAY) return failed("no such display");
+/// Throws `Error` with the reason why the display gives no context.
+EGLContext createContext(EGLDisplay display) {
+  if (display == EGL_NO_DISPLAY) throw Error("no such display");
   // The display is never terminated: it belongs to the whole process, EGL does not count its initialisations, and
   // another part of the program may use it.
-  if (!eglInitialize(display, nullptr, nullptr)) return failed("does not initialise, " + eglErrorText());
+  if (!eglInitialize(display, nullptr, nullptr)) throw Error("does not initialise, " + eglErrorText());
   const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
   for (const char* needed : {"EGL_KHR_no_config_context", "EGL_KHR_surfaceless_context", "EGL_KHR_create_context"})
-    if (!hasExtension(extensions, needed)) return failed(std::string("lacks ") + needed);
-  if (!eglBindAPI(EGL_OPENGL_API)) return failed("has no desktop OpenGL");
+    if (!hasExtension(extensions, needed)) throw Error(std::string("lacks ") + needed);
+  if (!eglBindAPI(EGL_OPENGL_API)) throw Error("has no desktop OpenGL");
   constexpr EGLint kAttributes[] = {
       EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
   const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes);
-  if (context == EGL_NO_CONTEXT) return failed("gives no OpenGL 4.5 core context, " + eglErrorText());
-  return {context, {}};
+  if (context == EGL_NO_CONTEXT) throw Error("gives no OpenGL 4.5 core context, " + eglErrorText());
+  return context;
 }
 
 const char* choiceText(GlChoice choice) {
@@ -169,31 +157,28 @@ EglContext::EglContext(GlChoice choice) {
   if (!missing.empty()) noContext(choice, missing);
   std::string tried;
   for (const Candidate& candidate : candidatesFor(choice, tried)) {
-    const std::string reason = open(candidate.display(), choice);
-    if (reason.empty()) return;
-    tried += "; " + candidate.name + ": " + reason;
+    try {
+      open(candidate.display(), choice);
+      return;
+    } catch (const Error& error) {
+      tried += "; " + candidate.name + ": " + error.what();
+    }
   }
   noContext(choice, std::string_view(tried).substr(2));
 }
 
-std::string EglContext::open(void* display, GlChoice choice) {
+void EglContext::open(void* display, GlChoice choice) {
   display_ = display;
-  Attempt result = createContext(display_);
-  context_ = result.context;
-  if (context_ == EGL_NO_CONTEXT) return result.reason;
+  context_ = createContext(display_);
   try {
     const Current current(*this);
     renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  } catch (const Error& error) {
-    result.reason = error.what();
+    if (choice != GlChoice::automatic && isSoftware(renderer_) != (choice == GlChoice::software))
+      throw Error("\"" + renderer_ + "\" is " + (choice == GlChoice::software ? "not " : "") + "a software renderer");
+  } catch (const Error&) {
+    eglDestroyContext(display_, context_);
+    throw;
   }
-  const bool software = isSoftware(renderer_);
-  if (result.reason.empty() && choice == GlChoice::hardware && software)
-    result.reason = "\"" + renderer_ + "\" is a software renderer";
-  if (result.reason.empty() && choice == GlChoice::software && !software)
-    result.reason = "\"" + renderer_ + "\" is not a software renderer";
-  if (!result.reason.empty()) eglDestroyContext(display_, context_);
-  return result.reason;
 }
 
 EglContext::~EglContext() { eglDestroyContext(display_, context_); }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "hpsdf/error.h"
 #include "hpsdf/render/renderer.h"
 
 namespace hpsdf::render {
@@ -33,12 +34,23 @@ class EglContext {
   };
 
  private:
-  /// Creates the context on a display. Returns the reason why the display does not serve the choice, or an empty text.
-  std::string open(void* display, GlChoice choice);
+  /// Creates the context on a display. Throws `Error` with the reason why the display does not serve the choice.
+  void open(void* display, GlChoice choice);
 
   void* display_ = nullptr;
   void* context_ = nullptr;
   std::string renderer_;
 };
+
+/// Deletes objects of a context, or leaves them to the context's end where it is current on another thread.
+template <typename Objects>
+void deleteObjects(const EglContext& context, std::unique_ptr<Objects>& objects) {
+  try {
+    const EglContext::Current current(context);
+    objects.reset();
+  } catch (const Error&) {
+    static_cast<void>(objects.release());
+  }
+}
 
 }  // namespace hpsdf::render

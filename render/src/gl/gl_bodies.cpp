@@ -1,7 +1,5 @@
 // OpenGL decides which triangle of which body each pixel sees; distances and normals are computed in double precision.
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,9 +9,7 @@
 
 #include "gl/egl_context.h"
 #include "gl/gl_objects.h"
-#include "gl/program.h"
-#include "gl/tiles.h"
-#include "hpsdf/error.h"
+#include "gl/render_target.h"
 #include "hpsdf/render/bodies.h"
 #include "scene/body_meshes.h"
 #include "scene/body_view.h"
@@ -33,42 +29,6 @@ using BodyTriangle = std::array<std::uint32_t, 2>;
 struct Instance {
   std::array<float, 16> targetFromMesh;  ///< column-major
   std::uint32_t body;
-};
-
-/// The render target of a tile: body and triangle, and depth.
-class BodyTarget {
- public:
-  BodyTarget(int width, int height) {
-    glTextureStorage2D(seen_.name(), 1, GL_RG32UI, width, height);
-    glTextureStorage2D(depth_.name(), 1, GL_DEPTH_COMPONENT32F, width, height);
-    glTextureParameteri(seen_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTextureParameteri(seen_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT0, seen_.name(), 0);
-    glNamedFramebufferTexture(framebuffer_.name(), GL_DEPTH_ATTACHMENT, depth_.name(), 0);
-    if (glCheckNamedFramebufferStatus(framebuffer_.name(), GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-      throw Error(
-          "the OpenGL device cannot render bodies into 32-bit buffers: update its driver, or render with --cpu");
-  }
-
-  /// Binds the target for drawing, with no body in any pixel.
-  void bindCleared() const {
-    constexpr GLuint kNothing[] = {kNoBody, 0, 0, 0};
-    constexpr GLfloat kInfinitelyFar = 0;
-    glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
-    glClearNamedFramebufferfv(framebuffer_.name(), GL_DEPTH, 0, &kInfinitelyFar);
-    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
-  }
-
-  void read(int width, int height, std::vector<BodyTriangle>& out) const {
-    out.resize(std::size_t(width) * std::size_t(height));
-    glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT0);
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glReadPixels(0, 0, width, height, GL_RG_INTEGER, GL_UNSIGNED_INT, out.data());
-  }
-
- private:
-  GlTexture2D seen_, depth_;
-  GlFramebuffer framebuffer_;
 };
 
 /// The transform of points relative to the eye to a tile's clip space, in which rows run downwards and nearer points
@@ -117,32 +77,26 @@ bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, d
 }
 
 /// A mesh on the device.
-class MeshUpload {
- public:
+struct MeshUpload {
   explicit MeshUpload(const BodyMesh& mesh) {
-    glNamedBufferStorage(vertices_.name(), GLsizeiptr(mesh.vertices().size() * sizeof(Eigen::Vector3f)), nullptr,
+    glNamedBufferStorage(vertices.name(), GLsizeiptr(mesh.vertices().size() * sizeof(Eigen::Vector3f)), nullptr,
                          GL_DYNAMIC_STORAGE_BIT);
-    glNamedBufferStorage(triangles_.name(), GLsizeiptr(mesh.triangles().size() * sizeof(Triangle)),
+    glNamedBufferStorage(triangles.name(), GLsizeiptr(mesh.triangles().size() * sizeof(Triangle)),
                          mesh.triangles().data(), 0);
     upload(mesh);
   }
 
   /// Uploads the vertices relative to the ball's centre, so that single precision suffices.
   void upload(const BodyMesh& mesh) {
-    ball_ = ballAround(mesh);
+    ball = ballAround(mesh);
     std::vector<Eigen::Vector3f> positions;
     positions.reserve(mesh.vertices().size());
-    for (const Vector3& vertex : mesh.vertices()) positions.push_back((vertex - ball_.center).cast<float>());
-    glNamedBufferSubData(vertices_.name(), 0, GLsizeiptr(positions.size() * sizeof(Eigen::Vector3f)), positions.data());
+    for (const Vector3& vertex : mesh.vertices()) positions.push_back((vertex - ball.center).cast<float>());
+    glNamedBufferSubData(vertices.name(), 0, GLsizeiptr(positions.size() * sizeof(Eigen::Vector3f)), positions.data());
   }
 
-  const Ball& ball() const { return ball_; }
-  GLuint vertices() const { return vertices_.name(); }
-  GLuint triangles() const { return triangles_.name(); }
-
- private:
-  GlBuffer vertices_, triangles_;
-  Ball ball_;
+  GlBuffer vertices, triangles;
+  Ball ball;
 };
 
 /// The objects on the device. The context must be current when they are created and destroyed.
@@ -176,16 +130,10 @@ struct BodyResources {
   std::vector<MeshUpload> meshes;
 };
 
-/// The point at which a ray passes a triangle, in the mesh's frame.
-struct Passage {
-  double distance;
-  Vector3 barycentric;
-  bool fromBehind;  ///< whether the ray meets the side from which the corners run clockwise
-};
-
 /// Moves the ray's intersection with the triangle's plane into the triangle: OpenGL rounds corners, so that the
-/// triangle that it reports may begin slightly beside the pixel's middle.
-Passage pass(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction) {
+/// triangle that it reports may begin slightly beside the pixel's middle. All vectors are in the mesh's frame.
+BodyPoint pointOn(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction,
+                  const BodyTriangle& seen) {
   const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];
   const Vector3 normal = toB.cross(toC);
   const double towards = normal.dot(direction);
@@ -197,7 +145,7 @@ Passage pass(const std::array<Vector3, 3>& corners, const Vector3& start, const 
   barycentric = barycentric.allFinite() ? Vector3(barycentric.cwiseMax(0)) : Vector3::Ones();
   barycentric /= barycentric.sum();
   const Vector3 point = barycentric[0] * corners[0] + barycentric[1] * corners[1] + barycentric[2] * corners[2];
-  return {(point - start).dot(direction), barycentric, towards > 0};
+  return {seen[0], seen[1], (point - start).dot(direction), barycentric, towards > 0};
 }
 
 class GlBodyRenderer final : public BodyRenderer {
@@ -207,34 +155,25 @@ class GlBodyRenderer final : public BodyRenderer {
     resources_ = std::make_unique<BodyResources>(meshes_);
   }
 
-  ~GlBodyRenderer() override {
-    try {
-      const EglContext::Current current(context_);
-      resources_.reset();
-    } catch (const Error&) {
-      // The context is current on another thread; its objects are deleted together with it.
-      static_cast<void>(resources_.release());
-    }
-  }
+  ~GlBodyRenderer() override { deleteObjects(context_, resources_); }
 
   BodyBuffers view(const Camera& camera, std::span<const Body> bodies, int width, int height) override {
     checkBodyView(camera, width, height);
     const double farthest = farthestDepth(camera, meshes_.bounds(bodies));
     BodyBuffers buffers = emptyBodyBuffers(width, height);
     const EglContext::Current current(context_);
-    const BodyTarget target(std::min(width, kTile), std::min(height, kTile));
+    const Tile whole{0, 0, width, height};
+    const RenderTarget target(whole, GL_RG32UI, GL_DEPTH_COMPONENT32F);
+    target.bindForDrawing();
     std::vector<BodyTriangle> pixels;
-    for (const Tile& tile : tiles({0, 0, width, height})) {
+    for (const Tile& tile : tiles(whole)) {
       glViewport(0, 0, tile.width, tile.height);
-      target.bindCleared();
+      target.clear();
       drawAll(targetFromEye(camera, tile, width, height, farthest), camera.eye, bodies);
-      target.read(tile.width, tile.height, pixels);
+      target.read(tile, pixels);
       checkGl("draw bodies");
-      tbb::parallel_for(0, tile.height, [&](int y) {
-        for (int x = 0; x < tile.width; ++x) {
-          const BodyTriangle& seen = pixels[std::size_t(y) * tile.width + x];
-          if (seen[0] != kNoBody) show(camera, bodies, seen, tile.left + x, tile.top + y, buffers);
-        }
+      forEachPixel(tile, [&](std::size_t i, int x, int y) {
+        if (pixels[i][0] != kNoBody) show(camera, bodies, pixels[i], x, y, buffers);
       });
     }
     return buffers;
@@ -256,7 +195,7 @@ class GlBodyRenderer final : public BodyRenderer {
   void drawAll(const Eigen::Matrix4d& targetFromEye, const Vector3& eye, std::span<const Body> bodies) const {
     std::vector<std::vector<Instance>> instances(meshes_.size());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Ball& ball = resources_->meshes[bodies[i].mesh].ball();
+      const Ball& ball = resources_->meshes[bodies[i].mesh].ball;
       const Vector3 center = bodies[i].worldFromBody * ball.center - eye;
       if (!mayBeVisible(targetFromEye, center, ball.radius)) continue;
       Eigen::Matrix4d eyeFromMesh = bodies[i].worldFromBody.matrix();
@@ -275,10 +214,10 @@ class GlBodyRenderer final : public BodyRenderer {
     const GLuint vertexArray = resources_->vertexArray.name();
     const GlBuffer buffer;
     glNamedBufferStorage(buffer.name(), GLsizeiptr(instances.size() * sizeof(Instance)), instances.data(), 0);
-    glVertexArrayVertexBuffer(vertexArray, kVertexBinding, resources_->meshes[mesh].vertices(), 0,
+    glVertexArrayVertexBuffer(vertexArray, kVertexBinding, resources_->meshes[mesh].vertices.name(), 0,
                               sizeof(Eigen::Vector3f));
     glVertexArrayVertexBuffer(vertexArray, kInstanceBinding, buffer.name(), 0, sizeof(Instance));
-    glVertexArrayElementBuffer(vertexArray, resources_->meshes[mesh].triangles());
+    glVertexArrayElementBuffer(vertexArray, resources_->meshes[mesh].triangles.name());
     glDrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(3 * meshes_[mesh].triangles().size()), GL_UNSIGNED_INT,
                             nullptr, static_cast<GLsizei>(instances.size()));
   }
@@ -293,14 +232,9 @@ class GlBodyRenderer final : public BodyRenderer {
     const Vector3 start = bodyFromWorld * pixelEye(camera, x, y, buffers.width, buffers.height);
     const Vector3 direction = bodyFromWorld.linear() * pixelRay(camera, x, y, buffers.width, buffers.height);
     const std::vector<Vector3>& vertices = mesh.vertices();
-    const Passage passage =
-        pass({vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]}, start, direction);
-    const Vector3 normal = body.worldFromBody.linear() * mesh.normal(seen[1], passage.barycentric);
-    const std::size_t pixel = std::size_t(y) * buffers.width + x;
-    buffers.body[pixel] = seen[0];
-    buffers.triangle[pixel] = seen[1];
-    buffers.normal[pixel] = (passage.fromBehind ? Vector3(-normal) : normal).cast<float>();
-    buffers.distance[pixel] = static_cast<float>(passage.distance);
+    const BodyPoint point =
+        pointOn({vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]}, start, direction, seen);
+    showBody(meshes_, bodies, point, std::size_t(y) * buffers.width + x, buffers);
   }
 
   BodyMeshes meshes_;

@@ -3,6 +3,8 @@
 
 #include <epoxy/gl.h>
 
+#include <initializer_list>
+#include <string_view>
 #include <utility>
 
 namespace hpsdf::render {
@@ -64,5 +66,13 @@ using GlFramebuffer = GlObject<FramebufferKind>;
 using GlVertexArray = GlObject<VertexArrayKind>;
 using GlQuery = GlObject<QueryKind>;
 using GlProgram = GlObject<ProgramKind>;
+
+/// A linked program of a vertex shader and a fragment shader, each of which is the concatenation of files in shaders/.
+/// Throws `Error` with the compiler's log.
+GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
+                        std::initializer_list<std::string_view> fragmentFiles);
+
+/// Throws `Error` where OpenGL reports an error since the last call. `what` completes "the OpenGL device fails to".
+void checkGl(const char* what);
 
 }  // namespace hpsdf::render

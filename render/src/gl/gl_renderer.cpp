@@ -7,9 +7,7 @@
 #include "gl/egl_context.h"
 #include "gl/field_upload.h"
 #include "gl/gl_objects.h"
-#include "gl/program.h"
-#include "gl/tiles.h"
-#include "hpsdf/error.h"
+#include "gl/render_target.h"
 #include "hpsdf/render/renderer.h"
 #include "view/grid_space.h"
 #include "view/scaled_renderer.h"
@@ -52,58 +50,6 @@ constexpr int blendedEvaluationLoops(int evaluation) {
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// The render targets of a tile: four integers and four floats a pixel.
-class Target {
- public:
-  Target(int width, int height) {
-    glTextureStorage2D(integers_.name(), 1, GL_RGBA32UI, width, height);
-    glTextureStorage2D(floats_.name(), 1, GL_RGBA32F, width, height);
-    for (const GLuint texture : {integers_.name(), floats_.name()}) {
-      // Integer textures cannot be read with the default filters.
-      glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-      glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    }
-    glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT0, integers_.name(), 0);
-    glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT1, floats_.name(), 0);
-    constexpr GLenum kBoth[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-    glNamedFramebufferDrawBuffers(framebuffer_.name(), 2, kBoth);
-    if (glCheckNamedFramebufferStatus(framebuffer_.name(), GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-      throw Error("the OpenGL device cannot render into 32-bit buffers: update its driver, or render with --cpu");
-  }
-
-  void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
-
-  /// Sets all pixels to no cell and no normal.
-  void clear() const {
-    constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
-    constexpr GLfloat kZero[] = {0, 0, 0, 0};
-    glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
-    glClearNamedFramebufferfv(framebuffer_.name(), GL_COLOR, 1, kZero);
-  }
-
-  /// Binds the targets as textures to the units 2 and 3.
-  void bindForReading() const {
-    glBindTextureUnit(2, integers_.name());
-    glBindTextureUnit(3, floats_.name());
-  }
-
-  void readIntegers(int width, int height, std::vector<Texel>& out) const {
-    out.resize(std::size_t(width) * height);
-    glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT0);
-    glReadPixels(0, 0, width, height, GL_RGBA_INTEGER, GL_UNSIGNED_INT, out.data());
-  }
-
-  void readFloats(int width, int height, std::vector<NormalTexel>& out) const {
-    out.resize(std::size_t(width) * height);
-    glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT1);
-    glReadPixels(0, 0, width, height, GL_RGBA, GL_FLOAT, out.data());
-  }
-
- private:
-  GlTexture2D integers_, floats_;
-  GlFramebuffer framebuffer_;
-};
-
 /// The smallest part of a view that contains all blocks, of which there must be at least one.
 Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
@@ -111,17 +57,6 @@ Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const int x = static_cast<int>(left.x);
   const int y = static_cast<int>(top.y);
   return {x, y, std::min(width, int(right.x) + kBlock) - x, std::min(height, int(bottom.y) + kBlock) - y};
-}
-
-/// A copy of the field without its coefficients.
-FieldData octreeOf(const FieldData& field) {
-  return {.domain = field.domain,
-          .grid = field.grid,
-          .nodes = field.nodes,
-          .coefficients = {},
-          .blend = 0,
-          .bounds = {},
-          .metadata = {}};
 }
 
 int highestDegree(const FieldData& field) {
@@ -184,8 +119,9 @@ void setRays(const GlProgram& program, const RayGeometry& rays, double offset, d
 
 class GlRenderer final : public Renderer {
  public:
-  GlRenderer(const Field& field, GlChoice choice)
-      : context_(choice), space_(field.data()), octree_(octreeOf(field.data())) {
+  GlRenderer(const Field& field, GlChoice choice) : context_(choice), space_(field.data()) {
+    octree_.grid = field.grid();
+    octree_.nodes = field.data().nodes;
     const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
     bounds_ = surfaceBounds(field.data(), zones);
     // Limit the steps and refinements of one pass so that the shaders stay within the loop budget.
@@ -199,15 +135,7 @@ class GlRenderer final : public Renderer {
     if (!zones.empty()) glProgramUniform1i(resources_->march.name(), kBlendedSteps, evaluation / loopsOfStep);
   }
 
-  ~GlRenderer() override {
-    try {
-      const EglContext::Current current(context_);
-      resources_.reset();
-    } catch (const Error&) {
-      // The context is current on another thread; its objects are deleted together with it.
-      static_cast<void>(resources_.release());
-    }
-  }
+  ~GlRenderer() override { deleteObjects(context_, resources_); }
 
   ViewBuffers slice(const SliceView& view, int width, int height) override {
     const SliceGeometry geometry(space_, view, width, height);
@@ -220,18 +148,20 @@ class GlRenderer final : public Renderer {
     glProgramUniform2d(program.name(), kSliceStep, geometry.stepX, geometry.stepY);
 
     ViewBuffers buffers = emptyBuffers(width, height, false);
-    const Target target(std::min(width, kTile), std::min(height, kTile));
-    bindField();
+    const Tile whole{0, 0, width, height};
+    const RenderTarget target(whole, GL_RGBA32UI, GL_RGBA32F);
+    target.bindForDrawing();
+    resources_->field.bind();
     glUseProgram(program.name());
     glBindVertexArray(resources_->noVertices.name());
-    for (const Tile& tile : tiles({0, 0, width, height})) {
+    for (const Tile& tile : tiles(whole)) {
       glViewport(0, 0, tile.width, tile.height);
       glProgramUniform2i(program.name(), kFirstPixel, tile.left, tile.top);
-      target.bindForDrawing();
       glDrawArrays(GL_TRIANGLES, 0, 3);
-      target.readIntegers(tile.width, tile.height, integers_);
-      forEachPixel(tile, width, [&](std::size_t from, std::size_t to) {
+      target.read(tile, integers_);
+      forEachPixel(tile, [&](std::size_t from, int x, int y) {
         const Texel& texel = integers_[from];
+        const std::size_t to = std::size_t(y) * width + x;
         buffers.cell[to] = texel[0];
         buffers.degree[to] = static_cast<std::uint8_t>(texel[1]);
         buffers.depth[to] = static_cast<std::uint8_t>(texel[2]);
@@ -262,16 +192,15 @@ class GlRenderer final : public Renderer {
 
     // Draw them, tile after tile.
     const Tile part = boundingTile(found.blocks, width, height);
-    const Target state(std::min(part.width, kTile), std::min(part.height, kTile));
-    const Target target(std::min(part.width, kTile), std::min(part.height, kTile));
-    bindField();
+    const RenderTarget state(part, GL_RGBA32UI, GL_RGBA32F), target(part, GL_RGBA32UI, GL_RGBA32F);
+    resources_->field.bind();
     glBindVertexArray(resources_->blocks.name());
     glEnable(GL_PROGRAM_POINT_SIZE);
     state.bindForReading();
     for (const Tile& tile : tiles(part)) {
       setTile(tile);
       drawTile(tile, static_cast<GLsizei>(found.blocks.size()), state, target);
-      forEachPixel(tile, width, [&](std::size_t from, std::size_t to) { setPixel(from, buffers, to); });
+      forEachPixel(tile, [&](std::size_t from, int x, int y) { setPixel(from, buffers, std::size_t(y) * width + x); });
     }
     checkGl("trace a surface");
     return buffers;
@@ -280,11 +209,6 @@ class GlRenderer final : public Renderer {
   std::string description() const override { return context_.renderer(); }
 
  private:
-  void bindField() const {
-    resources_->field.bind();
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  }
-
   void setTile(const Tile& tile) const {
     // The viewport consists of whole blocks, because a point whose centre lies outside is not drawn.
     const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
@@ -297,19 +221,19 @@ class GlRenderer final : public Renderer {
 
   /// Traces the rays of a tile and reads what they hit. The march continues in further passes only for the pixels that
   /// its first pass leaves under way.
-  void drawTile(const Tile& tile, GLsizei blocks, const Target& state, const Target& target) {
+  void drawTile(const Tile& tile, GLsizei blocks, const RenderTarget& state, const RenderTarget& target) {
     state.bindForDrawing();
     march(blocks);
     target.clear();
     hit(target, blocks);
-    target.readIntegers(tile.width, tile.height, integers_);
+    target.read(tile, integers_);
     if (std::ranges::any_of(integers_, isUnderWay)) {
       state.bindForDrawing();
       continueMarch(blocks);
       hit(target, blocks);
-      target.readIntegers(tile.width, tile.height, integers_);
+      target.read(tile, integers_);
     }
-    target.readFloats(tile.width, tile.height, normals_);
+    target.read(tile, normals_);
   }
 
   void march(GLsizei blocks) const {
@@ -336,7 +260,7 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  void hit(const Target& target, GLsizei blocks) const {
+  void hit(const RenderTarget& target, GLsizei blocks) const {
     target.bindForDrawing();
     glUseProgram(resources_->hit.name());
     glDrawArrays(GL_POINTS, 0, blocks);
@@ -357,17 +281,9 @@ class GlRenderer final : public Renderer {
     buffers.normal[to] = {normals_[from][0], normals_[from][1], normals_[from][2]};
   }
 
-  /// Calls f with the index of each pixel in the tile and in the view. Rows of a target run downwards, as in a view.
-  template <typename F>
-  static void forEachPixel(const Tile& tile, int viewWidth, F&& f) {
-    for (int y = 0; y < tile.height; ++y)
-      for (int x = 0; x < tile.width; ++x)
-        f(std::size_t(y) * tile.width + x, std::size_t(tile.top + y) * viewWidth + tile.left + x);
-  }
-
   EglContext context_;
   GridSpace space_;
-  FieldData octree_;
+  FieldData octree_;  ///< the field's nodes alone
   std::vector<SurfaceBounds> bounds_;
   std::unique_ptr<Resources> resources_;
   int stepsInPass_;                   ///< greatest number of steps of a ray in one pass of the march

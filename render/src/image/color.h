@@ -36,6 +36,11 @@ double colorDifference(const Oklab& a, const Oklab& b);
 
 inline LinearColor mix(const LinearColor& a, const LinearColor& b, float t) { return a + t * (b - a); }
 
+/// Mixes a share of a colour, 0 to 1, into a pixel, in linear light.
+inline void mixInto(Color& pixel, const LinearColor& color, float share) {
+  pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share));
+}
+
 /// Rises from 0 at `low` to 1 at `high` with a slope of 0 at both ends.
 inline float smoothStep(double low, double high, double x) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);

@@ -2,6 +2,7 @@
 // Anti-aliased text in the built-in font (DejaVu Sans). Strings are UTF-8; a size is the em in pixels; the position of
 // a text is the left end of its baseline.
 
+#include <cstdio>
 #include <string>
 #include <string_view>
 
@@ -29,5 +30,13 @@ void drawText(Image& image, std::string_view text, double size, double x, double
 /// The text if it is at most `width` pixels wide; else the longest beginning that fits with an ellipsis; empty if not
 /// even the ellipsis fits.
 std::string fitText(std::string_view text, double size, double width);
+
+/// The text that `printf` prints, of at most 63 characters.
+template <typename... Arguments>
+std::string printed(const char* format, Arguments... arguments) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, arguments...);
+  return text;
+}
 
 }  // namespace hpsdf::render

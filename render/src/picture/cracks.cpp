@@ -11,19 +11,13 @@ namespace {
 /// The samples that are at most `radius` away from a crack along either axis.
 std::vector<std::uint8_t> dilated(const ViewBuffers& buffers, int radius) {
   const int width = buffers.width, height = buffers.height;
-  std::vector<std::uint8_t> alongRows(buffers.crack.size()), result(buffers.crack.size());
+  std::vector<std::uint8_t> result(buffers.crack.size());
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const std::size_t row = std::size_t(y) * width;
-      if (!buffers.crack[row + x]) continue;
+      if (!buffers.crack[std::size_t(y) * width + x]) continue;
       const int first = std::max(0, x - radius), last = std::min(width - 1, x + radius);
-      std::fill_n(&alongRows[row + first], last - first + 1, std::uint8_t{1});
-    }
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      if (!alongRows[std::size_t(y) * width + x]) continue;
       for (int v = std::max(0, y - radius); v <= std::min(height - 1, y + radius); ++v)
-        result[std::size_t(v) * width + x] = 1;
+        std::fill_n(&result[std::size_t(v) * width + first], last - first + 1, std::uint8_t{1});
     }
   return result;
 }
@@ -55,10 +49,7 @@ void markCracks(Image& picture, const ViewBuffers& buffers, const Sampling& samp
   const LinearColor color = decodeSrgb(kCrackColor);
   const float share = 1.0F / float(sampling.samples * sampling.samples);
   forEachMarked(dilated(buffers, radius), buffers.width, buffers.height, sampling.samples,
-                [&](int x, int y, int count) {
-                  Color& pixel = picture.at(x, y);
-                  pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share * float(count)));
-                });
+                [&](int x, int y, int count) { mixInto(picture.at(x, y), color, share * float(count)); });
 }
 
 }  // namespace hpsdf::render

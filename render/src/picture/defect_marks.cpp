@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "image/color.h"
+#include "image/strokes.h"
+#include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace {
@@ -68,48 +70,25 @@ class Painter {
  private:
   void paint(const Stroke& stroke, double border, const LinearColor& color, float opacity) {
     const Eigen::Vector2d from(stroke.from.x, stroke.from.y), to(stroke.to.x, stroke.to.y);
-    const double extent = stroke.radius + stroke.halfWidth + border + 1;  // from the segment
-    const auto first = [&](double x) { return int(std::clamp(std::floor(x - extent), 0.0, 1e6)); };
-    const auto end = [&](double x, int size) { return int(std::clamp(std::ceil(x + extent), 0.0, double(size))); };
-    const int x1 = end(std::max(from.x(), to.x()), buffers_.width / samples_);
-    const int y1 = end(std::max(from.y(), to.y()), buffers_.height / samples_);
-    const Eigen::Vector2d along = to - from;
-    const double squared = along.squaredNorm();
-    for (int y = first(std::min(from.y(), to.y())); y < y1; ++y) {
-      // Find the part of the segment that is near enough to the row to cover pixels of it.
-      double begin = 0, last = 1;
-      if (along.y() != 0) {
-        const auto [low, high] =
-            std::minmax({(y + 0.5 - extent - from.y()) / along.y(), (y + 0.5 + extent - from.y()) / along.y()});
-        begin = std::clamp(low, 0.0, 1.0);
-        last = std::clamp(high, 0.0, 1.0);
-      }
-      const double xBegin = from.x() + begin * along.x(), xLast = from.x() + last * along.x();
-      const int rowEnd = std::min(x1, end(std::max(xBegin, xLast), x1));
-      for (int x = first(std::min(xBegin, xLast)); x < rowEnd; ++x) {
-        const Eigen::Vector2d middle(x + 0.5, y + 0.5);
-        const double t = squared > 0 ? std::clamp((middle - from).dot(along) / squared, 0.0, 1.0) : 0.0;
-        const double distance = std::abs((middle - from - t * along).norm() - stroke.radius);
-        const double covered = std::clamp(stroke.halfWidth + border + 0.5 - distance, 0.0, 1.0);
-        if (covered <= 0) continue;
-        const bool hidden = isHidden(stroke, t, x, y);
-        if (hidden && isGap(stroke, middle)) continue;
-        const float strength = hidden ? kHiddenMark : 1.0F;
-        Color& pixel = picture_.at(x, y);
-        pixel = encodeSrgb(mix(decodeSrgb(pixel), color, opacity * strength * static_cast<float>(covered)));
-      }
-    }
+    const double reach = stroke.halfWidth + border + 0.5;  // from the segment or the ring
+    const PixelRect view{0, 0, buffers_.width / samples_, buffers_.height / samples_};
+    forEachPixelNear(from, to, stroke.radius + reach, view, [&](const NearPixel& near) {
+      const double covered = std::min(reach - std::abs(near.distance - stroke.radius), 1.0);
+      if (covered <= 0) return;
+      const bool hidden = isHidden(stroke, near.t, near.x, near.y);
+      if (hidden && isGap(stroke, near.middle)) return;
+      const float strength = hidden ? kHiddenMark : 1.0F;
+      mixInto(picture_.at(near.x, near.y), color, opacity * strength * static_cast<float>(covered));
+    });
   }
 
   /// A ring is hidden as a whole, if its centre is.
   bool isHidden(const Stroke& stroke, double t, int x, int y) const {
     if (stroke.radius > 0) x = int(stroke.from.x), y = int(stroke.from.y);
     if (x < 0 || y < 0 || x >= buffers_.width / samples_ || y >= buffers_.height / samples_) return false;
-    const std::size_t i =
-        std::size_t(y * samples_ + samples_ / 2) * buffers_.width + std::size_t(x * samples_ + samples_ / 2);
     // In perspective the reciprocal of the distance is linear along the line in the picture.
     const double distance = 1 / ((1 - t) / stroke.from.distance + t / stroke.to.distance);
-    return buffers_.covered(i) && distance > double(buffers_.distance[i]) + stroke.tolerance;
+    return hides(buffers_, samples_, x, y, distance, stroke.tolerance);
   }
 
   /// The gaps depend on the position in the picture, not along the line, so that edges shorter than a dash have gaps
@@ -139,7 +118,7 @@ class Groups {
 
   struct Group {
     Eigen::AlignedBox2d extent;
-    PicturePoint nearest;
+    PicturePoint nearest = {};
   };
 
   /// Finds all groups and forgets their cells.
@@ -147,7 +126,7 @@ class Groups {
     std::vector<Group> groups;
     for (int row = 0; row < rows_; ++row)
       for (int column = 0; column < columns_; ++column)
-        if (cells_[std::size_t(row) * columns_ + column].used) groups.push_back(extractFrom(column, row));
+        if (!at(column, row).extent.isEmpty()) groups.push_back(extractFrom(column, row));
     return groups;
   }
 
@@ -167,29 +146,21 @@ class Groups {
  private:
   void add(const PicturePoint& p) {
     if (!(p.x >= 0 && p.y >= 0 && p.x < columns_ * kGroupCell && p.y < rows_ * kGroupCell)) return;
-    const int column = int(p.x) / kGroupCell, row = int(p.y) / kGroupCell;
-    Cell& cell = cells_[std::size_t(row) * columns_ + column];
-    if (!cell.used || p.distance < cell.nearest.distance) cell.nearest = p;
-    cell.used = true;
+    Group& cell = at(int(p.x) / kGroupCell, int(p.y) / kGroupCell);
+    if (cell.extent.isEmpty() || p.distance < cell.nearest.distance) cell.nearest = p;
     cell.extent.extend(Eigen::Vector2d(p.x, p.y));
   }
 
-  struct Cell {
-    bool used = false;
-    PicturePoint nearest = {};
-    Eigen::AlignedBox2d extent;
-  };
-
   Group extractFrom(int column, int row) {
-    Group group{.extent = {}, .nearest = cells_[std::size_t(row) * columns_ + column].nearest};
+    Group group{.extent = {}, .nearest = at(column, row).nearest};
     std::vector<std::array<int, 2>> pending = {{column, row}};
     while (!pending.empty()) {
       const auto [x, y] = pending.back();
       pending.pop_back();
-      Cell& cell = cells_[std::size_t(y) * columns_ + x];
-      if (!cell.used) continue;
-      cell.used = false;
+      Group& cell = at(x, y);
+      if (cell.extent.isEmpty()) continue;
       group.extent.extend(cell.extent);
+      cell.extent.setEmpty();
       if (cell.nearest.distance < group.nearest.distance) group.nearest = cell.nearest;
       for (int v = std::max(0, y - 1); v <= std::min(rows_ - 1, y + 1); ++v)
         for (int u = std::max(0, x - 1); u <= std::min(columns_ - 1, x + 1); ++u) pending.push_back({u, v});
@@ -197,8 +168,10 @@ class Groups {
     return group;
   }
 
+  Group& at(int column, int row) { return cells_[std::size_t(row) * columns_ + column]; }
+
   int columns_, rows_;
-  std::vector<Cell> cells_;
+  std::vector<Group> cells_;  ///< the points of each cell; their extent is empty where there are none
 };
 
 /// The ends of the part of a segment that lies before the eye; both are behind the eye if there is none.

@@ -1,7 +1,5 @@
 #include "picture/describe.h"
 
-#include <cstdio>
-
 namespace hpsdf::render {
 namespace {
 
@@ -65,12 +63,7 @@ std::string describeLevels(const std::map<int, double>& shares) {
 }
 
 std::string describeBytes(std::size_t bytes) {
-  char text[32];
-  if (bytes < 1000000)
-    std::snprintf(text, sizeof text, "%.1f kB", double(bytes) / 1e3);
-  else
-    std::snprintf(text, sizeof text, "%.2f MB", double(bytes) / 1e6);
-  return text;
+  return bytes < 1000000 ? printed("%.1f kB", double(bytes) / 1e3) : printed("%.2f MB", double(bytes) / 1e6);
 }
 
 std::string describeGreatest(const std::vector<float>& values) {

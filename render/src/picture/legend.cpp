@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "coloring/color_view.h"
@@ -18,26 +17,23 @@ double textSizeFor(int width, int height) {
   return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
 }
 
-void addTextRight(Overlay& overlay, const std::string& text, double size, double right, double baseline, Color color) {
-  addText(overlay, text, size, right - advanceOf(text, size), baseline, color);
-}
-
-// The part of the panel that is still free.
+// The part of the panel that is still free below its title.
 struct Column {
-  double left, right, top, bottom;
+  /// Adds the first title that fits.
+  Column(Overlay& overlay, const Frame& frame, std::span<const std::string> titles)
+      : left(frame.panel.x0 + frame.textSize),
+        right(frame.panel.x1 - frame.textSize),
+        top(frame.panel.y0 + frame.textSize),
+        bottom(frame.panel.y1 - 0.5 * frame.textSize) {
+    const double em = frame.textSize;
+    addText(overlay, fittingTitle(titles, em, width()), em, left, top + capHeight(em), kInk);
+    top += 1.7 * em;
+  }
+
   double width() const { return right - left; }
+
+  double left, right, top, bottom;
 };
-
-Column columnOf(const Frame& frame) {
-  const double em = frame.textSize;
-  return {frame.panel.x0 + em, frame.panel.x1 - em, frame.panel.y0 + em, frame.panel.y1 - 0.5 * em};
-}
-
-// Adds the first title that fits and moves the column's top below it.
-void addTitle(Overlay& overlay, Column& column, std::span<const std::string> titles, double size) {
-  addText(overlay, fittingTitle(titles, size, column.width()), size, column.left, column.top + capHeight(size), kInk);
-  column.top += 1.7 * size;
-}
 
 // A vertical colour bar in the panel.
 struct Bar {
@@ -52,17 +48,15 @@ template <typename ColorAt>
 Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, double above, double below,
            const ColorAt& colorAt) {
   const double em = frame.textSize;
-  Column column = columnOf(frame);
-  addTitle(overlay, column, titles, em);
-  Bar bar{.left = std::round(column.left),
-          .right = 0,
-          .top = std::round(column.top + above),
-          .bottom = std::round(column.bottom - below),
-          .labelsLeft = 0,
-          .labelsRight = column.right,
-          .labelSize = std::min(em, 0.9 * em + 1)};
-  bar.right = bar.left + std::round(1.7 * em);
-  bar.labelsLeft = bar.right + 0.6 * em;
+  const Column column(overlay, frame, titles);
+  const double left = std::round(column.left), right = left + std::round(1.7 * em);
+  const Bar bar{.left = left,
+                .right = right,
+                .top = std::round(column.top + above),
+                .bottom = std::round(column.bottom - below),
+                .labelsLeft = right + 0.6 * em,
+                .labelsRight = column.right,
+                .labelSize = std::min(em, 0.9 * em + 1)};
   for (double y = bar.top; y < bar.bottom; ++y)
     overlay.boxes.push_back({bar.left, y, bar.right, y + 1, encodeSrgb(colorAt((y + 0.5 - bar.top) / bar.height()))});
   return bar;
@@ -91,16 +85,18 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
                 bool roomy, const LinearColor& color) {
   const double left = std::round(column.left);
   const double swatch = std::round(2.1 * size);
-  addSwatch(overlay, row, left, swatch, std::max(1.0, std::round(0.16 * row.height)), encodeSrgb(color));
+  const double gap = std::max(1.0, std::round(0.16 * row.height));
+  addSwatch(overlay, row, left, swatch, gap, encodeSrgb(color));
   LevelRow box = row;
-  box.height -= std::max(1.0, std::round(0.16 * row.height));
+  box.height -= gap;
   const std::string number = std::to_string(row.level);
   const double baseline = std::round(box.baseline(size));
   addText(overlay, number, size, left + (swatch - advanceOf(number, size)) / 2, baseline, inkOn(color));
 
   const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
   if (shareRight > column.right) return;
-  addTextRight(overlay, formatShare(row.share), size, shareRight, baseline, kInk);
+  const std::string share = formatShare(row.share);
+  addText(overlay, share, size, shareRight - advanceOf(share, size), baseline, kInk);
   const double barLeft = shareRight + 0.6 * size;
   if (!roomy || barLeft + size > column.right) return;
   const double middle = box.top + box.height / 2, half = std::max(1.0, 0.22 * size);
@@ -123,40 +119,32 @@ void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<Lev
   }
 }
 
+std::string withoutTrailingZeros(std::string number) {
+  if (number.find('.') != std::string::npos) number.erase(number.find_last_not_of('0') + 1);
+  if (number.back() == '.') number.pop_back();
+  return number;
+}
+
 // Formats a positive number without padding: 1.5e-7, not 1.500e-07.
 std::string formatScientific(double value, int digits) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*e", digits - 1, value);
-  const std::string shown = text;
+  const std::string shown = printed("%.*e", digits - 1, value);
   const std::size_t e = shown.find('e');
-  std::string mantissa = shown.substr(0, e);
-  if (mantissa.find('.') != std::string::npos) mantissa.erase(mantissa.find_last_not_of('0') + 1);
-  if (mantissa.back() == '.') mantissa.pop_back();
-  return mantissa + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
+  return withoutTrailingZeros(shown.substr(0, e)) + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
 }
 
 // Rounds a positive number to this many digits, or to a whole number if that has more, without trailing zeros.
 std::string formatPlain(double value, int digits) {
   const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", std::max(0, digits - beforePoint), value);
-  std::string shown = text;
-  if (shown.find('.') == std::string::npos) return shown;
-  shown.erase(shown.find_last_not_of('0') + 1);
-  if (shown.back() == '.') shown.pop_back();
-  return shown;
+  return withoutTrailingZeros(printed("%.*f", std::max(0, digits - beforePoint), value));
 }
-
-int decimalsOf(double step) { return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9))); }
 
 // Formats a multiple of a step: all multiples have the same number of decimals, or an exponent where that is shorter.
 std::string formatTick(double value, double step) {
   if (value == 0) return "0";
   const std::string sign = value < 0 ? "−" : "+";
   if (step < 0.9e-3 || step > 0.9e4) return sign + formatScientific(std::abs(value), 3);
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimalsOf(step), std::abs(value));
-  return sign + text;
+  const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+  return sign + printed("%.*f", decimals, std::abs(value));
 }
 
 // Adds an arrow from (x, y) to the right or upwards.
@@ -182,7 +170,10 @@ void blendBox(Image& image, const BoxItem& box) {
   for (int y = std::max(0, int(std::floor(box.y0))); y < std::min<double>(image.height, std::ceil(box.y1)); ++y)
     for (int x = std::max(0, int(std::floor(box.x0))); x < std::min<double>(image.width, std::ceil(box.x1)); ++x) {
       const double covered = overlap(box.x0, box.x1, x) * overlap(box.y0, box.y1, y);
-      image.at(x, y) = covered >= 1 ? box.color : encodeSrgb(mix(decodeSrgb(image.at(x, y)), color, float(covered)));
+      if (covered >= 1)
+        image.at(x, y) = box.color;
+      else
+        mixInto(image.at(x, y), color, float(covered));
     }
 }
 
@@ -222,8 +213,7 @@ void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::s
                     const std::map<int, double>& shares, const LevelMap& map) {
   if (frame.panel.empty() || shares.empty()) return;
   const double em = frame.textSize;
-  Column column = columnOf(frame);
-  addTitle(overlay, column, titles, em);
+  Column column(overlay, frame, titles);
   if (frame.roomy) {
     const double small = 0.8 * em;
     addText(overlay, fitText("share of the volume", small, column.width()), small, column.left,
@@ -321,8 +311,7 @@ void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string>
               std::span<const std::pair<std::string, std::string>> facts) {
   if (frame.panel.empty()) return;
   const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em);
-  Column column = columnOf(frame);
-  addTitle(overlay, column, titles, em);
+  Column column(overlay, frame, titles);
   for (const auto& [name, value] : facts) {
     if (column.top + 2.3 * em > column.bottom) return;
     addText(overlay, fitText(name, small, column.width()), small, column.left, column.top + capHeight(small), kSoftInk);
@@ -336,8 +325,7 @@ void addSwatches(Overlay& overlay, const Frame& frame, std::span<const std::stri
                  std::span<const Swatch> swatches) {
   if (frame.panel.empty()) return;
   const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em), side = 0.9 * small;
-  Column column = columnOf(frame);
-  addTitle(overlay, column, titles, em);
+  Column column(overlay, frame, titles);
   for (const Swatch& swatch : swatches) {
     const double height = 1.6 * small + (swatch.count.empty() ? 0 : 1.6 * em);
     if (column.top + height > column.bottom) return;
@@ -394,9 +382,7 @@ std::string formatCount(std::size_t count) {
 
 std::string formatShare(double fraction) {
   if (fraction > 0 && fraction < 0.0005) return "<0.1 %";
-  char text[32];
-  std::snprintf(text, sizeof text, fraction > 0.9995 ? "%.0f %%" : "%.1f %%", 100 * fraction);
-  return text;
+  return printed(fraction > 0.9995 ? "%.0f %%" : "%.1f %%", 100 * fraction);
 }
 
 }  // namespace hpsdf::render

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "coloring/color_view.h"
+#include "hpsdf/render/line_plot.h"
+#include "image/strokes.h"
 #include "picture/describe.h"
 
 namespace hpsdf::render {
@@ -129,32 +131,28 @@ std::string tickText(double value, double step) {
   return formatNumber(value, std::clamp(digits, 1, 15));
 }
 
-// The rectangles of charts and bands, in pixels.
-struct Grid {
-  double em, small, thin;  // sizes of text and small text, width of thin lines
-  bool labelled;           // true if the picture has room for numbers
-  int left, right;         // extent of the line
-  std::vector<PixelRect> charts;
-  std::vector<PixelRect> bands;
-  int bottom;  // lower end of the last chart or band
-};
-
 class Plotter {
  public:
   Plotter(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact)
-      : frame_(frame), field_(field), line_(line), charts_(chartsOf(line, exact)) {}
+      : frame_(frame),
+        field_(field),
+        line_(line),
+        em_(frame.textSize),
+        small_(std::max(kSmallestText, 0.85 * em_)),
+        thin_(std::max(1.0, em_ / 15)),
+        labelled_(!frame.caption.empty()),
+        charts_(chartsOf(line, exact)) {}
 
   LineLayout draw() {
     layOutGrid();
     shadeOutside();
-    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawGround(grid_.charts[n], scales_[n]);
+    for (std::size_t n = 0; n < layout_.charts.size(); ++n) drawGround(layout_.charts[n], scales_[n]);
     drawBands();
     drawBorders();
-    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawCurves(grid_.charts[n], charts_[n], scales_[n]);
-    if (grid_.labelled) drawAbscissa();
-    for (std::size_t n = 0; n < grid_.charts.size(); ++n) drawLegend(grid_.charts[n], charts_[n]);
+    for (std::size_t n = 0; n < layout_.charts.size(); ++n) drawCurves(layout_.charts[n], charts_[n], scales_[n]);
+    if (labelled_) drawAbscissa();
+    for (std::size_t n = 0; n < layout_.charts.size(); ++n) drawLegend(layout_.charts[n], charts_[n]);
     drawCaption();
-    layout_.charts = grid_.charts;
     return std::move(layout_);
   }
 
@@ -166,40 +164,28 @@ class Plotter {
     addText(layout_.overlay, std::move(text), size, x, baseline, color);
   }
 
-  double xOf(double t) const { return grid_.left + t * (grid_.right - grid_.left); }
+  double xOf(double t) const { return left_ + t * (right_ - left_); }
 
   void layOutGrid() {
-    const double em = frame_.textSize;
-    grid_ = {.em = em,
-             .small = std::max(kSmallestText, 0.85 * em),
-             .thin = std::max(1.0, em / 15),
-             .labelled = !frame_.caption.empty(),
-             .left = 0,
-             .right = frame_.view.x1,
-             .charts = {},
-             .bands = {},
-             .bottom = 0};
     const PixelRect& view = frame_.view;
-    const int margin = grid_.labelled ? int(std::lround(em)) : 1;
-    const int foot = grid_.labelled ? int(std::lround(3.2 * em)) : margin;
+    const int margin = labelled_ ? int(std::lround(em_)) : 1;
+    const int foot = labelled_ ? int(std::lround(3.2 * em_)) : margin;
     layOutRows(view.y0 + margin, view.y1 - foot);
-    for (std::size_t n = 0; n < grid_.charts.size(); ++n)
-      scales_.push_back(scaleOf(charts_[n], grid_.charts[n].height() / (2.4 * em)));
-    grid_.left = view.x0 + margin;
-    if (grid_.labelled) grid_.left = view.x0 + int(std::ceil(widestLabel() + 1.2 * em));
+    for (std::size_t n = 0; n < layout_.charts.size(); ++n)
+      scales_.push_back(scaleOf(charts_[n], layout_.charts[n].height() / (2.4 * em_)));
+    left_ = view.x0 + margin;
+    if (labelled_) left_ = view.x0 + int(std::ceil(widestLabel() + 1.2 * em_));
     // Leave room for the last number where the picture's edge follows instead of a legend.
-    grid_.right =
-        std::max(grid_.left + 1, view.x1 - int(std::lround(frame_.panel.empty() ? 1.5 * margin : 0.5 * margin)));
-    for (auto* rows : {&grid_.charts, &grid_.bands})
-      for (PixelRect& row : *rows) row.x0 = grid_.left, row.x1 = grid_.right;
+    right_ = std::max(left_ + 1, view.x1 - int(std::lround(frame_.panel.empty() ? 1.5 * margin : 0.5 * margin)));
+    for (auto* rows : {&layout_.charts, &bands_})
+      for (PixelRect& row : *rows) row.x0 = left_, row.x1 = right_;
   }
 
   // Stacks charts and bands. If the charts would be too low to read, the bands are left out, then the last charts.
   void layOutRows(int top, int bottom) {
-    const double em = grid_.em;
-    const int gap = std::max(1, int(std::lround(0.9 * em))), bandGap = std::max(1, int(std::lround(0.35 * em)));
-    const int band = int(std::lround(1.5 * em)), least = int(std::lround(2.6 * em));
-    int bands = grid_.labelled ? 2 * band + bandGap + gap : 0;
+    const int gap = std::max(1, int(std::lround(0.9 * em_))), bandGap = std::max(1, int(std::lround(0.35 * em_)));
+    const int band = int(std::lround(1.5 * em_)), least = int(std::lround(2.6 * em_));
+    int bands = labelled_ ? 2 * band + bandGap + gap : 0;
     const auto available = [&] { return bottom - top - bands - gap * int(charts_.size() - 1); };
     if (available() < least * int(charts_.size())) bands = 0;
     while (charts_.size() > 1 && available() < least * int(charts_.size())) charts_.pop_back();
@@ -210,25 +196,24 @@ class Plotter {
     int y = top;
     for (const Chart& chart : charts_) {
       const int ownHeight = std::max(1, int(std::floor(height * chart.weight / weights)));
-      grid_.charts.push_back({0, y, 0, y + ownHeight});
+      layout_.charts.push_back({0, y, 0, y + ownHeight});
       y += ownHeight + gap;
     }
     if (bands > 0)
-      for (int n = 0; n < 2; ++n, y += band + bandGap) grid_.bands.push_back({0, y, 0, y + band});
-    grid_.bottom = grid_.bands.empty() ? grid_.charts.back().y1 : grid_.bands.back().y1;
+      for (int n = 0; n < 2; ++n, y += band + bandGap) bands_.push_back({0, y, 0, y + band});
+    bottom_ = bands_.empty() ? layout_.charts.back().y1 : bands_.back().y1;
   }
 
   double widestLabel() const {
-    double widest = grid_.bands.empty() ? 0 : advanceOf("degree", grid_.small);
+    double widest = bands_.empty() ? 0 : advanceOf("degree", small_);
     for (const Scale& scale : scales_)
-      for (const double tick : ticksOf(scale))
-        widest = std::max(widest, advanceOf(tickText(tick, scale.step), grid_.small));
+      for (const double tick : ticksOf(scale)) widest = std::max(widest, advanceOf(tickText(tick, scale.step), small_));
     return widest;
   }
 
   void shadeOutside() {
     for (const Piece& piece : line_.pieces)
-      if (!piece.cell) box(xOf(piece.tEnter), grid_.charts.front().y0, xOf(piece.tLeave), grid_.bottom, kOutside);
+      if (!piece.cell) box(xOf(piece.tEnter), layout_.charts.front().y0, xOf(piece.tLeave), bottom_, kOutside);
   }
 
   static double yOf(const PixelRect& chart, const Scale& scale, double value) {
@@ -237,19 +222,18 @@ class Plotter {
 
   // Draws grid lines with their values, a darker one at zero, and the two axes.
   void drawGround(const PixelRect& chart, const Scale& scale) {
-    const double thin = grid_.thin;
     double lastLabel = std::numeric_limits<double>::infinity();  // baseline of the last number; the ticks ascend
     for (const double tick : ticksOf(scale)) {
       const double y = yOf(chart, scale, tick);
       const std::string label = tickText(tick, scale.step);
-      box(grid_.left, y - 0.5 * thin, grid_.right, y + 0.5 * thin, label == "0" ? kSoftInk : kRule);
-      const double baseline = y + capHeight(grid_.small) / 2;
-      if (!grid_.labelled || baseline + 1.3 * grid_.small > lastLabel) continue;
-      text(label, grid_.small, grid_.left - 0.5 * grid_.em - advanceOf(label, grid_.small), baseline, kInk);
+      box(left_, y - 0.5 * thin_, right_, y + 0.5 * thin_, label == "0" ? kSoftInk : kRule);
+      const double baseline = y + capHeight(small_) / 2;
+      if (!labelled_ || baseline + 1.3 * small_ > lastLabel) continue;
+      text(label, small_, left_ - 0.5 * em_ - advanceOf(label, small_), baseline, kInk);
       lastLabel = baseline;
     }
-    box(grid_.left - thin, chart.y0, grid_.left, chart.y1, kTick);
-    box(grid_.left - thin, chart.y1, grid_.right, chart.y1 + thin, kTick);
+    box(left_ - thin_, chart.y0, left_, chart.y1, kTick);
+    box(left_ - thin_, chart.y1, right_, chart.y1 + thin_, kTick);
   }
 
   // Draws the borders of cells, thinner where they are dense, so that they do not hide the curves.
@@ -257,17 +241,17 @@ class Plotter {
     for (std::size_t n = 1; n < line_.pieces.size(); ++n) {
       const double x = xOf(line_.pieces[n].tEnter);
       const double room = xOf(line_.pieces[n].tLeave) - xOf(line_.pieces[n - 1].tEnter);
-      const double half = 0.5 * std::clamp(0.04 * room, 0.2 * grid_.thin, grid_.thin);
-      box(x - half, grid_.charts.front().y0, x + half, grid_.bottom, kBorder);
+      const double half = 0.5 * std::clamp(0.04 * room, 0.2 * thin_, thin_);
+      box(x - half, layout_.charts.front().y0, x + half, bottom_, kBorder);
     }
   }
 
   void drawBands() {
-    if (grid_.bands.empty()) return;
+    if (bands_.empty()) return;
     const FieldStatistics figures = statistics(field_);
-    drawBand(grid_.bands[0], "degree", figures.degreeVolume, [](const Cell& cell) { return cell.degree; });
-    drawBand(grid_.bands[1], "depth", figures.depthVolume, [](const Cell& cell) { return cell.depth; });
-    nameOutside(grid_.bands[0]);
+    drawBand(bands_[0], "degree", figures.degreeVolume, [](const Cell& cell) { return cell.degree; });
+    drawBand(bands_[1], "depth", figures.depthVolume, [](const Cell& cell) { return cell.depth; });
+    nameOutside(bands_[0]);
   }
 
   // Draws a band of degrees or depths. The colours depend on all levels of the field, as in slices; the legend contains
@@ -285,11 +269,10 @@ class Plotter {
       swatch({xOf(piece.tEnter), double(band.y0), xOf(piece.tLeave), double(band.y1), encodeSrgb(map(level))}, level,
              map);
     }
-    text(name, grid_.small, grid_.left - 0.5 * grid_.em - advanceOf(name, grid_.small), baselineIn(band, grid_.small),
-         kInk);
+    text(name, small_, left_ - 0.5 * em_ - advanceOf(name, small_), baselineIn(band, small_), kInk);
     if (frame_.panel.empty()) return;
-    const double left = frame_.panel.x0 + grid_.em, width = (frame_.panel.x1 - grid_.em - left) / double(seen.size());
-    const double swatchWidth = std::min(width, 1.8 * grid_.em);
+    const double left = frame_.panel.x0 + em_, width = (frame_.panel.x1 - em_ - left) / double(seen.size());
+    const double swatchWidth = std::min(width, 1.8 * em_);
     int n = 0;
     for (const int level : seen) {
       swatch({left + n * swatchWidth, double(band.y0), left + (n + 1) * swatchWidth, double(band.y1),
@@ -301,11 +284,11 @@ class Plotter {
 
   void nameOutside(const PixelRect& row) {
     const std::string name = "outside";
-    const double advance = advanceOf(name, grid_.small);
+    const double advance = advanceOf(name, small_);
     for (const Piece& piece : line_.pieces) {
       const double left = xOf(piece.tEnter), right = xOf(piece.tLeave);
-      if (piece.cell || advance + 0.4 * grid_.em > right - left) continue;
-      text(name, grid_.small, (left + right - advance) / 2, baselineIn(row, grid_.small), kSoftInk);
+      if (piece.cell || advance + 0.4 * em_ > right - left) continue;
+      text(name, small_, (left + right - advance) / 2, baselineIn(row, small_), kSoftInk);
     }
   }
 
@@ -313,15 +296,15 @@ class Plotter {
   void swatch(const BoxItem& item, int level, const LevelMap& map) {
     layout_.overlay.boxes.push_back(item);
     const std::string number = std::to_string(level);
-    const double advance = advanceOf(number, grid_.small);
-    if (advance + 0.4 * grid_.em > item.x1 - item.x0) return;
-    text(number, grid_.small, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(grid_.small)) / 2,
+    const double advance = advanceOf(number, small_);
+    if (advance + 0.4 * em_ > item.x1 - item.x0) return;
+    text(number, small_, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(small_)) / 2,
          inkOn(map(level)));
   }
 
   static double baselineIn(const PixelRect& row, double size) { return (row.y0 + row.y1 + capHeight(size)) / 2; }
 
-  double widthOf(const Series& series) const { return (series.broad ? 4.8 : 1.8) * std::max(0.8, grid_.em / 15); }
+  double widthOf(const Series& series) const { return (series.broad ? 4.8 : 1.8) * std::max(0.8, em_ / 15); }
 
   void drawCurves(const PixelRect& chart, const Chart& content, const Scale& scale) {
     const double length = line_.length();
@@ -336,40 +319,40 @@ class Plotter {
 
   // Draws the axis of distances along the line with its title.
   void drawAbscissa() {
-    const double length = line_.length(), em = grid_.em, small = grid_.small;
-    const Scale scale{0, length, niceStep(length, std::max(2.0, (grid_.right - grid_.left) / (6 * em)))};
-    const double baseline = grid_.bottom + 0.6 * em + capHeight(small);
-    const double end = frame_.panel.empty() ? frame_.view.x1 - 2 : frame_.panel.x0 + 0.6 * em;
+    const double length = line_.length();
+    const Scale scale{0, length, niceStep(length, std::max(2.0, (right_ - left_) / (6 * em_)))};
+    const double baseline = bottom_ + 0.6 * em_ + capHeight(small_);
+    const double end = frame_.panel.empty() ? frame_.view.x1 - 2 : frame_.panel.x0 + 0.6 * em_;
     double lastRight = -std::numeric_limits<double>::infinity();
     for (const double tick : ticksOf(scale)) {
       const double x = xOf(tick / length);
-      box(x - 0.5 * grid_.thin, grid_.bottom, x + 0.5 * grid_.thin, grid_.bottom + 0.35 * em, kTick);
+      box(x - 0.5 * thin_, bottom_, x + 0.5 * thin_, bottom_ + 0.35 * em_, kTick);
       const std::string label = tickText(tick, scale.step);
-      const double left = x - advanceOf(label, small) / 2, right = left + advanceOf(label, small);
-      if (left < std::max(lastRight + 0.6 * em, 2.0) || right > end) continue;
-      text(label, small, left, baseline, kInk);
+      const double left = x - advanceOf(label, small_) / 2, right = left + advanceOf(label, small_);
+      if (left < std::max(lastRight + 0.6 * em_, 2.0) || right > end) continue;
+      text(label, small_, left, baseline, kInk);
       lastRight = right;
     }
     static const std::string titles[] = {"distance along the line, in the field's units", "distance along the line",
                                          "along the line"};
-    const std::string title = fittingTitle(titles, small, grid_.right - grid_.left);
-    text(title, small, (grid_.left + grid_.right - advanceOf(title, small)) / 2, baseline + 1.35 * small, kSoftInk);
+    const std::string title = fittingTitle(titles, small_, right_ - left_);
+    text(title, small_, (left_ + right_ - advanceOf(title, small_)) / 2, baseline + 1.35 * small_, kSoftInk);
   }
 
   // Draws the chart's title and, for each series, a stroke with its name.
   void drawLegend(const PixelRect& chart, const Chart& content) {
     if (frame_.panel.empty()) return;
-    const double em = grid_.em, left = frame_.panel.x0 + em, right = frame_.panel.x1 - 0.5 * em;
+    const double left = frame_.panel.x0 + em_, right = frame_.panel.x1 - 0.5 * em_;
     double y = chart.y0;
-    text(fittingTitle(content.titles, em, right - left), em, left, y + capHeight(em), kInk);
-    y += 1.5 * em;
+    text(fittingTitle(content.titles, em_, right - left), em_, left, y + capHeight(em_), kInk);
+    y += 1.5 * em_;
     for (const Series& series : content.series) {
-      if (y + em > chart.y1 + 0.7 * em) return;  // the last row may extend into the gap below
-      const double stroke = 1.6 * em, middle = y + 0.5 * em, half = widthOf(series) / 2;
+      if (y + em_ > chart.y1 + 0.7 * em_) return;  // the last row may extend into the gap below
+      const double stroke = 1.6 * em_, middle = y + 0.5 * em_, half = widthOf(series) / 2;
       box(left, middle - half, left + stroke, middle + half, series.color);
-      text(fittingTitle(series.names, grid_.small, right - left - stroke - 0.5 * em), grid_.small,
-           left + stroke + 0.5 * em, middle + capHeight(grid_.small) / 2, kInk);
-      y += 1.3 * em;
+      text(fittingTitle(series.names, small_, right - left - stroke - 0.5 * em_), small_, left + stroke + 0.5 * em_,
+           middle + capHeight(small_) / 2, kInk);
+      y += 1.3 * em_;
     }
   }
 
@@ -393,16 +376,51 @@ class Plotter {
   const Frame& frame_;
   const Field& field_;
   const Line& line_;
+  // Lengths are in pixels.
+  const double em_, small_, thin_;  // sizes of text and small text, width of thin lines
+  const bool labelled_;             // true if the picture has room for numbers
   std::vector<Chart> charts_;
   std::vector<Scale> scales_;
-  Grid grid_;
-  LineLayout layout_;
+  int left_ = 0, right_ = 0;  // extent of the line
+  std::vector<PixelRect> bands_;
+  int bottom_ = 0;     // lower end of the last chart or band
+  LineLayout layout_;  // its charts are the rectangles of charts_
 };
 
 }  // namespace
 
 LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact) {
   return Plotter(frame, field, line, exact).draw();
+}
+
+// The coverage by all segments is collected before blending, so that a curve is not darker where segments overlap.
+void paintCurve(Image& image, const CurveItem& curve) {
+  const PixelRect& rect = curve.within;
+  if (rect.empty()) return;
+  std::vector<float> covered(std::size_t(rect.width()) * rect.height(), 0.0F);
+  const double reach = curve.width / 2 + 0.5;
+  for (std::size_t i = 1; i < curve.points.size(); ++i) {
+    const Eigen::Vector2d &a = curve.points[i - 1], &b = curve.points[i];
+    if (!a.allFinite() || !b.allFinite()) continue;
+    forEachPixelNear(a, b, reach, rect, [&](const NearPixel& near) {
+      float& here = covered[std::size_t(near.y - rect.y0) * rect.width() + (near.x - rect.x0)];
+      here = std::max(here, float(std::min(reach - near.distance, 1.0)));
+    });
+  }
+  const LinearColor color = decodeSrgb(curve.color);
+  for (int y = rect.y0; y < rect.y1; ++y)
+    for (int x = rect.x0; x < rect.x1; ++x)
+      if (const float share = covered[std::size_t(y - rect.y0) * rect.width() + (x - rect.x0)]; share > 0)
+        mixInto(image.at(x, y), color, share);
+}
+
+Image drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height) {
+  checkPictureSize(width, height, 1);
+  const LineLayout layout = layOutLine(frame(width, height), field, line, exact);
+  Image image(width, height, paperColor());
+  paint(image, layout.overlay);
+  for (const CurveItem& curve : layout.curves) paintCurve(image, curve);
+  return image;
 }
 
 }  // namespace hpsdf::render

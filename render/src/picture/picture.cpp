@@ -17,7 +17,12 @@
 #include "picture/defect_marks.h"
 #include "picture/describe.h"
 #include "picture/legend.h"
-#include "picture/scene.h"
+#include "scene/body_view.h"
+#include "scene/cell_boxes.h"
+#include "scene/cell_lines.h"
+#include "scene/section.h"
+#include "view/view_buffers.h"
+#include "view/view_checks.h"
 
 namespace hpsdf::render {
 namespace {
@@ -61,17 +66,10 @@ void movePanelTo(const PixelRect& section, Frame& frame) {
   frame.panel.x1 -= space;
 }
 
-/// The name of the coordinate axis that a direction is parallel to, if there is one.
-std::optional<char> axisAlong(const Vector3& direction) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (direction[axis] > 0 && direction[(axis + 1) % 3] == 0 && direction[(axis + 2) % 3] == 0) return "xyz"[axis];
-  return std::nullopt;
-}
-
 /// Names the axes of a slice; an oblique plane has none.
 void addAxesOf(Overlay& overlay, const Frame& frame, const SliceView& view, const PixelRect& section) {
-  const auto right = axisAlong(view.right), up = axisAlong(view.up);
-  if (right && up && !section.empty()) addAxes(overlay, frame, section, *right, *up);
+  const int right = axisAlong(view.right), up = axisAlong(view.up);
+  if (right >= 0 && up >= 0 && !section.empty()) addAxes(overlay, frame, section, "xyz"[right], "xyz"[up]);
 }
 
 void checkArrows(int spacing) {
@@ -80,8 +78,7 @@ void checkArrows(int spacing) {
 }
 
 /// Draws arrows over the finished view; legend and caption cover them.
-template <typename View>
-void addArrows(Image& image, const Frame& frame, const Field& field, const View& view, const ViewBuffers& buffers,
+void addArrows(Image& image, const Frame& frame, const Field& field, const auto& view, const ViewBuffers& buffers,
                int samples, int spacing) {
   if (spacing > 0)
     paintArrows(image, frame.view, gradientArrows(field, view, buffers, samples, spacing), frame.lineWidth());
@@ -94,17 +91,57 @@ void checkColor(ColorBy color, ColorBy inapplicable, const ReferenceData& refere
   requireReferenceData(color, reference);
 }
 
-template <typename View>
 std::function<Vector3(int, int)> pointsOf(const View& view, const ViewBuffers& buffers) {
-  return [&](int x, int y) { return pointAt(view, buffers, x, y); };
+  return [&](int x, int y) {
+    return std::visit([&](const auto& plainView) { return pointAt(plainView, buffers, x, y); }, view);
+  };
 }
 
-template <typename View>
-std::vector<float> quantityIn(const Field& field, const View& view, const ViewBuffers& buffers, ColorBy quantity,
-                              const ReferenceData& reference) {
-  requireReferenceData(quantity, reference);
-  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, reference,
-                           quantityOfCells(field, quantity, reference));
+/// The domain's section with a plane, framed for width × height pixels.
+SliceView sectionView(const Box& domain, const Plane& plane, int width, int height) {
+  if (const auto* axis = std::get_if<AxisPlane>(&plane))
+    return axisSlice(domain, axis->axis, axis->offset, width, height);
+  const auto& free = std::get<FreePlane>(plane);
+  return planeSlice(domain, free.point, free.normal, width, height);
+}
+
+/// The buffers of a surface's picture with everything that it shows: surface, sections, cells, bodies.
+struct Scene {
+  SurfaceView view;
+  ViewBuffers buffers;
+  std::vector<float> lines = {};  ///< how strongly edges of cells cover each sample, 0 to 1; empty without such lines
+
+  /// True if any pixel shows the field.
+  bool showsField() const {
+    return std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; }) ||
+           std::ranges::any_of(lines, [](float strength) { return strength > 0; });
+  }
+};
+
+/// Renders a view of width × height pixels with the picture's samples for each; lines along cells are `lineWidth`
+/// pixels wide. Throws `Error` for a camera, an offset or a clipping plane out of range.
+Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& picture, int width, int height,
+                  double lineWidth) {
+  checkOffset(picture.offset);
+  checkClip(picture.clip);
+  const ShownBodies& bodies = picture.bodies;
+  Camera camera = cameraOf(picture.camera, field.domain(), width, height);
+  // Parallel rays start before the domain; let them start before the bodies too.
+  if (bodies.renderer) camera = startingBefore(bodies.renderer->bounds(bodies.bodies), camera);
+  const SurfaceView view{camera, picture.offset, picture.clip};
+  width *= picture.samples;
+  height *= picture.samples;
+  lineWidth *= picture.samples;
+
+  Scene scene{view, picture.surface ? renderer.surface(view, width, height) : emptyBuffers(width, height, true)};
+  if (picture.surface) addSection(field, view, scene.buffers);
+  if (picture.plane) addPlane(field, view, sectionView(field.domain(), *picture.plane, 1, 1), scene.buffers);
+  std::vector<Cell> cells;
+  if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells);
+  if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
+  if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
+  if (picture.cells.style == CellStyle::lines) scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
+  return scene;
 }
 
 /// Fills the panel of a picture whose colours mean nothing.
@@ -146,12 +183,6 @@ void addFieldDetails(const Field& field, const FieldStatistics& figures, std::ve
 }
 
 }  // namespace
-
-ViewSize viewSize(int pictureWidth, int pictureHeight) {
-  checkPictureSize(pictureWidth, pictureHeight, 1);
-  const PixelRect view = frame(pictureWidth, pictureHeight).view;
-  return {view.width(), view.height()};
-}
 
 ViewSize viewSize(const SurfacePicture& picture) {
   const PixelRect view = frameOfSurface(picture).view;
@@ -220,8 +251,8 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     drawn.details = {"distance", plane, formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
                      "lines every " + formatNumber(scale.step)};
   } else {
-    const ColorKey key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(view, buffers), picture.color,
-                                      picture.scale, reference);
+    const ColorKey key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers),
+                                      picture.color, picture.scale, reference);
     pasteView(drawn.image, colorCellSlice(buffers, key.color, sampling));
     drawn.legend = key.legend;
     drawn.scale = key.scale;
@@ -262,7 +293,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   Overlay overlay;
   ColorKey key;
   if (picture.color != ColorBy::normal) {
-    key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(scene.view, buffers), picture.color,
+    key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
                        picture.scale, reference);
     drawn.legend = key.legend;
     drawn.scale = key.scale;
@@ -300,14 +331,11 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   return drawn;
 }
 
-std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
+std::vector<float> quantityAt(const Field& field, const View& view, const ViewBuffers& buffers, ColorBy quantity,
                               const ReferenceData& reference) {
-  return quantityIn(field, view, buffers, quantity, reference);
-}
-
-std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
-                              const ReferenceData& reference) {
-  return quantityIn(field, view, buffers, quantity, reference);
+  requireReferenceData(quantity, reference);
+  return quantityOfSamples(field, buffers, pointsOf(view, buffers), quantity, reference,
+                           quantityOfCells(field, quantity, reference));
 }
 
 namespace {
@@ -340,10 +368,8 @@ std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y)
   if (column >= buffers.width || row >= buffers.height) return std::nullopt;
   const std::size_t i = std::size_t(row) * buffers.width + column;
   if (!buffers.hit(i)) return std::nullopt;
-  const Vector3 position =
-      std::visit([&](const auto& view) { return pointAt(view, buffers, column, row); }, drawn.view);
-  return Pick{withinCell(field, position, buffers.cell[i]), buffers.cell[i], buffers.degree[i], buffers.depth[i],
-              buffers.value[i]};
+  const Vector3 position = withinCell(field, pointsOf(drawn.view, buffers)(column, row), buffers.cell[i]);
+  return Pick{position, buffers.cell[i], buffers.degree[i], buffers.depth[i], buffers.value[i]};
 }
 
 bool meetsWalls(const Field& field, double offset) {

@@ -1,9 +1,11 @@
 #include "scene/body_view.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "hpsdf/error.h"
+#include "image/color.h"
 #include "view/view_checks.h"
 
 namespace hpsdf::render {
@@ -13,6 +15,18 @@ constexpr std::size_t kMostPixels = std::size_t{1} << 26;
 constexpr double kLeastDepth = 1e-5;  // least visible depth in perspective, in parts of the farthest depth
 
 }  // namespace
+
+Color bodyColor(std::size_t index) {
+  // Hues run from green over blue to pink, far from the clay's orange, in steps of the golden section. Three
+  // lightnesses alternate.
+  constexpr double kFirstHue = 125, kHues = 225, kChroma = 0.11;
+  constexpr double kLightness[] = {0.66, 0.78, 0.56};
+  const double turns = 0.6180339887498949 * double(index % 1000000);
+  return encodeSrgb(fromOklch(kLightness[index % 3], kChroma, kFirstHue + kHues * (turns - std::floor(turns))));
+}
+
+// The destructor is defined here so that the virtual table exists once, in this library.
+BodyRenderer::~BodyRenderer() = default;
 
 void checkBodyView(const Camera& camera, int width, int height) {
   checkCamera(camera, width, height);
@@ -42,6 +56,16 @@ BodyBuffers emptyBodyBuffers(int width, int height) {
   buffers.normal.assign(pixels, Eigen::Vector3f::Zero());
   buffers.distance.assign(pixels, 0);
   return buffers;
+}
+
+void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const BodyPoint& point, std::size_t pixel,
+              BodyBuffers& buffers) {
+  const Body& body = bodies[point.body];
+  const Vector3 normal = body.worldFromBody.linear() * meshes[body.mesh].normal(point.triangle, point.barycentric);
+  buffers.body[pixel] = point.body;
+  buffers.triangle[pixel] = point.triangle;
+  buffers.normal[pixel] = (point.fromBehind ? Vector3(-normal) : normal).cast<float>();
+  buffers.distance[pixel] = static_cast<float>(point.distance);
 }
 
 void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers) {

@@ -1,7 +1,7 @@
 #pragma once
 // Parts of a view of bodies that both body renderers share.
 
-#include "hpsdf/render/bodies.h"
+#include "scene/body_meshes.h"
 
 namespace hpsdf::render {
 
@@ -16,6 +16,16 @@ double leastDepth(const Camera& camera, double farthest);
 
 /// Buffers in which no pixel shows a body.
 BodyBuffers emptyBodyBuffers(int width, int height);
+
+/// The point of a body that a pixel sees.
+struct BodyPoint {
+  std::uint32_t body, triangle;
+  double distance;  ///< along the pixel's ray from its start, world units
+  Vector3 barycentric;
+  bool fromBehind;  ///< whether the ray meets the side from which the triangle's corners run clockwise
+};
+void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const BodyPoint& point, std::size_t pixel,
+              BodyBuffers& buffers);
 
 /// Shows in `buffers` each body that is nearer than what the pixel shows.
 void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers);

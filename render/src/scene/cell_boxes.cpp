@@ -3,32 +3,23 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <limits>
 #include <optional>
 
-#include "scene/cell_selection.h"
 #include "scene/pixel_rows.h"
 #include "scene/section.h"
+#include "view/grid_space.h"
 
 namespace hpsdf::render {
 namespace {
 
-/// The rectangle of the pixels that may see a box: the whole view for a box that extends behind the eye.
+/// The pixels that may see a box.
 PixelRect rectOf(const Box& box, const Camera& camera, int width, int height) {
-  Eigen::AlignedBox2d seen;
-  int behind = 0;
-  for (const Vector3& corner : cornersOf(box)) {
-    const PicturePoint p = project(camera, corner, width, height);
-    if (p.depth > 0)
-      seen.extend(Eigen::Vector2d(p.x, p.y));
-    else
-      ++behind;
-  }
-  if (behind == 8) return {};
-  if (behind > 0) return {0, 0, width, height};
-  const auto clamped = [](double pixel, int pixels) { return int(std::clamp(pixel, 0.0, double(pixels))); };
-  return {clamped(std::floor(seen.min().x()), width), clamped(std::floor(seen.min().y()), height),
-          clamped(std::ceil(seen.max().x()), width), clamped(std::ceil(seen.max().y()), height)};
+  std::array<PicturePoint, 8> corners;
+  std::ranges::transform(cornersOf(box), corners.begin(),
+                         [&](const Vector3& corner) { return project(camera, corner, width, height); });
+  return pixelsAround(corners, std::numeric_limits<double>::min(), width, height);
 }
 
 struct BoxRay {
@@ -82,16 +73,6 @@ std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& c
   return boxes;
 }
 
-void show(const CellBox& box, const Entry& entry, const BoxRay& ray, std::size_t i, ViewBuffers& buffers) {
-  buffers.cell[i] = box.cell->id;
-  buffers.degree[i] = static_cast<std::uint8_t>(box.cell->degree);
-  buffers.depth[i] = static_cast<std::uint8_t>(box.cell->depth);
-  buffers.normal[i] = (ray.direction[entry.axis] > 0 ? -1.0F : 1.0F) * Eigen::Vector3f::Unit(entry.axis);
-  buffers.distance[i] = static_cast<float>(entry.distance);
-  buffers.crack[i] = 0;
-  buffers.shown[i] = Shown::box;
-}
-
 /// Sets f in the pixels that show boxes, in the rows from y0 on to which the rays belong.
 void addValues(const Field& field, int y0, const std::vector<BoxRay>& rays, ViewBuffers& buffers) {
   const std::size_t first = std::size_t(y0) * buffers.width;
@@ -108,6 +89,34 @@ void addValues(const Field& field, int y0, const std::vector<BoxRay>& rays, View
 }
 
 }  // namespace
+
+std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice) {
+  const auto among = [](const std::vector<int>& levels, int level) {
+    return levels.empty() || std::ranges::find(levels, level) != levels.end();
+  };
+  std::vector<Cell> cells;
+  field.forEachCell([&](const Cell& cell) {
+    if (among(choice.degrees, cell.degree) && among(choice.depths, cell.depth)) cells.push_back(cell);
+  });
+  return cells;
+}
+
+Box clipped(Box box, const SurfaceView& view) {
+  if (!view.clip) return box;
+  const auto [axis, offset] = *view.clip;
+  if (eyeAbove(view.camera, *view.clip))
+    box.max()[axis] = std::min(box.max()[axis], offset);
+  else
+    box.min()[axis] = std::max(box.min()[axis], offset);
+  if (!(box.min()[axis] < box.max()[axis])) box.setEmpty();
+  return box;
+}
+
+std::array<Vector3, 8> cornersOf(const Box& box) {
+  std::array<Vector3, 8> corners;
+  for (int i = 0; i < 8; ++i) corners[i] = box.corner(Box::CornerType(i));
+  return corners;
+}
 
 void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells, ViewBuffers& buffers) {
   prepareShown(buffers);
@@ -130,7 +139,8 @@ void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cel
           const BoxRay& ray = rays[std::size_t(y - y0) * width + x];
           const auto entry = enter(ray, boxes[n].box);
           if (entry && !(buffers.hit(i) && buffers.distance[i] <= static_cast<float>(entry->distance)))
-            show(boxes[n], *entry, ray, i, buffers);
+            showCell(*boxes[n].cell, Shown::box, entry->distance, Vector3::Unit(entry->axis), ray.direction, i,
+                     buffers);
         }
     }
     addValues(field, y0, rays, buffers);

@@ -1,11 +1,23 @@
 #pragma once
+// Cells of the octree in the picture of a surface: which of them are shown, and how they are drawn as boxes.
 
+#include <array>
 #include <vector>
 
 #include "hpsdf/field.h"
+#include "hpsdf/render/shown_cells.h"
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
+
+/// The leaves of the chosen degrees and depths, in the order of the octree.
+std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice);
+
+/// The part of a box that the view's clipping plane leaves; empty where the plane leaves nothing or only a face.
+Box clipped(Box box, const SurfaceView& view);
+
+/// The corners of a box; bit k of a corner's index is set where its coordinate along axis k is the greater one.
+std::array<Vector3, 8> cornersOf(const Box& box);
 
 /// The edges of a drawn box in parts of those of its cell: below 1, so that the camera sees between boxes.
 constexpr double kBoxShare = 0.8;

@@ -8,7 +8,8 @@
 #include <cmath>
 
 #include "image/color.h"
-#include "scene/cell_selection.h"
+#include "image/strokes.h"
+#include "scene/cell_boxes.h"
 #include "scene/pixel_rows.h"
 
 namespace hpsdf::render {
@@ -41,57 +42,54 @@ struct EdgeKey {
   bool operator==(const EdgeKey&) const = default;
 };
 
-/// A hash set of edges, by open addressing: faster than `std::unordered_set` by a multiple.
-class EdgeSet {
+/// Collects the edges of cells, each once.
+class EdgeCollector {
  public:
-  explicit EdgeSet(std::size_t most) : slots_(std::bit_ceil(2 * most + 1), 0) { keys_.reserve(most); }
+  EdgeCollector(const Field& field, std::size_t mostCells)
+      : lower_(field.domain().min()),
+        cellsPerUnit_(Vector3(field.grid()[0], field.grid()[1], field.grid()[2]).cwiseQuotient(field.domain().sizes()) *
+                      std::ldexp(1.0, kMaxDepth)),
+        slots_(std::bit_ceil(24 * mostCells + 1), 0) {
+    keys_.reserve(12 * mostCells);
+  }
 
-  /// Adds an edge. Returns whether it was not in the set.
-  bool add(const EdgeKey& key) {
+  /// Adds the edges of `box`, the part of a cell that a clipping plane leaves.
+  void add(const Cell& cell, const Box& box) {
+    const Vector3 first = (cell.box.min() - lower_).cwiseProduct(cellsPerUnit_);
+    const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
+    const std::array<Vector3, 8> corners = cornersOf(box);
+    for (int edge = 0; edge < 12; ++edge) {
+      // Edges 0 to 3 run along x, 4 to 7 along y, 8 to 11 along z; the two low bits choose the sides of the other axes.
+      const int axis = edge / 4, from = (edge & 1) << (axis + 1) % 3 | (edge >> 1 & 1) << (axis + 2) % 3;
+      EdgeKey key{{}, std::uint64_t(cell.depth) * 3 + axis};
+      for (int k = 0; k < 3; ++k) key.from[k] = std::uint64_t(std::llround(first[k])) + (from >> k & 1 ? size : 0);
+      if (insert(key)) segments.push_back({corners[from], corners[from | 1 << axis], cell.box.sizes()[axis]});
+    }
+  }
+
+  std::vector<Segment> segments;
+
+ private:
+  /// Returns whether the edge is new. The hash set with open addressing is faster than `std::unordered_set` by a
+  /// multiple.
+  bool insert(const EdgeKey& key) {
     std::uint64_t hash = key.kind;
     for (const std::uint64_t x : key.from) hash = (hash ^ x) * 0x9e3779b97f4a7c15;
     for (std::size_t i = hash >> 32;; ++i) {
       std::uint32_t& slot = slots_[i & (slots_.size() - 1)];
-      if (slot == 0) {
-        keys_.push_back(key);
-        slot = static_cast<std::uint32_t>(keys_.size());
-        return true;
-      }
-      if (keys_[slot - 1] == key) return false;
+      if (slot != 0 && keys_[slot - 1] == key) return false;
+      if (slot != 0) continue;
+      keys_.push_back(key);
+      slot = static_cast<std::uint32_t>(keys_.size());
+      return true;
     }
   }
 
- private:
+  Vector3 lower_;
+  Vector3 cellsPerUnit_;              ///< number of cells of the greatest depth in a unit of length, along each axis
   std::vector<std::uint32_t> slots_;  ///< index of a key + 1, or 0 for a free slot
   std::vector<EdgeKey> keys_;
 };
-
-/// The edges of the cells that `mayShow` accepts, each once, cut by the clipping plane.
-template <typename MayShow>
-std::vector<Segment> edgesOf(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
-                             const MayShow& mayShow) {
-  const Vector3 lower = field.domain().min();
-  const Vector3 cellsPerUnit =
-      Vector3(field.grid()[0], field.grid()[1], field.grid()[2]).cwiseQuotient(field.domain().sizes()) *
-      std::ldexp(1.0, kMaxDepth);
-  EdgeSet known(12 * cells.size());
-  std::vector<Segment> segments;
-  for (const Cell& cell : cells) {
-    const Box box = clipped(cell.box, view);
-    if (box.isEmpty() || !mayShow(cell.box)) continue;
-    const Vector3 first = (cell.box.min() - lower).cwiseProduct(cellsPerUnit);
-    const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
-    const std::array<Vector3, 8> corners = cornersOf(box);
-    for (int i = 0; i < 8; ++i)
-      for (int axis = 0; axis < 3; ++axis) {
-        if (i >> axis & 1) continue;
-        EdgeKey key{{}, std::uint64_t(cell.depth) * 3 + axis};
-        for (int k = 0; k < 3; ++k) key.from[k] = std::uint64_t(std::llround(first[k])) + (i >> k & 1 ? size : 0);
-        if (known.add(key)) segments.push_back({corners[i], corners[i | 1 << axis], cell.box.sizes()[axis]});
-      }
-  }
-  return segments;
-}
 
 /// Draws edges into the coverage.
 class EdgePainter {
@@ -138,30 +136,14 @@ class EdgePainter {
   /// The pixels that an edge may cover; empty for an edge that is not drawn.
   PixelRect rectOf(const Edge& edge) const {
     if (edge.strength <= 0) return {};
-    const auto low = [&](double p, double q, int most) {
-      return int(std::clamp(std::floor(std::min(p, q) - radius_), 0.0, double(most)));
-    };
-    const auto high = [&](double p, double q, int most) {
-      return int(std::clamp(std::ceil(std::max(p, q) + radius_), 0.0, double(most)));
-    };
-    return {low(edge.from.x, edge.to.x, buffers_.width), low(edge.from.y, edge.to.y, buffers_.height),
-            high(edge.from.x, edge.to.x, buffers_.width), high(edge.from.y, edge.to.y, buffers_.height)};
+    return pixelsNear({edge.from.x, edge.from.y}, {edge.to.x, edge.to.y}, radius_,
+                      {0, 0, buffers_.width, buffers_.height});
   }
 
   /// Draws the part of an edge in the rows from y0 to y1 − 1.
   void paint(const Edge& edge, int y0, int y1) const {
-    const PixelRect rect = rectOf(edge);
-    const double dx = edge.to.x - edge.from.x, dy = edge.to.y - edge.from.y, length = std::hypot(dx, dy);
-    for (int y = std::max(y0, rect.y0); y < std::min(y1, rect.y1); ++y) {
-      double left = rect.x0, right = rect.x1;
-      // Restrict the row to the band about the infinite line.
-      if (std::abs(dy) > 1e-6 * length) {
-        const double x = edge.from.x + (y + 0.5 - edge.from.y) / dy * dx, half = radius_ * length / std::abs(dy);
-        left = std::clamp(std::floor(x - half), left, right);
-        right = std::clamp(std::ceil(x + half), left, right);
-      }
-      for (int x = int(left); x < int(right); ++x) paintPixel(edge, dx, dy, length, x, y);
-    }
+    forEachPixelNear({edge.from.x, edge.from.y}, {edge.to.x, edge.to.y}, radius_, {0, y0, buffers_.width, y1},
+                     [&](const NearPixel& near) { paintPixel(edge, near); });
   }
 
  private:
@@ -170,14 +152,9 @@ class EdgePainter {
     return length / pixelSize(camera_, std::max(depth, nearDepth_), buffers_.height);
   }
 
-  void paintPixel(const Edge& edge, double dx, double dy, double length, int x, int y) const {
-    // Find the share of the pixel that the line covers, by the distance of the pixel's middle from the segment.
-    const double fromX = x + 0.5 - edge.from.x, fromY = y + 0.5 - edge.from.y;
-    const double t = length > 0 ? std::clamp((fromX * dx + fromY * dy) / (length * length), 0.0, 1.0) : 0.0;
-    const double acrossX = fromX - t * dx, acrossY = fromY - t * dy, square = acrossX * acrossX + acrossY * acrossY;
-    if (square >= radius_ * radius_) return;
-    const double covered = std::min(radius_ - std::sqrt(square), 1.0);
-    const std::size_t i = std::size_t(y) * buffers_.width + x;
+  void paintPixel(const Edge& edge, const NearPixel& near) const {
+    const double t = near.t, covered = std::min(radius_ - near.distance, 1.0);
+    const std::size_t i = std::size_t(near.y) * buffers_.width + near.x;
     // Find the parameter s of the point in space: equal steps in a perspective picture are not equal steps in space.
     const double toFar = parallel_ ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel_ ? t : t * edge.from.depth;
     const double s = toNear / (toFar + toNear);
@@ -211,8 +188,10 @@ std::vector<float> cellLines(const Field& field, const SurfaceView& view, const 
                              const ViewBuffers& buffers, double lineWidth) {
   std::vector<float> coverage(buffers.cell.size(), 0.0F);
   const EdgePainter painter(view.camera, field.domain(), buffers, lineWidth, coverage);
-  const auto mayShow = [&](const Box& box) { return painter.mayShow(box); };
-  const std::vector<Segment> segments = edgesOf(field, view, cells, mayShow);
+  EdgeCollector collector(field, cells.size());
+  for (const Cell& cell : cells)
+    if (const Box box = clipped(cell.box, view); !box.isEmpty() && painter.mayShow(cell.box)) collector.add(cell, box);
+  const std::vector<Segment>& segments = collector.segments;
   std::vector<Edge> edges(segments.size());
   std::vector<PixelRect> rects(segments.size());
   tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t n) {

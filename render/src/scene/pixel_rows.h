@@ -3,12 +3,36 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "hpsdf/render/view.h"
 #include "image/pixel_rect.h"
 
 namespace hpsdf::render {
+
+/// The pixels of a view whose middles may lie in the hull of these points: none where all depths are below
+/// `leastDepth`, and the whole view where only some are, because the hull then extends behind the eye.
+inline PixelRect pixelsAround(std::span<const PicturePoint> points, double leastDepth, int width, int height) {
+  constexpr double kMargin = 1e-6;  // for rounding, pixels
+  Eigen::AlignedBox2d hull;
+  std::size_t behind = 0;
+  for (const PicturePoint& p : points) {
+    if (p.depth >= leastDepth)
+      hull.extend(Eigen::Vector2d(p.x, p.y));
+    else
+      ++behind;
+  }
+  if (behind == points.size()) return {};
+  if (behind > 0) return {0, 0, width, height};
+  const auto clamped = [](double pixel, int pixels) { return int(std::clamp(pixel, 0.0, double(pixels))); };
+  return {clamped(std::ceil(hull.min().x() - 0.5 - kMargin), width),
+          clamped(std::ceil(hull.min().y() - 0.5 - kMargin), height),
+          clamped(std::floor(hull.max().x() + 0.5 + kMargin), width),
+          clamped(std::floor(hull.max().y() + 0.5 + kMargin), height)};
+}
 
 /// Draws things with known rectangles in parallel: calls fill(y0, y1, indices) for strips of 16 rows, where `indices`
 /// are those of the rectangles that meet the rows, ascending. The result does not depend on the number of threads as

@@ -24,28 +24,6 @@ struct PlaneHit {
   Vector3 ray;  ///< unit direction of the ray
 };
 
-/// The axis that a direction is parallel to, or −1.
-int axisAlong(const Vector3& direction) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (direction[(axis + 1) % 3] == 0 && direction[(axis + 2) % 3] == 0) return axis;
-  return -1;
-}
-
-/// Writes a plane's cell, value, normal and distance to the pixel of a hit.
-void show(const Field& field, const ScenePlane& plane, const PlaneHit& hit, double value, Shown shown,
-          ViewBuffers& buffers) {
-  const std::size_t i = hit.pixel;
-  const Cell cell = field.cellAt(hit.point + plane.lookupOffset);
-  buffers.cell[i] = cell.id;
-  buffers.degree[i] = static_cast<std::uint8_t>(cell.degree);
-  buffers.depth[i] = static_cast<std::uint8_t>(cell.depth);
-  buffers.value[i] = static_cast<float>(value);
-  buffers.normal[i] = (plane.normal.dot(hit.ray) > 0 ? Vector3(-plane.normal) : plane.normal).cast<float>();
-  buffers.distance[i] = static_cast<float>(hit.distance);
-  buffers.crack[i] = 0;
-  buffers.shown[i] = shown;
-}
-
 /// Shows the part of a plane within the domain where `visible(hit)` and `keeps(value)` hold.
 template <typename Visible, typename Keeps>
 void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& plane, Shown shown,
@@ -70,12 +48,33 @@ void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& p
     }
     std::vector<double> values(points.size());
     field.values(points, values);
-    for (std::size_t n = 0; n < hits.size(); ++n)
-      if (keeps(values[n])) show(field, plane, hits[n], values[n], shown, buffers);
+    for (std::size_t n = 0; n < hits.size(); ++n) {
+      if (!keeps(values[n])) continue;
+      const PlaneHit& hit = hits[n];
+      showCell(field.cellAt(points[n]), shown, hit.distance, plane.normal, hit.ray, hit.pixel, buffers);
+      buffers.value[hit.pixel] = static_cast<float>(values[n]);
+    }
   });
 }
 
 }  // namespace
+
+int axisAlong(const Vector3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (direction[(axis + 1) % 3] == 0 && direction[(axis + 2) % 3] == 0) return axis;
+  return -1;
+}
+
+void showCell(const Cell& cell, Shown shown, double distance, const Vector3& normal, const Vector3& ray,
+              std::size_t pixel, ViewBuffers& buffers) {
+  buffers.cell[pixel] = cell.id;
+  buffers.degree[pixel] = static_cast<std::uint8_t>(cell.degree);
+  buffers.depth[pixel] = static_cast<std::uint8_t>(cell.depth);
+  buffers.normal[pixel] = (normal.dot(ray) > 0 ? Vector3(-normal) : normal).cast<float>();
+  buffers.distance[pixel] = static_cast<float>(distance);
+  buffers.crack[pixel] = 0;
+  buffers.shown[pixel] = shown;
+}
 
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers) {
   if (!view.clip) return;

@@ -56,6 +56,9 @@ class ScaledRenderer final : public Renderer {
 
 }  // namespace
 
+// The destructor is defined here so that the virtual table exists once, in this library.
+Renderer::~Renderer() = default;
+
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make) {
   constexpr int kGreatestExponent = 30;
   const int exponent = std::ilogb(field.domain().sizes().maxCoeff());

@@ -79,16 +79,13 @@ std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vect
   for (std::size_t n = bounds.size(); n-- > 0;) {
     if (node::isLeaf(field.nodes[n])) continue;
     const SurfaceBounds* children = &bounds[node::firstChild(field.nodes[n])];
-    bounds[n] = {.lo = children[0].lo,
-                 .hi = children[0].hi,
-                 .gradientDeviation = -1,
-                 .valueDeviation = 0,
-                 .secondDerivative = 0,
-                 .linear = {}};
+    SurfaceBounds& parent = bounds[n];
+    parent = children[0];
     for (int child = 1; child < 8; ++child) {
-      bounds[n].lo = std::min(bounds[n].lo, children[child].lo);
-      bounds[n].hi = std::max(bounds[n].hi, children[child].hi);
+      parent.lo = std::min(parent.lo, children[child].lo);
+      parent.hi = std::max(parent.hi, children[child].hi);
     }
+    parent = {parent.lo, parent.hi, -1, 0, 0, {}};
   }
   return bounds;
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "hpsdf/error.h"
+#include "image/text.h"
 #include "view/view_size.h"
 
 namespace hpsdf::render {
@@ -14,11 +15,7 @@ namespace {
 constexpr double kSectionMargin = 0.025;  // margin around the section, in parts of the picture's width or height
 constexpr double kRayMargin = 0.01;       // distance from the start of parallel rays to the domain, in domain diagonals
 
-std::string text(double x) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", x);
-  return buffer;
-}
+std::string text(double x) { return printed("%.6g", x); }
 
 void checkDomain(const Box& domain) {
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite())

@@ -22,4 +22,15 @@ inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   return buffers;
 }
 
+/// The index of the middle sample of a pixel, in buffers that hold samples × samples for each pixel.
+inline std::size_t middleSample(const ViewBuffers& buffers, int samples, int x, int y) {
+  return std::size_t(y * samples + samples / 2) * buffers.width + std::size_t(x * samples + samples / 2);
+}
+
+/// Returns true if a pixel shows something that is nearer to the eye than `distance` by more than `tolerance`.
+inline bool hides(const ViewBuffers& buffers, int samples, int x, int y, double distance, double tolerance) {
+  const std::size_t i = middleSample(buffers, samples, x, y);
+  return buffers.covered(i) && distance > double(buffers.distance[i]) + tolerance;
+}
+
 }  // namespace hpsdf::render

@@ -29,10 +29,12 @@ namespace hpsdf::render {
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const ReferenceData& reference = {});
 
+using View = std::variant<SliceView, SurfaceView>;
+
 /// A finished picture with the view that it shows.
 struct Drawn {
   Image image;
-  std::variant<SliceView, SurfaceView> view;
+  View view;
   ViewBuffers buffers;  ///< samples × samples for each pixel of the view
   int samples = 1;
   bool seen = false;  ///< true if any pixel shows the field
@@ -63,23 +65,19 @@ std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y)
 
 /// The quantity at each pixel of a view's buffers; NaN where the pixel does not show the field. Throws `Error` where
 /// the reference data that the quantity needs is missing.
-std::vector<float> quantityAt(const Field& field, const SliceView& view, const ViewBuffers& buffers, ColorBy quantity,
-                              const ReferenceData& reference);
-std::vector<float> quantityAt(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, ColorBy quantity,
+std::vector<float> quantityAt(const Field& field, const View& view, const ViewBuffers& buffers, ColorBy quantity,
                               const ReferenceData& reference);
 
 /// True if the surface f = offset meets the walls of the domain, where tracing cuts it off. The signs of f − offset at
 /// 40 × 40 points of each wall decide, so that a piece smaller than the points' spacing may be missed.
 bool meetsWalls(const Field& field, double offset);
 
-/// Size in pixels of the view within a picture of this size, without legend and caption. `draw` asks the renderer for
+/// Size in pixels of the view within a picture, without legend and caption. `draw` asks the renderer for
 /// `samples` times as many pixels along each axis.
 struct ViewSize {
   int width = 0;
   int height = 0;
 };
-ViewSize viewSize(int pictureWidth, int pictureHeight);
-/// Size of the view in a picture that may be bare or have the caller's caption.
 ViewSize viewSize(const SurfacePicture& picture);
 
 /// The view that `draw` colours. Its pixels are square at `viewSize`.

@@ -1,4 +1,4 @@
-#include "gl/program.h"
+#include "gl/gl_objects.h"
 
 #include <algorithm>
 #include <string>
@@ -68,6 +68,13 @@ GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
   checkLog(ok, "the OpenGL driver does not link the shader " + names(fragmentFiles), glGetProgramInfoLog,
            program.name());
   return program;
+}
+
+void checkGl(const char* what) {
+  const GLenum error = glGetError();
+  if (error == GL_NO_ERROR) return;
+  throw Error(std::string("the OpenGL device fails to ") + what + " (error " + std::to_string(error) +
+              "): render a smaller picture, or with --cpu");
 }
 
 }  // namespace hpsdf::render

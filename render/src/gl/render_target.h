@@ -1,0 +1,101 @@
+#pragma once
+// Render targets, and the tiles in which large views are drawn.
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <type_traits>
+#include <vector>
+
+#include "gl/gl_objects.h"
+#include "hpsdf/error.h"
+#include "hpsdf/render/view.h"
+
+namespace hpsdf::render {
+
+/// Greatest width and height of a tile in pixels, small enough for the render targets of any device.
+constexpr int kTile = 2048;
+
+/// A part of a view that is drawn in one piece.
+struct Tile {
+  int left, top, width, height;
+};
+
+/// The tiles that cover a part of a view.
+inline std::vector<Tile> tiles(const Tile& part) {
+  std::vector<Tile> result;
+  for (int y = 0; y < part.height; y += kTile)
+    for (int x = 0; x < part.width; x += kTile)
+      result.push_back(
+          {part.left + x, part.top + y, std::min(kTile, part.width - x), std::min(kTile, part.height - y)});
+  return result;
+}
+
+/// Calls f(index, x, y) for each pixel of a tile, in several threads: its index within the tile and its place in the
+/// view. Rows of a target run downwards, as in a view.
+template <typename F>
+void forEachPixel(const Tile& tile, const F& f) {
+  tbb::parallel_for(0, tile.height, [&](int y) {
+    for (int x = 0; x < tile.width; ++x) f(std::size_t(y) * tile.width + x, tile.left + x, tile.top + y);
+  });
+}
+
+/// The render target of the tiles of a part of a view: integers, and four floats or a depth a pixel.
+class RenderTarget {
+ public:
+  /// `integers` and `other` are the formats of the two. Throws `Error` where the device cannot draw into the target.
+  RenderTarget(const Tile& part, GLenum integers, GLenum other) : hasDepth_(other == GL_DEPTH_COMPONENT32F) {
+    const int width = std::min(part.width, kTile), height = std::min(part.height, kTile);
+    glTextureStorage2D(integers_.name(), 1, integers, width, height);
+    glTextureStorage2D(other_.name(), 1, other, width, height);
+    for (const GLuint texture : {integers_.name(), other_.name()}) {
+      // Integer textures cannot be read with the default filters.
+      glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+      glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    }
+    constexpr GLenum kColors[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    glNamedFramebufferTexture(framebuffer_.name(), kColors[0], integers_.name(), 0);
+    glNamedFramebufferTexture(framebuffer_.name(), hasDepth_ ? GL_DEPTH_ATTACHMENT : kColors[1], other_.name(), 0);
+    glNamedFramebufferDrawBuffers(framebuffer_.name(), hasDepth_ ? 1 : 2, kColors);
+    if (glCheckNamedFramebufferStatus(framebuffer_.name(), GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+      throw Error("the OpenGL device cannot render into 32-bit buffers: update its driver, or render with --cpu");
+  }
+
+  void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
+
+  /// Sets all pixels to no cell or body, and to no normal or an infinite distance.
+  void clear() const {
+    static_assert(kNoCell == kNoBody);
+    constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
+    constexpr GLfloat kZero[] = {0, 0, 0, 0};
+    glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
+    glClearNamedFramebufferfv(framebuffer_.name(), hasDepth_ ? GL_DEPTH : GL_COLOR, hasDepth_ ? 0 : 1, kZero);
+  }
+
+  /// Binds integers and floats as textures to the units 2 and 3.
+  void bindForReading() const {
+    glBindTextureUnit(2, integers_.name());
+    glBindTextureUnit(3, other_.name());
+  }
+
+  /// Reads the integers or the floats of a tile's pixels.
+  template <typename Channel, std::size_t channels>
+  void read(const Tile& tile, std::vector<std::array<Channel, channels>>& out) const {
+    constexpr bool kIntegers = std::is_integral_v<Channel>;
+    out.resize(std::size_t(tile.width) * tile.height);
+    glNamedFramebufferReadBuffer(framebuffer_.name(), kIntegers ? GL_COLOR_ATTACHMENT0 : GL_COLOR_ATTACHMENT1);
+    glReadPixels(0, 0, tile.width, tile.height,
+                 !kIntegers      ? GL_RGBA
+                 : channels == 2 ? GL_RG_INTEGER
+                                 : GL_RGBA_INTEGER,
+                 kIntegers ? GL_UNSIGNED_INT : GL_FLOAT, out.data());
+  }
+
+ private:
+  bool hasDepth_;
+  GlTexture2D integers_, other_;
+  GlFramebuffer framebuffer_;
+};
+
+}  // namespace hpsdf::render
