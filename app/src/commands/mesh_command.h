@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Returns the command `mesh`. It shares parameters of `render`, which the registry must contain already.
-Command meshCommand(const Registry& registry);
+/// Adds the command `mesh`. It shares parameters of `render`, which the registry must contain already.
+void addMeshCommand(Registry& registry);
 
 }  // namespace hpsdf::app
