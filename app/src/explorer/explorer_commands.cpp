@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "construction/build_arguments.h"
 #include "explorer/explorer.h"

@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "hpsdf/detail/nearest_name.h"
-#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -10,7 +10,6 @@
 #include "session/field_summary.h"
 #include "session/session.h"
 #include "text/json.h"
-#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
