@@ -12,8 +12,8 @@
 #include <thread>
 
 #include "cli_fixture.h"
+#include "commands/point_query.h"
 #include "hpsdf/field_file.h"
-#include "language/point_query.h"
 #include "support/one_leaf_field.h"
 
 namespace hpsdf::app {

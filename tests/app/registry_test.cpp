@@ -61,7 +61,7 @@ TEST(Registry, everyCommandExplainsItself) {
       EXPECT_TRUE(parameters.insert(parameter.name).second);
       EXPECT_FALSE(parameter.help.empty());
       EXPECT_THAT(commandHelp(command, HelpDetail::all),
-                  HasSubstr(parameter.positional ? parameter.valueName : "--" + parameter.name));
+                  HasSubstr(parameter.isPositional ? parameter.valueName : "--" + parameter.name));
     }
   }
 }

@@ -22,28 +22,26 @@ using testing::HasSubstr;
 class Script : public testing::Test {
  protected:
   Script() {
-    registry_.add(
-        {.name = "say",
-         .parameters = {{.name = "words", .positional = true, .repeatable = true},
-                        {.name = "count", .type = ParameterType::wholeNumber, .defaultText = "1", .minimum = 1},
-                        {.name = "loud", .type = ParameterType::flag, .defaultText = "false"},
-                        {.name = "output", .type = ParameterType::outputPath, .alias = 'o'}},
-         .action = [this](Session&, const Arguments& arguments) {
-           std::string line = arguments.flag("loud") ? "LOUD" : "";
-           for (const std::string& word : arguments.texts("words")) line += "[" + word + "]";
-           if (arguments.given("count")) line += "x" + arguments.text("count");
-           if (arguments.given("output")) line += ">" + arguments.text("output");
-           said_.push_back(line);
-         }});
+    registry_.add({.name = "say",
+                   .parameters = {{"words", text().positional().repeatable(), ""},
+                                  {"count", wholeNumber().atLeast(1).byDefault("1"), ""},
+                                  {"loud", flag(), ""},
+                                  {"output", outputFile().as('o'), ""}},
+                   .action = [this](Session&, const Arguments& arguments) {
+                     std::string line = arguments.flag("loud") ? "LOUD" : "";
+                     for (const std::string& word : arguments.texts("words")) line += "[" + word + "]";
+                     if (arguments.given("count")) line += "x" + arguments.text("count");
+                     if (arguments.given("output")) line += ">" + arguments.text("output");
+                     said_.push_back(line);
+                   }});
     registry_.add({.name = "fail", .action = [](Session&, const Arguments&) { throw Error("it failed"); }});
-    registry_.add(
-        {.name = "set",
-         .parameters = {{.name = "assignments", .positional = true, .repeatable = true, .need = Need::always}},
-         .action = [](Session&, const Arguments&) {},
-         .takesVariables = true,
-         .definesVariables = true});
+    registry_.add({.name = "set",
+                   .parameters = {{"assignments", text().positional().repeatable().required(), ""}},
+                   .action = [](Session&, const Arguments&) {},
+                   .takesVariables = true,
+                   .definesVariables = true});
     registry_.add({.name = "include",
-                   .parameters = {{.name = "script", .positional = true, .need = Need::always}},
+                   .parameters = {{"script", text().positional().required(), ""}},
                    .action = [](Session&, const Arguments&) {},
                    .includesScript = true});
   }

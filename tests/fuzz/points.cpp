@@ -4,7 +4,7 @@
 #include <sstream>
 #include <string>
 
-#include "language/point_query.h"
+#include "commands/point_query.h"
 #include "support/one_leaf_field.h"
 #include "target.h"
 

@@ -15,9 +15,9 @@
 #include "files/data_table.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/compare.h"
-#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -263,7 +263,7 @@ void refuseUnknown(const std::vector<std::string>& names, const std::vector<std:
   for (const std::string& name : only) {
     if (std::ranges::find(names, name) != names.end()) continue;
     throw Error(fmt::format("no script is named '{}'; {}", name,
-                            suggestion(name, names, "give the name of its file without .hps")));
+                            didYouMean(name, names, "give the name of its file without .hps")));
   }
 }
 

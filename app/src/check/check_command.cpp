@@ -10,6 +10,7 @@
 #include "console/version.h"
 #include "files/data_table.h"
 #include "files/text_file.h"
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/render/image.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -126,7 +127,7 @@ Json resultNamed(const std::string& name, const Json& results, const fs::path& f
     if (names.back() == name) return item;
   }
   throw Error(fmt::format("the last check wrote no picture '{}'; {}", name,
-                          suggestion(name, names, "expected SCRIPT/PICTURE.png")));
+                          didYouMean(name, names, "expected SCRIPT/PICTURE.png")));
 }
 
 std::array<std::size_t, 2> sizeOf(const fs::path& file) {
@@ -178,91 +179,55 @@ void runAccept(Session& session, const Arguments& arguments) {
   for (const Json& one : accepted) session.console().out << acceptedText(one);
 }
 
-const Parameter kFolder = {.name = "folder",
-                           .type = ParameterType::path,
-                           .help = "Folder that holds scripts/NAME.hps and baselines/NAME/PICTURE.png.",
-                           .valueName = "FOLDER",
-                           .positional = true,
-                           .need = Need::always};
-
-const Command kCheck = {
-    .name = "check",
-    .summary = "Run a folder's scripts and compare their pictures with its baselines.",
-    .help =
-        "Each script of FOLDER/scripts runs in a session of its own and writes pictures (.png) and raw values (.csv, "
-        ".pfm) into $out. Each result is compared with its baseline in FOLDER/baselines/SCRIPT. A check fails where "
-        "sizes differ, too many pixels differ, a baseline is missing or no script writes it, a script fails, or a "
-        "picture that must be rejected passes.\n"
-        "\n"
-        "The output folder receives all results, the differences, and one page that shows the failures and can be "
-        "mailed. docs/check.md is the manual.\n"
-        "\n"
-        "Exit status: 0 nothing failed, 1 a comparison failed, 2 a script failed or bad input.",
-    .examples = {"hpsdf check screenshots mesh=bunny.obj",
-                 "hpsdf check pictures --only gallery --out /tmp/check --junit check.xml"},
-    .parameters = {kFolder,
-                   {.name = "variables",
-                    .type = ParameterType::text,
-                    .help = "Variables of the scripts.",
-                    .valueName = "name=value",
-                    .positional = true,
-                    .repeatable = true},
-                   {.name = "out",
-                    .type = ParameterType::outputPath,
-                    .help = "Folder of the results. Those of an earlier check are removed.",
-                    .defaultText = "check-results",
-                    .valueName = "FOLDER"},
-                   {.name = "only",
-                    .type = ParameterType::text,
-                    .help = "Runs this script instead of all: the name of its file without .hps.",
-                    .valueName = "SCRIPT",
-                    .repeatable = true},
-                   {.name = "junit",
-                    .type = ParameterType::outputPath,
-                    .help = "Writes the results as JUnit XML, for continuous integration."}},
-    .action = runCheck,
-    .takesVariables = true};
-
-const Command kAccept = {
-    .name = "accept",
-    .summary = "Accept pictures of the last check as new baselines, one by one.",
-    .help =
-        "Each NAME is SCRIPT/PICTURE.png as in the table of the check. The picture and a small JSON file with size, "
-        "renderer and version are copied to FOLDER/baselines/SCRIPT. View the pictures first.",
-    .examples = {"hpsdf accept screenshots gallery/degree.png",
-                 "hpsdf accept pictures lines/cracks.png --from /tmp/check --budget 0.005"},
-    .parameters = {kFolder,
-                   {.name = "names",
-                    .type = ParameterType::text,
-                    .help = "Pictures to accept.",
-                    .valueName = "SCRIPT/PICTURE",
-                    .positional = true,
-                    .repeatable = true,
-                    .need = Need::always},
-                   {.name = "from",
-                    .type = ParameterType::path,
-                    .help = "Folder of the check's results.",
-                    .defaultText = "check-results",
-                    .valueName = "FOLDER"},
-                   {.name = "budget",
-                    .type = ParameterType::number,
-                    .help =
-                        "Share of the pixels or values that may differ in future checks. When left out, that of the "
-                        "older baseline, or 0.002.",
-                    .minimum = 0,
-                    .maximum = 1},
-                   {.name = "bound",
-                    .type = ParameterType::number,
-                    .help = "Difference of raw values that future checks accept. When left out, that of the older "
-                            "baseline, or 1e-6.",
-                    .minimum = 0}},
-    .action = runAccept};
+const Parameter kFolder = {"folder", file("FOLDER").positional().required(),
+                           "Folder that holds scripts/NAME.hps and baselines/NAME/PICTURE.png."};
 
 }  // namespace
 
 void addCheckCommands(Registry& registry) {
-  registry.add(kCheck);
-  registry.add(kAccept);
+  registry.add({
+      .name = "check",
+      .summary = "Run a folder's scripts and compare their pictures with its baselines.",
+      .help = paragraphs(R"(
+Each script of FOLDER/scripts runs in a session of its own and writes pictures (.png) and raw values (.csv, .pfm) into
+$out. Each result is compared with its baseline in FOLDER/baselines/SCRIPT. A check fails where sizes differ, too many
+pixels differ, a baseline is missing or no script writes it, a script fails, or a picture that must be rejected passes.
+
+The output folder receives all results, the differences, and one page that shows the failures and can be mailed.
+docs/check.md is the manual.
+
+Exit status: 0 nothing failed, 1 a comparison failed, 2 a script failed or bad input.)"),
+      .examples = {"hpsdf check screenshots mesh=bunny.obj",
+                   "hpsdf check pictures --only gallery --out /tmp/check --junit check.xml"},
+      .parameters = {kFolder,
+                     {"variables", text("name=value").positional().repeatable(), "Variables of the scripts."},
+                     {"out", outputFile("FOLDER").byDefault("check-results"),
+                      "Folder of the results. Those of an earlier check are removed."},
+                     {"only", text("SCRIPT").repeatable(),
+                      "Runs this script instead of all: the name of its file without .hps."},
+                     {"junit", outputFile(), "Writes the results as JUnit XML, for continuous integration."}},
+      .action = runCheck,
+      .takesVariables = true,
+  });
+  registry.add({
+      .name = "accept",
+      .summary = "Accept pictures of the last check as new baselines, one by one.",
+      .help =
+          "Each NAME is SCRIPT/PICTURE.png as in the table of the check. The picture and a small JSON file with size, "
+          "renderer and version are copied to FOLDER/baselines/SCRIPT. View the pictures first.",
+      .examples = {"hpsdf accept screenshots gallery/degree.png",
+                   "hpsdf accept pictures lines/cracks.png --from /tmp/check --budget 0.005"},
+      .parameters =
+          {kFolder,
+           {"names", text("SCRIPT/PICTURE").positional().repeatable().required(), "Pictures to accept."},
+           {"from", file("FOLDER").byDefault("check-results"), "Folder of the check's results."},
+           {"budget", number().within(0, 1),
+            "Share of the pixels or values that may differ in future checks. When left out, that of the older "
+            "baseline, or 0.002."},
+           {"bound", number().atLeast(0),
+            "Difference of raw values that future checks accept. When left out, that of the older baseline, or 1e-6."}},
+      .action = runAccept,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
@@ -101,62 +100,45 @@ void runExport(Session& session, const Arguments& arguments) {
   result << exportText(made, file);
 }
 
-const Command kExport = {
-    .name = "export",
-    .summary = "Write a field as a cubic grid for Bullet or PositionBasedDynamics.",
-    .help =
-        "Writes FILE.cdf, the file format of Discregrid's cubic Lagrange grid: a regular grid over the field's domain "
-        "whose cells interpolate 32 distances at their corners and edges. Bullet loads it by btSdfCollisionShape or "
-        "btMiniSDF (as float or double), PositionBasedDynamics by CubicSDFCollisionDetection.\n"
-        "\n"
-        "Use it for simulations that cannot load .hpsdf files. Lengths are those of the field, negative inside. The "
-        "grid has no distances outside the domain: build the field with a --margin as wide as the deepest contact that "
-        "must be resolved.\n"
-        "\n"
-        "A regular grid follows the field less closely than the field's own cells do. The command measures the "
-        "additional error at random points in the whole domain and near the surface, where |f| is at most one cell "
-        "diagonal. Doubling the number of cells along each axis makes the file eight times as long. It divides the "
-        "error by sixteen where the field is smooth and by two at creases of the distance; it does not reduce the "
-        "jumps between cells of the field.\n"
-        "\n"
-        "The file appears when it is complete. Bullet reads at most 2147 MB, about 224 cells along each axis.",
-    .examples = {"hpsdf export bunny.hpsdf -o bunny.cdf", "hpsdf export bunny.hpsdf -o small.cdf --max-bytes 5e6",
-                 "hpsdf export bunny.hpsdf -o box.cdf --resolution 40,40,30 --json"},
-    .action = runExport,
-    .check = checkExport};
-
 const std::vector<Parameter> kExportParameters = {
-    {.name = "output",
-     .type = ParameterType::outputPath,
-     .help = "File of the grid, *.cdf.",
-     .alias = 'o',
-     .need = Need::always},
-    {.name = "resolution",
-     .type = ParameterType::numbers,
-     .help =
-         "Number of cells. One number counts the cells along the longest side of the domain, which are nearly cubes; "
-         "three numbers count those along x, y and z. Use it instead of max-bytes.",
-     .valueName = "N|NX,NY,NZ",
-     .minimum = 1,
-     .maximum = 1e7,
-     .whole = true,
-     .counts = {1, 3}},
-    {.name = "max-bytes",
-     .type = ParameterType::wholeNumber,
-     .help = "Largest size of the file, e.g. 64e6. The finest grid that fits is written; a cell takes 188 bytes.",
-     .defaultText = "64e6",
-     .unit = "bytes",
-     .minimum = 1,
-     .maximum = double(kMaxCubicGridBytes)}};
+    {"output", outputFile().as('o').required(), "File of the grid, *.cdf."},
+    {"resolution", wholeNumbers("N|NX,NY,NZ", {1, 3}).within(1, 1e7),
+     "Number of cells. One number counts the cells along the longest side of the domain, which are nearly cubes; three "
+     "numbers count those along x, y and z. Use it instead of max-bytes."},
+    {"max-bytes",
+     wholeNumber().within(1, double(kMaxCubicGridBytes)).in("bytes").byDefault("64e6").under(setting_group::kAsked),
+     "Largest size of the file, e.g. 64e6. The finest grid that fits is written; a cell takes 188 bytes."}};
 
 }  // namespace
 
 void addExportCommand(Registry& registry) {
-  registry.add(withParameters(
-      kExport, {{fieldParameter()},
-                kExportParameters,
-                {pointsParameter("Number of random points at which the grid is compared with the field.", "100000", 1),
-                 seedParameter(), threadsParameter("The file is")}}));
+  registry.add({
+      .name = "export",
+      .summary = "Write a field as a cubic grid for Bullet or PositionBasedDynamics.",
+      .help = paragraphs(R"(
+Writes FILE.cdf, the file format of Discregrid's cubic Lagrange grid: a regular grid over the field's domain whose cells
+interpolate 32 distances at their corners and edges. Bullet loads it by btSdfCollisionShape or btMiniSDF (as float or
+double), PositionBasedDynamics by CubicSDFCollisionDetection.
+
+Use it for simulations that cannot load .hpsdf files. Lengths are those of the field, negative inside. The grid has no
+distances outside the domain: build the field with a --margin as wide as the deepest contact that must be resolved.
+
+A regular grid follows the field less closely than the field's own cells do. The command measures the additional error
+at random points in the whole domain and near the surface, where |f| is at most one cell diagonal. Doubling the number
+of cells along each axis makes the file eight times as long. It divides the error by sixteen where the field is smooth
+and by two at creases of the distance; it does not reduce the jumps between cells of the field.
+
+The file appears when it is complete. Bullet reads at most 2147 MB, about 224 cells along each axis.)"),
+      .examples = {"hpsdf export bunny.hpsdf -o bunny.cdf", "hpsdf export bunny.hpsdf -o small.cdf --max-bytes 5e6",
+                   "hpsdf export bunny.hpsdf -o box.cdf --resolution 40,40,30 --json"},
+      .parameters = joined(
+          {{fieldParameter()},
+           kExportParameters,
+           {pointsParameter("Number of random points at which the grid is compared with the field.", "100000", 1),
+            seedParameter(), threadsParameter("The file is")}}),
+      .action = runExport,
+      .check = checkExport,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -5,7 +5,7 @@
 
 #include "batch/batch.h"
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
+#include "commands/point_query.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
@@ -19,7 +19,6 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
-#include "language/point_query.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
 #include "session/field_surface.h"
@@ -227,194 +226,165 @@ void runBounds(Session& session, const Arguments& arguments) {
   });
 }
 
-const Parameter kFieldOutput = {.name = "output",
-                                .type = ParameterType::outputPath,
-                                .help =
-                                    "File of the resulting field, usually *.hpsdf. A script may leave it out; the "
-                                    "result becomes the current field in any case.",
-                                .alias = 'o',
-                                .need = Need::onCommandLine};
-
-const Command kBuild = {
-    .name = "build",
-    .summary = "Build a field from a mesh or a built-in shape.",
-    .help =
-        "MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape "
-        "(builtin:SHAPE,parameter=value,…) "
-        "or a shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes.\n"
-        "\n"
-        "The construction refines the worst cell, by a higher degree or by eight children, until the weighted squared "
-        "error over the domain falls below the target error τ. As in the paper, τ refers to a mesh whose longest side "
-        "is 2. A mesh with the longest side L is built for τ·(L/2)^5, so that the same τ gives the same cells whether "
-        "its units are metres or millimetres. One hundredth of τ gives about one tenth of the RMS error.\n"
-        "\n"
-        "The inside is what the mesh encloses. Where that is not certain, because the mesh has holes or intersects "
-        "itself, a line reports which inside test was chosen (see --sign). Ctrl-C stops the construction without "
-        "writing a field; with --checkpoint the same command continues it later. In a script, the field becomes the "
-        "current one, and the output may be left out.\n"
-        "\n"
-        "With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output "
-        "reports its result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist "
-        "already, made from the same contents with the same options, are skipped. Any number of processes may share "
-        "one "
-        "list and one folder: each mesh is built by one of them. docs/batch.md shows how, also with GNU parallel and "
-        "Slurm.",
-    .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
-                 "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
-                 "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
-                 "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
-                 "hpsdf build --batch list.txt -o fields"},
-    .action = runBuild,
-    .check = checkBuildArguments};
+const Parameter kFieldOutput = {"output", outputFile().as('o').requiredOnCommandLine(),
+                                "File of the resulting field, usually *.hpsdf. A script may leave it out; the result "
+                                "becomes the current field in any case."};
 
 const std::vector<Parameter> kBuildFiles = {
-    {.name = "mesh",
-     .type = ParameterType::text,
-     .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
-     .valueName = "MESH",
-     .positional = true},
-    {.name = "output",
-     .type = ParameterType::outputPath,
-     .help = "File of the field, usually *.hpsdf. With batch it is the folder of the fields, which is created where it "
-             "does not exist.",
-     .alias = 'o',
-     .need = Need::onCommandLine,
-     .group = "Files"},
-    {.name = "batch",
-     .type = ParameterType::path,
-     .help = "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current "
-             "folder) or shape a line; empty lines and # comments are ignored, - is standard input.",
-     .valueName = "LIST",
-     .group = "Files"}};
+    {"mesh", text("MESH").positional(), "Mesh file, builtin:SHAPE or analytic:SHAPE."},
+    {"output", outputFile().as('o').requiredOnCommandLine().under(kFiles),
+     "File of the field, usually *.hpsdf. With batch it is the folder of the fields, which is created where it does "
+     "not exist."},
+    {"batch", file("LIST").under(kFiles),
+     "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current folder) or "
+     "shape a line; empty lines and # comments are ignored, - is standard input."}};
 
-const Command kSmooth = {
-    .name = "smooth",
-    .summary = "Make a field weakly continuous: smaller jumps for a little error.",
-    .help =
-        "Changes the polynomials of the cells so that Σ w ∫ jump² dA + λ‖f − f₀‖² becomes minimal. The sum runs over "
-        "the faces between cells; w is the edge of the smaller cell across the face, f₀ the original field, and λ the "
-        "weight, which has no unit. Cells, degrees and size stay. 'build --continuity weak' does the same during the "
-        "construction; it rounds to float once, this command a second time.\n"
-        "\n"
-        "Use it where jumps between cells disturb more than a small error. The polynomials of cells have too few "
-        "coefficients to agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows "
-        "how much. Bounds are removed. A field can be smoothed once.",
-    .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
-                 "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
-    .action = runSmooth};
+void addBuildCommand(Registry& registry) {
+  registry.add({
+      .name = "build",
+      .summary = "Build a field from a mesh or a built-in shape.",
+      .help = paragraphs(R"(
+MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape (builtin:SHAPE,parameter=value,…) or a
+shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes.
 
-const Command kBlend = {
-    .name = "blend",
-    .summary = "Make a field and its gradient continuous.",
-    .help =
-        "Blends neighbouring cells by smooth weights in a zone along their faces, so that neither value nor gradient "
-        "jumps anywhere in the domain. Outside of the zones the field stays the same to the bit. No coefficient "
-        "changes: "
-        "the file stores the width of the zones, and queries and pictures blend. 'build --continuity exact' does the "
-        "same.\n"
-        "\n"
-        "Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long, "
-        "and bounds are removed.",
-    .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
-    .action = runBlend};
+The construction refines the worst cell, by a higher degree or by eight children, until the weighted squared error over
+the domain falls below the target error τ. As in the paper, τ refers to a mesh whose longest side is 2. A mesh with the
+longest side L is built for τ·(L/2)^5, so that the same τ gives the same cells whether its units are metres or
+millimetres. One hundredth of τ gives about one tenth of the RMS error.
 
-const Command kBounds = {
-    .name = "bounds",
-    .summary = "Compute proven bounds of the error and the slope of each cell.",
-    .help =
-        "Stores two numbers for each cell: |f − Φ| does not exceed the first anywhere in the cell, and ‖∇f‖ does not "
-        "exceed the second. Subtracting the first from |f| gives a distance within which there is certainly no "
-        "surface, "
-        "so that rays and collisions miss nothing. 'build --bounds' does the same; existing bounds are computed again. "
-        "Coefficients stay the same to the bit.\n"
-        "\n"
-        "It needs MESH, from which the field was made, and computes 24 exact distances a cell, between which the "
-        "1-Lipschitz property of Φ bounds it. A mesh from which the field was not made is refused. Bounds hold where Φ "
-        "is a signed distance: not beside the holes of an open mesh, nor where a mesh intersects itself.\n"
-        "\n"
-        "'smooth' and 'blend' change the field and remove bounds: compute them last. 'hpsdf verify --max-violations 0' "
-        "tests them at random points.",
-    .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
-    .action = runBounds};
+The inside is what the mesh encloses. Where that is not certain, because the mesh has holes or intersects itself, a line
+reports which inside test was chosen (see --sign). Ctrl-C stops the construction without writing a field; with
+--checkpoint the same command continues it later. In a script, the field becomes the current one, and the output may be
+left out.
 
-const Command kInfo = {
-    .name = "info",
-    .summary = "Show the size, the settings and the estimated error of a field.",
-    .help =
-        "Prints leaves, coefficients, memory, errors, settings, the mesh from which the field was made, and the "
-        "shares of its volume by degree and depth. The estimated RMS error is √(ε/|Ω|) in mesh units, where ε is the "
-        "weighted estimate of the construction; 'hpsdf verify' measures the error.",
-    .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
-    .action = runInfo};
+With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output reports its
+result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist already, made from the
+same contents with the same options, are skipped. Any number of processes may share one list and one folder: each mesh
+is built by one of them. docs/batch.md shows how, also with GNU parallel and Slurm.)"),
+      .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
+                   "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
+                   "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
+                   "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
+                   "hpsdf build --batch list.txt -o fields"},
+      .parameters = joined({kBuildFiles, checkpointParameters(), buildParameters()}),
+      .action = runBuild,
+      .check = checkBuildArguments,
+  });
+}
 
-const Command kQuery = {
-    .name = "query",
-    .summary = "Compute distances and gradients at points.",
-    .help =
-        "Reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments and a "
-        "header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, "
-        "or with --json an array of objects.\n"
-        "\n"
-        "Distances are negative inside. Outside the domain the field is continued continuously.",
-    .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf", "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
-    .action = runQuery};
+void addContinuityCommands(Registry& registry) {
+  registry.add({
+      .name = "smooth",
+      .summary = "Make a field weakly continuous: smaller jumps for a little error.",
+      .help = paragraphs(R"(
+Changes the polynomials of the cells so that Σ w ∫ jump² dA + λ‖f − f₀‖² becomes minimal. The sum runs over the faces
+between cells; w is the edge of the smaller cell across the face, f₀ the original field, and λ the weight, which has no
+unit. Cells, degrees and size stay. 'build --continuity weak' does the same during the construction; it rounds to float
+once, this command a second time.
 
-const std::vector<Parameter> kQueryFiles = {{.name = "points",
-                                             .type = ParameterType::path,
-                                             .help = "File of points; - or nothing for standard input.",
-                                             .valueName = "POINTS",
-                                             .positional = true},
-                                            {.name = "output",
-                                             .type = ParameterType::outputPath,
-                                             .help = "File to write; standard output when left out.",
-                                             .alias = 'o'}};
+Use it where jumps between cells disturb more than a small error. The polynomials of cells have too few coefficients to
+agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows how much. Bounds are
+removed. A field can be smoothed once.)"),
+      .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
+                   "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
+      .parameters = {fieldParameter(), kFieldOutput, settingParameter("continuity-weight"),
+                     threadsParameter("The field is")},
+      .action = runSmooth,
+  });
+  registry.add({
+      .name = "blend",
+      .summary = "Make a field and its gradient continuous.",
+      .help = paragraphs(R"(
+Blends neighbouring cells by smooth weights in a zone along their faces, so that neither value nor gradient jumps
+anywhere in the domain. Outside of the zones the field stays the same to the bit. No coefficient changes: the file
+stores the width of the zones, and queries and pictures blend. 'build --continuity exact' does the same.
 
-const Command kLoad = {.name = "load",
-                       .summary = "Load a field, which becomes the current one.",
-                       .help = "The following commands of the script work on it.",
-                       .examples = {"load bunny.hpsdf"},
-                       .parameters = {{.name = "field",
-                                       .type = ParameterType::path,
-                                       .help = "File of the field.",
-                                       .valueName = "FIELD",
-                                       .positional = true,
-                                       .need = Need::always}},
-                       .action = runLoad,
-                       .scriptOnly = true};
+Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long, and bounds
+are removed.)"),
+      .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
+      .parameters = {fieldParameter(),
+                     kFieldOutput,
+                     {"width", settingKind("blend-width"), std::string(buildSetting("blend-width").help)}},
+      .action = runBlend,
+  });
+}
 
-const Command kSave = {.name = "save",
-                       .summary = "Save the current field.",
-                       .help =
-                           "The file is written under a temporary name and renamed, so that an interrupted save "
-                           "leaves an older file intact.",
-                       .examples = {"save output=bunny.hpsdf"},
-                       .parameters = {{.name = "output",
-                                       .type = ParameterType::outputPath,
-                                       .help = "File of the field, usually *.hpsdf.",
-                                       .alias = 'o',
-                                       .need = Need::always}},
-                       .action = runSave,
-                       .scriptOnly = true};
+void addBoundsCommand(Registry& registry) {
+  registry.add({
+      .name = "bounds",
+      .summary = "Compute proven bounds of the error and the slope of each cell.",
+      .help = paragraphs(R"(
+Stores two numbers for each cell: |f − Φ| does not exceed the first anywhere in the cell, and ‖∇f‖ does not exceed the
+second. Subtracting the first from |f| gives a distance within which there is certainly no surface, so that rays and
+collisions miss nothing. 'build --bounds' does the same; existing bounds are computed again. Coefficients stay the same
+to the bit.
 
-/// The parameter `width` of `blend`: `build`'s blend-width under its shorter name.
-Parameter widthParameter() {
-  Parameter parameter = settingParameter("blend-width");
-  parameter.name = "width";
-  return parameter;
+It needs MESH, from which the field was made, and computes 24 exact distances a cell, between which the 1-Lipschitz
+property of Φ bounds it. A mesh from which the field was not made is refused. Bounds hold where Φ is a signed distance:
+not beside the holes of an open mesh, nor where a mesh intersects itself.
+
+'smooth' and 'blend' change the field and remove bounds: compute them last. 'hpsdf verify --max-violations 0' tests them
+at random points.)"),
+      .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
+      .parameters = {fieldParameter(), surfaceParameter(), kFieldOutput, threadsParameter("The field is")},
+      .action = runBounds,
+  });
+}
+
+void addReadingCommands(Registry& registry) {
+  registry.add({
+      .name = "info",
+      .summary = "Show the size, the settings and the estimated error of a field.",
+      .help =
+          "Prints leaves, coefficients, memory, errors, settings, the mesh from which the field was made, and the "
+          "shares of its volume by degree and depth. The estimated RMS error is √(ε/|Ω|) in mesh units, where ε is the "
+          "weighted estimate of the construction; 'hpsdf verify' measures the error.",
+      .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
+      .parameters = {fieldParameter()},
+      .action = runInfo,
+  });
+  registry.add({
+      .name = "query",
+      .summary = "Compute distances and gradients at points.",
+      .help = paragraphs(R"(
+Reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments and a header line are
+ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of
+objects.
+
+Distances are negative inside. Outside the domain the field is continued continuously.)"),
+      .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf", "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
+      .parameters = {fieldParameter(),
+                     {"points", file("POINTS").positional(), "File of points; - or nothing for standard input."},
+                     {"output", outputFile().as('o'), "File to write; standard output when left out."}},
+      .action = runQuery,
+  });
+  registry.addForScripts({
+      .name = "load",
+      .summary = "Load a field, which becomes the current one.",
+      .help = "The following commands of the script work on it.",
+      .examples = {"load bunny.hpsdf"},
+      .parameters = {{"field", file("FIELD").positional().required(), "File of the field."}},
+      .action = runLoad,
+  });
+  registry.addForScripts({
+      .name = "save",
+      .summary = "Save the current field.",
+      .help =
+          "The file is written under a temporary name and renamed, so that an interrupted save leaves an older file "
+          "intact.",
+      .examples = {"save output=bunny.hpsdf"},
+      .parameters = {{"output", outputFile().as('o').required(), "File of the field, usually *.hpsdf."}},
+      .action = runSave,
+  });
 }
 
 }  // namespace
 
 void addFieldCommands(Registry& registry) {
-  const Parameter field = fieldParameter(), threads = threadsParameter("The field is");
-  registry.add(withParameters(kBuild, {kBuildFiles, checkpointParameters(), buildParameters()}));
-  registry.add(withParameters(kSmooth, {{field, kFieldOutput, settingParameter("continuity-weight"), threads}}));
-  registry.add(withParameters(kBlend, {{field, kFieldOutput, widthParameter()}}));
-  registry.add(withParameters(kBounds, {{field, surfaceParameter(), kFieldOutput, threads}}));
-  registry.add(withParameters(kInfo, {{field}}));
-  registry.add(withParameters(kQuery, {{field}, kQueryFiles}));
-  registry.add(kLoad);
-  registry.add(kSave);
+  addBuildCommand(registry);
+  addContinuityCommands(registry);
+  addBoundsCommand(registry);
+  addReadingCommands(registry);
 }
 
 }  // namespace hpsdf::app

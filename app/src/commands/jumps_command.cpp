@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/jumps.h"
 #include "session/field_argument.h"
@@ -140,41 +139,30 @@ void runJumps(Session& session, const Arguments& arguments) {
   session.console().out << jumpsText(session.current().name, jumps, jumpKind(arguments), count);
 }
 
-const Command kJumps = {
-    .name = "jumps",
-    .summary = "Measure how much a field jumps between its cells.",
-    .help =
-        "The polynomials of neighbouring leaves do not agree on the interface between them. For each interface the "
-        "command measures the jump of the value and of the gradient: the RMS over the interface (exact), and the "
-        "greatest jump at quadrature points, edges and corners. It prints totals, histograms by powers of ten, and the "
-        "worst interfaces with their positions. Lengths are in the field's units; jumps of the gradient have no unit.\n"
-        "\n"
-        "Use it to decide whether a field needs continuity, see 'build --continuity'. With -o it also writes a CSV "
-        "table "
-        "of all interfaces: cells, degrees and depths on the side of smaller and of greater coordinates, the axis "
-        "across the interface (0, 1, 2), area, centre, jumps, and the position of the greatest jump of the value.",
-    .examples = {"hpsdf jumps bunny.hpsdf", "hpsdf jumps bunny.hpsdf --by gradient --worst 3",
-                 "hpsdf jumps bunny.hpsdf -o interfaces.csv --json"},
-    .action = runJumps};
-
-const std::vector<Parameter> kJumpsParameters = {
-    {.name = "worst",
-     .type = ParameterType::wholeNumber,
-     .help = "Number of worst interfaces to list.",
-     .defaultText = "10",
-     .minimum = 0,
-     .maximum = 1000000},
-    {.name = "by",
-     .type = ParameterType::choice,
-     .help = "Ranks the worst interfaces by their jump of the value or of the gradient.",
-     .defaultText = "value",
-     .choices = {"value", "gradient"}},
-    {.name = "output", .type = ParameterType::outputPath, .help = "CSV file of all interfaces.", .alias = 'o'}};
-
 }  // namespace
 
 void addJumpsCommand(Registry& registry) {
-  registry.add(withParameters(kJumps, {{fieldParameter()}, kJumpsParameters}));
+  registry.add({
+      .name = "jumps",
+      .summary = "Measure how much a field jumps between its cells.",
+      .help = paragraphs(R"(
+The polynomials of neighbouring leaves do not agree on the interface between them. For each interface the command
+measures the jump of the value and of the gradient: the RMS over the interface (exact), and the greatest jump at
+quadrature points, edges and corners. It prints totals, histograms by powers of ten, and the worst interfaces with their
+positions. Lengths are in the field's units; jumps of the gradient have no unit.
+
+Use it to decide whether a field needs continuity, see 'build --continuity'. With -o it also writes a CSV table of all
+interfaces: cells, degrees and depths on the side of smaller and of greater coordinates, the axis across the interface
+(0, 1, 2), area, centre, jumps, and the position of the greatest jump of the value.)"),
+      .examples = {"hpsdf jumps bunny.hpsdf", "hpsdf jumps bunny.hpsdf --by gradient --worst 3",
+                   "hpsdf jumps bunny.hpsdf -o interfaces.csv --json"},
+      .parameters = {fieldParameter(),
+                     {"worst", wholeNumber().within(0, 1000000).byDefault("10"), "Number of worst interfaces to list."},
+                     {"by", choice({"value", "gradient"}).byDefault("value"),
+                      "Ranks the worst interfaces by their jump of the value or of the gradient."},
+                     {"output", outputFile().as('o'), "CSV file of all interfaces."}},
+      .action = runJumps,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
@@ -269,80 +268,60 @@ void runMesh(Session& session, const Arguments& arguments) {
     throw Failed(fmt::format("{}: {} of {} signs are wrong", results.surface, check->wrong, check->points));
 }
 
-const Command kMesh = {
-    .name = "mesh",
-    .summary = "Find the defects of a mesh and how its inside is decided; repair and draw it.",
-    .help =
-        "Prints counts after welding equal positions, parts, volume, area, box, and the triangles that were removed or "
-        "reversed on import. Then it lists defects with their positions: edges that are open, shared by more than two "
-        "faces, or run along in the same direction by both of their faces, so that one face is reversed; vertices at "
-        "which surfaces touch; and faces that intersect others, decided without rounding. The last line names the "
-        "inside test that 'hpsdf build' would choose (--sign auto), with the reason.\n"
-        "\n"
-        "--repair writes the cleaned mesh with consistent orientations: each face is oriented like most faces of its "
-        "component, and closed parts outward, except cavities. It closes no holes and removes no intersections; "
-        "--sign winding works with both.\n"
-        "\n"
-        "--picture draws the mesh: clay from outside, blue from inside, pale red where faces intersect others. Defects "
-        "have colours of their own; small ones are ringed, hidden ones dashed.\n"
-        "\n"
-        "--check-sign compares the sign with the winding number, summed over all faces, at random points: half of them "
-        "in and around the mesh's box, half close to its faces. The exit status is 1 where the sign is wrong farther "
-        "from the surface than a millionth of the mesh's longest side.",
-    .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json",
-                 "hpsdf mesh chair.obj --picture defects.png --view corner",
-                 "hpsdf mesh chair.obj --repair repaired.obj", "hpsdf mesh bunny.obj --check-sign 100000"},
-    .action = runMesh,
-    .check = checkMesh};
-
 const std::vector<Parameter> kMeshParameters = {
-    {.name = "mesh",
-     .type = ParameterType::text,
-     .help = "Mesh file or builtin:SHAPE.",
-     .valueName = "MESH",
-     .positional = true,
-     .need = Need::always},
-    {.name = "repair",
-     .type = ParameterType::outputPath,
-     .help = "Writes the repaired mesh, with all digits of its coordinates.",
-     .valueName = "FILE.obj|FILE.ply"},
-    {.name = "picture",
-     .type = ParameterType::outputPath,
-     .help = "Draws the mesh with its defects.",
-     .valueName = "FILE.png"},
-    {.name = "places",
-     .type = ParameterType::wholeNumber,
-     .help = "Greatest number of positions to list for each kind of defect. When left out, 3, or 100 with json.",
-     .minimum = 0,
-     .maximum = 1e6},
-    {.name = "check-sign",
-     .type = ParameterType::wholeNumber,
-     .help = "Compares signs at this number of random points. Each takes about 15 ns a face.",
-     .valueName = "POINTS",
-     .minimum = 1,
-     .maximum = 1e9}};
+    {"mesh", text("MESH").positional().required(), "Mesh file or builtin:SHAPE."},
+    {"repair", outputFile("FILE.obj|FILE.ply"), "Writes the repaired mesh, with all digits of its coordinates."},
+    {"picture", outputFile("FILE.png"), "Draws the mesh with its defects."},
+    {"places", wholeNumber().within(0, 1e6),
+     "Greatest number of positions to list for each kind of defect. When left out, 3, or 100 with json."},
+    {"check-sign", wholeNumber("POINTS").within(1, 1e9),
+     "Compares signs at this number of random points. Each takes about 15 ns a face."}};
 
 /// Returns the camera parameters of `render`, with the defaults that fit a mesh.
 std::vector<Parameter> meshLookParameters(const Registry& registry) {
   std::vector<Parameter> parameters = cameraParameters(registry);
   parameters.push_back(*findParameter(registry.command("render"), "up"));
-  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  Parameter& camera = parameterNamed("camera", parameters);
   camera.help =
       "Azimuth and elevation in degrees, and the distance of the eye from the middle of the mesh in diagonals of a "
-      "cube "
-      "around it. When left out, 30 and 20 degrees, at the distance that just shows the whole mesh.";
+      "cube around it. When left out, 30 and 20 degrees, at the distance that just shows the whole mesh.";
   camera.defaultText.clear();
-  std::ranges::find(parameters, "target", &Parameter::name)->help =
+  parameterNamed("target", parameters).help =
       "Point in the middle of the picture, around which the camera turns; the middle of the mesh when left out. A "
-      "small "
-      "distance in camera shows a defect from nearby.";
+      "small distance in camera shows a defect from nearby.";
   return parameters;
 }
 
 }  // namespace
 
-Command meshCommand(const Registry& registry) {
-  return withParameters(kMesh, {kMeshParameters, {seedParameter()}, meshLookParameters(registry)});
+void addMeshCommand(Registry& registry) {
+  registry.add({
+      .name = "mesh",
+      .summary = "Find the defects of a mesh and how its inside is decided; repair and draw it.",
+      .help = paragraphs(R"(
+Prints counts after welding equal positions, parts, volume, area, box, and the triangles that were removed or reversed
+on import. Then it lists defects with their positions: edges that are open, shared by more than two faces, or run along
+in the same direction by both of their faces, so that one face is reversed; vertices at which surfaces touch; and faces
+that intersect others, decided without rounding. The last line names the inside test that 'hpsdf build' would choose
+(--sign auto), with the reason.
+
+--repair writes the cleaned mesh with consistent orientations: each face is oriented like most faces of its component,
+and closed parts outward, except cavities. It closes no holes and removes no intersections; --sign winding works with
+both.
+
+--picture draws the mesh: clay from outside, blue from inside, pale red where faces intersect others. Defects have
+colours of their own; small ones are ringed, hidden ones dashed.
+
+--check-sign compares the sign with the winding number, summed over all faces, at random points: half of them in and
+around the mesh's box, half close to its faces. The exit status is 1 where the sign is wrong farther from the surface
+than a millionth of the mesh's longest side.)"),
+      .examples = {"hpsdf mesh bunny.obj", "hpsdf mesh builtin:gear --json",
+                   "hpsdf mesh chair.obj --picture defects.png --view corner",
+                   "hpsdf mesh chair.obj --repair repaired.obj", "hpsdf mesh bunny.obj --check-sign 100000"},
+      .parameters = joined({kMeshParameters, {seedParameter()}, meshLookParameters(registry)}),
+      .action = runMesh,
+      .check = checkMesh,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -5,7 +5,6 @@
 #include <span>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "hpsdf/detail/line.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/line_plot.h"
@@ -121,81 +120,42 @@ void runProbe(Session& session, const Arguments& arguments) {
   report(session, arguments, line, exact);
 }
 
-const Command kProbe = {
-    .name = "probe",
-    .summary = "Sample a field along a line: distance, error, gradient, cells.",
-    .help =
-        "Evaluates the field at points of a line and draws or writes what it finds. Use it to see jumps between cells "
-        "and errors in detail.\n"
-        "\n"
-        "A .png shows curves over the distance along the line: f and the exact distance; the error f − exact on its "
-        "own "
-        "scale, or, where the exact distance is unknown, the jumps of f at borders of cells; the length of the "
-        "gradient "
-        "and its component along the line; bands of the cells' degrees and depths. Thin lines mark borders of cells. "
-        "Each leaf's polynomial is drawn up to both of its ends, so that a jump is a vertical step.\n"
-        "\n"
-        "A .csv has one row for each sample: the parameter t from 0 to 1, the distance s along the line, the point, "
-        "its "
-        "cell, degree and depth, f, the exact distance, the error, the gradient, and its component along the line. At "
-        "a "
-        "border of two cells two rows with the same t hold the limits from both sides. Outside the domain, f is the "
-        "continuation of the field and the columns of the cell are empty. The columns of the exact distance are empty "
-        "where it is unknown.",
-    .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
-                 "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
-                 "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
-    .action = runProbe};
-
 const std::vector<Parameter> kProbeParameters = {
-    {.name = "from",
-     .type = ParameterType::numbers,
-     .help = "Start of the line.",
-     .valueName = "X,Y,Z",
-     .unit = "world units",
-     .counts = {3},
-     .need = Need::always,
-     .group = "The line"},
-    {.name = "to",
-     .type = ParameterType::numbers,
-     .help = "End of the line.",
-     .valueName = "X,Y,Z",
-     .unit = "world units",
-     .counts = {3},
-     .need = Need::always,
-     .group = "The line"},
-    {.name = "output",
-     .type = ParameterType::outputPath,
-     .help = "File to write: *.png for a plot, *.csv for the samples.",
-     .alias = 'o',
-     .need = Need::always},
-    {.name = "samples",
-     .type = ParameterType::wholeNumber,
-     .help = "Number of evenly spaced samples, both ends included. Each border of cells adds two.",
-     .defaultText = "1000",
-     .minimum = 2,
-     .maximum = 1000000,
-     .group = "The line"},
-    {.name = "mesh",
-     .type = ParameterType::text,
-     .help = "The surface from which the field was made. It gives the exact distance; without it there are no errors. "
-             "It is known already for built-in and analytic shapes, and for a mesh that was built in the same script.",
-     .defaultText = "",
-     .valueName = "MESH"},
-    {.name = "size",
-     .type = ParameterType::size,
-     .help = "Size of the plot.",
-     .defaultText = "1280x720",
-     .unit = "pixels",
-     .minimum = 16,
-     .maximum = 16384,
-     .whole = true,
-     .counts = {2}}};
+    {"from", numbers("X,Y,Z", {3}).in("world units").required().under("The line"), "Start of the line."},
+    {"to", numbers("X,Y,Z", {3}).in("world units").required().under("The line"), "End of the line."},
+    {"output", outputFile().as('o').required(), "File to write: *.png for a plot, *.csv for the samples."},
+    {"samples", wholeNumber().within(2, 1000000).byDefault("1000").under("The line"),
+     "Number of evenly spaced samples, both ends included. Each border of cells adds two."},
+    {"mesh", text("MESH"),
+     "The surface from which the field was made. It gives the exact distance; without it there are no errors. It is "
+     "known already for built-in and analytic shapes, and for a mesh that was built in the same script."},
+    {"size", size(16, 16384).byDefault("1280x720").under(kPicture), "Size of the plot."}};
 
 }  // namespace
 
 void addProbeCommand(Registry& registry) {
-  registry.add(withParameters(kProbe, {{fieldParameter()}, kProbeParameters}));
+  registry.add({
+      .name = "probe",
+      .summary = "Sample a field along a line: distance, error, gradient, cells.",
+      .help = paragraphs(R"(
+Evaluates the field at points of a line and draws or writes what it finds. Use it to see jumps between cells and errors
+in detail.
+
+A .png shows curves over the distance along the line: f and the exact distance; the error f − exact on its own scale,
+or, where the exact distance is unknown, the jumps of f at borders of cells; the length of the gradient and its
+component along the line; bands of the cells' degrees and depths. Thin lines mark borders of cells. Each leaf's
+polynomial is drawn up to both of its ends, so that a jump is a vertical step.
+
+A .csv has one row for each sample: the parameter t from 0 to 1, the distance s along the line, the point, its cell,
+degree and depth, f, the exact distance, the error, the gradient, and its component along the line. At a border of two
+cells two rows with the same t hold the limits from both sides. Outside the domain, f is the continuation of the field
+and the columns of the cell are empty. The columns of the exact distance are empty where it is unknown.)"),
+      .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
+                   "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
+                   "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
+      .parameters = joined({{fieldParameter()}, kProbeParameters}),
+      .action = runProbe,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -6,7 +6,6 @@
 #include <thread>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "console/version.h"
 #include "files/text_file.h"
 #include "hpsdf/exact_distance.h"
@@ -198,131 +197,100 @@ void runDocs(Session& session, const Arguments& arguments) {
   out << fmt::format("{}: {} commands\n", file, count);
 }
 
-const Command kRun = {
-    .name = "run",
-    .summary = "Run a script, or script lines given with -e.",
-    .help =
-        "A script holds one command a line: verb value key=value …, with \"quotes\", # comments, and ; between "
-        "commands "
-        "of one line. $name or ${name} is replaced by the value that is given as name=value after the script. Relative "
-        "paths start at the current folder.\n"
-        "\n"
-        "The whole script is checked before its first command runs. A mistake ends it with file:line:column. "
-        "docs/scripts.md is the manual.",
-    .examples = {"hpsdf run pictures.hps mesh=bunny.obj", "hpsdf run -e 'build builtin:torus; slice output=x.png'"},
-    .parameters = {{.name = "script",
-                    .type = ParameterType::text,
-                    .help = "File of the script, then name=value for each variable. With -e only variables.",
-                    .valueName = "SCRIPT name=value",
-                    .positional = true,
-                    .repeatable = true},
-                   {.name = "execute",
-                    .type = ParameterType::text,
-                    .help = "Runs this script line instead of a file.",
-                    .valueName = "LINE",
-                    .alias = 'e',
-                    .repeatable = true}},
-    .action = runRun,
-    .takesVariables = true};
+void addMachineCommands(Registry& registry) {
+  registry.add({
+      .name = "shapes",
+      .summary = "List the built-in shapes and their parameters.",
+      .help =
+          "Commands accept builtin:NAME, the triangle mesh of a shape, and analytic:NAME, its distance in closed form.",
+      .examples = {"hpsdf shapes", "hpsdf build analytic:sphere,radius=0.5 -o sphere.hpsdf"},
+      .action = runShapes,
+  });
+  registry.add({
+      .name = "doctor",
+      .summary = "Show the machine and the libraries that the program uses.",
+      .help = "Prints the OpenGL device that would draw pictures, or why there is none; the instruction "
+              "sets of the processor; the number of threads; whether a process of its own reads mesh files; and "
+              "versions. Use it when pictures fail, and attach its output to bug reports.",
+      .examples = {"hpsdf doctor", "hpsdf doctor --gl software"},
+      .parameters = without({"cpu"}, backendParameters()),
+      .action = runDoctor,
+  });
+}
 
-const Command kShapes = {
-    .name = "shapes",
-    .summary = "List the built-in shapes and their parameters.",
-    .help =
-        "Commands accept builtin:NAME, the triangle mesh of a shape, and analytic:NAME, its distance in closed form.",
-    .examples = {"hpsdf shapes", "hpsdf build analytic:sphere,radius=0.5 -o sphere.hpsdf"},
-    .action = runShapes};
+void addScriptCommands(Registry& registry) {
+  registry.addForScripts({
+      .name = "set",
+      .summary = "Set variables for the rest of the script.",
+      .help = "In the following lines, $name or ${name} is replaced by the value. It overrides a value "
+              "that was given on the command line.",
+      .examples = {"set size=640x360 mesh=bunny.obj"},
+      .parameters = {{"assignments", text("name=value").positional().repeatable().required(),
+                      "Variables and their values."}},
+      .action = runSet,
+      .takesVariables = true,
+      .definesVariables = true,
+  });
+  registry.addForScripts({
+      .name = "include",
+      .summary = "Insert the lines of another script.",
+      .help =
+          "The lines of the included script see the variables of the lines above, and variables that they set are "
+          "valid in the lines below. The file is read and checked together with the script, before any command runs. A "
+          "relative name starts at the folder of the including script.",
+      .examples = {"include settings.hps"},
+      .parameters = {{"script", file("SCRIPT").positional().required(), "File of the script."}},
+      .action = runInclude,
+      .includesScript = true,
+  });
+}
 
-const Command kDoctor = {
-    .name = "doctor",
-    .summary = "Show the machine and the libraries that the program uses.",
-    .help =
-        "Prints the OpenGL device that would draw pictures, or why there is none; the instruction sets of the "
-        "processor; the number of threads; whether a process of its own reads mesh files; and versions. Use it when "
-        "pictures fail, and attach its output to bug reports.",
-    .examples = {"hpsdf doctor", "hpsdf doctor --gl software"},
-    .action = runDoctor};
-
-const Command kSet = {
-    .name = "set",
-    .summary = "Set variables for the rest of the script.",
-    .help =
-        "In the following lines, $name or ${name} is replaced by the value. It overrides a value that was given on "
-        "the command line.",
-    .examples = {"set size=640x360 mesh=bunny.obj"},
-    .parameters = {{.name = "assignments",
-                    .type = ParameterType::text,
-                    .help = "Variables and their values.",
-                    .valueName = "name=value",
-                    .positional = true,
-                    .repeatable = true,
-                    .need = Need::always}},
-    .action = runSet,
-    .scriptOnly = true,
-    .takesVariables = true,
-    .definesVariables = true};
-
-const Command kInclude = {
-    .name = "include",
-    .summary = "Insert the lines of another script.",
-    .help =
-        "The lines of the included script see the variables of the lines above, and variables that they set are "
-        "valid in the lines below. The file is read and checked together with the script, before any command runs. "
-        "A relative name starts at the folder of the including script.",
-    .examples = {"include settings.hps"},
-    .parameters = {{.name = "script",
-                    .type = ParameterType::path,
-                    .help = "File of the script.",
-                    .valueName = "SCRIPT",
-                    .positional = true,
-                    .need = Need::always}},
-    .action = runInclude,
-    .scriptOnly = true,
-    .includesScript = true};
-
-const Command kHelp = {
-    .name = "help",
-    .summary = "Explain the program or a command.",
-    .help = "Without a command it prints an overview.",
-    .examples = {"hpsdf help", "hpsdf help build", "hpsdf help build --all"},
-    .parameters = {{.name = "command",
-                    .type = ParameterType::text,
-                    .help = "Command to explain.",
-                    .valueName = "COMMAND",
-                    .positional = true},
-                   {.name = "all",
-                    .type = ParameterType::flag,
-                    .help = "Explains the advanced options of the command too, as 'hpsdf COMMAND --help-all' does.",
-                    .defaultText = "false"}},
-    .action = runHelp};
-
-const Command kDocs = {
-    .name = "docs",
-    .summary = "Write the reference of all commands as a Markdown page.",
-    .help =
-        "The page docs/commands.md describes commands, parameters, ranges and defaults of this version of the "
-        "program.",
-    .examples = {"hpsdf docs -o docs/commands.md"},
-    .parameters = {{.name = "output",
-                    .type = ParameterType::outputPath,
-                    .help = "File to write; standard output when left out.",
-                    .alias = 'o'}},
-    .action = runDocs};
-
-std::vector<Parameter> doctorParameters() {
-  std::vector<Parameter> parameters = backendParameters();
-  std::erase_if(parameters, [](const Parameter& parameter) { return parameter.name == "cpu"; });
-  return parameters;
+void addHelpCommands(Registry& registry) {
+  registry.add({
+      .name = "help",
+      .summary = "Explain the program or a command.",
+      .help = "Without a command it prints an overview.",
+      .examples = {"hpsdf help", "hpsdf help build", "hpsdf help build --all"},
+      .parameters = {{"command", text("COMMAND").positional(), "Command to explain."},
+                     {"all", flag(),
+                      "Explains the advanced options of the command too, as 'hpsdf COMMAND --help-all' does."}},
+      .action = runHelp,
+  });
+  registry.add({
+      .name = "docs",
+      .summary = "Write the reference of all commands as a Markdown page.",
+      .help = "The page docs/commands.md describes commands, parameters, ranges and defaults of this version of the "
+              "program.",
+      .examples = {"hpsdf docs -o docs/commands.md"},
+      .parameters = {{"output", outputFile().as('o'), "File to write; standard output when left out."}},
+      .action = runDocs,
+  });
 }
 
 }  // namespace
 
 void addToolCommands(Registry& registry) {
-  registry.add(kRun);
-  registry.add(meshCommand(registry));
-  registry.add(kShapes);
-  registry.add(withParameters(kDoctor, {doctorParameters()}));
-  for (const Command& command : {kSet, kInclude, kHelp, kDocs}) registry.add(command);
+  registry.add({
+      .name = "run",
+      .summary = "Run a script, or script lines given with -e.",
+      .help = paragraphs(R"(
+A script holds one command a line: verb value key=value …, with "quotes", # comments, and ; between commands of one
+line. $name or ${name} is replaced by the value that is given as name=value after the script. Relative paths start at
+the current folder.
+
+The whole script is checked before its first command runs. A mistake ends it with file:line:column. docs/scripts.md is
+the manual.)"),
+      .examples = {"hpsdf run pictures.hps mesh=bunny.obj", "hpsdf run -e 'build builtin:torus; slice output=x.png'"},
+      .parameters = {{"script", text("SCRIPT name=value").positional().repeatable(),
+                      "File of the script, then name=value for each variable. With -e only variables."},
+                     {"execute", text("LINE").as('e').repeatable(), "Runs this script line instead of a file."}},
+      .action = runRun,
+      .takesVariables = true,
+  });
+  addMeshCommand(registry);
+  addMachineCommands(registry);
+  addScriptCommands(registry);
+  addHelpCommands(registry);
 }
 
 }  // namespace hpsdf::app

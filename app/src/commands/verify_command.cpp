@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "commands/commands.h"
-#include "commands/shared_parameters.h"
 #include "console/failed.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
@@ -305,95 +304,64 @@ void runVerify(Session& session, const Arguments& arguments) {
     throw Failed(fmt::format("{}: {}", current.name, problem));
 }
 
-const Command kVerify = {
-    .name = "verify",
-    .summary = "Measure the errors of a field, and fail where they exceed limits.",
-    .help =
-        "Compares the field with the exact distance of MESH at random points, half of them uniform in the domain and "
-        "half near the surface. It prints RMS, mean, percentiles and maximum of the error; wrong signs; the angle "
-        "between the gradients, the length of the field's gradient and slopes; the jumps between cells; steps of the "
-        "queried values across faces, at as many random points of faces; and the worst points, one of each cell. "
-        "Lengths are in the field's units. The same seed gives the same figures for any number of threads.\n"
-        "\n"
-        "Use it to judge a field, or with limits (--max-…) in automated tests: where a limit is exceeded, all figures "
-        "are written, the last line names the limit, and the exit status is 1. A mesh from which the field was not "
-        "made "
-        "is refused.\n"
-        "\n"
-        "Signs between the surface and the field's zero level are always wrong. Only wrong signs farther from the "
-        "surface than the sign bound are defects; --max-mismatches counts these.",
-    .examples = {"hpsdf verify bunny.hpsdf bunny.obj",
-                 "hpsdf verify bunny.hpsdf bunny.obj --max-rms 5e-4 --max-error 0.02 --max-mismatches 0",
-                 "hpsdf verify torus.hpsdf --points 1e7 --band 0.05 --json",
-                 "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps"},
-    .action = runVerify};
+std::vector<Parameter> sampledParameters() {
+  return {
+      pointsParameter("Number of random points, uniform and near ones counted alike.", "1000000", 2),
+      seedParameter(),
+      {"near", number().above(0).in("world units"),
+       "Greatest distance of a near point from a random point of the surface. When left out, one hundredth of the "
+       "mesh's longest side."},
+      {"band", number().above(0).in("world units").advanced(),
+       "Restricts the uniform points to those within this distance of the surface. Use it for fields that were built "
+       "with a band."}};
+}
 
-constexpr const char* kSampledPoints = "Sampled points";
+const std::vector<Parameter> kReported = {
+    {"sign-bound", number().above(0).in("world units").under("Limits"),
+     "Distance from the surface beyond which a wrong sign is a defect. When left out, ten times the RMS error near the "
+     "surface."},
+    {"worst", wholeNumber().within(0, 100000).byDefault("10"), "Number of worst points to list."},
+    {"script", outputFile("FILE"),
+     "Writes a script, *.hps, that shows each of the worst points in the explorer. Run it from the same folder."},
+    {"any-mesh", flag(), "Accepts a mesh from which the field was not made, for instance a simplified one."}};
 
-const std::vector<Parameter> kVerifyParameters = {
-    {.name = "near",
-     .type = ParameterType::number,
-     .help =
-         "Greatest distance of a near point from a random point of the surface. When left out, one hundredth of the "
-         "mesh's longest side.",
-     .unit = "world units",
-     .minimum = 0,
-     .minimumExcluded = true,
-     .group = kSampledPoints},
-    {.name = "band",
-     .type = ParameterType::number,
-     .help = "Restricts the uniform points to those within this distance of the surface. Use it for fields that were "
-             "built with a band.",
-     .unit = "world units",
-     .minimum = 0,
-     .minimumExcluded = true,
-     .group = kSampledPoints},
-    {.name = "sign-bound",
-     .type = ParameterType::number,
-     .help = "Distance from the surface beyond which a wrong sign is a defect. When left out, ten times the RMS error "
-             "near the surface.",
-     .unit = "world units",
-     .minimum = 0,
-     .minimumExcluded = true,
-     .group = "Limits"},
-    {.name = "worst",
-     .type = ParameterType::wholeNumber,
-     .help = "Number of worst points to list.",
-     .defaultText = "10",
-     .minimum = 0,
-     .maximum = 100000},
-    {.name = "script",
-     .type = ParameterType::outputPath,
-     .help =
-         "Writes a script, *.hps, that shows each of the worst points in the explorer. Run it from the same folder.",
-     .valueName = "FILE"},
-    {.name = "any-mesh",
-     .type = ParameterType::flag,
-     .help = "Accepts a mesh from which the field was not made, for instance a simplified one.",
-     .defaultText = "false"}};
-
-std::vector<Parameter> thresholdParameters() {
+std::vector<Parameter> limitParameters() {
   std::vector<Parameter> parameters;
   for (const Threshold& threshold : kThresholds)
-    parameters.push_back({.name = threshold.option,
-                          .type = threshold.counts ? ParameterType::wholeNumber : ParameterType::number,
-                          .help = threshold.help,
-                          .minimum = 0,
-                          .maximum = threshold.counts ? std::optional(1e9) : std::nullopt,
-                          .group = "Limits"});
+    parameters.push_back(
+        {threshold.option, threshold.counts ? wholeNumber().within(0, 1e9) : number().atLeast(0), threshold.help});
   return parameters;
 }
 
 }  // namespace
 
 void addVerifyCommand(Registry& registry) {
-  Parameter points = pointsParameter("Number of random points, uniform and near ones counted alike.", "1000000", 2);
-  Parameter seed = seedParameter();
-  points.group = seed.group = kSampledPoints;
-  registry.add(withParameters(kVerify, {{fieldParameter(), surfaceParameter(), points, seed},
-                                        kVerifyParameters,
-                                        thresholdParameters(),
-                                        {threadsParameter("The figures are")}}));
+  registry.add({
+      .name = "verify",
+      .summary = "Measure the errors of a field, and fail where they exceed limits.",
+      .help = paragraphs(R"(
+Compares the field with the exact distance of MESH at random points, half of them uniform in the domain and half near
+the surface. It prints RMS, mean, percentiles and maximum of the error; wrong signs; the angle between the gradients,
+the length of the field's gradient and slopes; the jumps between cells; steps of the queried values across faces, at as
+many random points of faces; and the worst points, one of each cell. Lengths are in the field's units. The same seed
+gives the same figures for any number of threads.
+
+Use it to judge a field, or with limits (--max-…) in automated tests: where a limit is exceeded, all figures are
+written, the last line names the limit, and the exit status is 1. A mesh from which the field was not made is refused.
+
+Signs between the surface and the field's zero level are always wrong. Only wrong signs farther from the surface than
+the sign bound are defects; --max-mismatches counts these.)"),
+      .examples = {"hpsdf verify bunny.hpsdf bunny.obj",
+                   "hpsdf verify bunny.hpsdf bunny.obj --max-rms 5e-4 --max-error 0.02 --max-mismatches 0",
+                   "hpsdf verify torus.hpsdf --points 1e7 --band 0.05 --json",
+                   "hpsdf verify bunny.hpsdf bunny.obj --worst 5 --script worst.hps"},
+      .parameters = joined({{fieldParameter(), surfaceParameter()},
+                            under("Sampled points", sampledParameters()),
+                            kReported,
+                            under("Limits", limitParameters()),
+                            {threadsParameter("The figures are")}}),
+      .action = runVerify,
+  });
 }
 
 }  // namespace hpsdf::app

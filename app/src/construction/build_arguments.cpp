@@ -13,23 +13,23 @@ namespace {
 
 constexpr std::uint64_t kDefaultMemory = 100'000'000;  // of the construction, where nothing limits its size
 
+ParameterKind kindOf(const BuildSetting& setting) {
+  using enum BuildSetting::Type;
+  ParameterKind kind = setting.type == wholeNumbers ? app::wholeNumbers("N|NX,NY,NZ", {1, 3})
+                       : setting.type == choice     ? app::choice({setting.words.begin(), setting.words.end()})
+                       : setting.type == flag       ? app::flag()
+                       : setting.type == number     ? app::number()
+                                                    : app::wholeNumber();
+  kind.minimumExcluded = setting.minimumExcluded;
+  if (std::isfinite(setting.minimum)) kind.minimum = setting.minimum;
+  if (std::isfinite(setting.maximum)) kind.maximum = setting.maximum;
+  return kind.byDefault(defaultText(setting)).in(std::string(setting.unit));
+}
+
 Parameter parameterFrom(const BuildSetting& setting) {
-  Parameter parameter{.name = std::string(setting.name),
-                      .help = std::string(setting.help),
-                      .defaultText = defaultText(setting),
-                      .unit = std::string(setting.unit),
-                      .minimumExcluded = setting.minimumExcluded,
-                      .choices = {setting.words.begin(), setting.words.end()}};
-  if (std::isfinite(setting.minimum)) parameter.minimum = setting.minimum;
-  if (std::isfinite(setting.maximum)) parameter.maximum = setting.maximum;
-  constexpr ParameterType kTypes[] = {ParameterType::number, ParameterType::wholeNumber, ParameterType::numbers,
-                                      ParameterType::choice, ParameterType::flag};  // for each `BuildSetting::Type`
-  parameter.type = kTypes[std::size_t(setting.type)];
-  if (setting.type == BuildSetting::Type::wholeNumbers) {
-    parameter.valueName = "N|NX,NY,NZ";
-    parameter.whole = true;
-    parameter.counts = {1, 3};
-  }
+  Parameter parameter(std::string(setting.name), kindOf(setting), std::string(setting.help));
+  parameter.group = setting.group;
+  parameter.isAdvanced = setting.isAdvanced;
   return parameter;
 }
 
@@ -40,64 +40,33 @@ std::vector<double> valueOf(const Arguments& arguments, const BuildSetting& sett
   return {double(std::ranges::find(setting.words, arguments.text(name)) - setting.words.begin())};
 }
 
-std::vector<Parameter> domainParameters() {
-  return {
-      {.name = "domain",
-       .type = ParameterType::numbers,
-       .help =
-           "Where the field is defined by polynomials: the cube or the box around the mesh, enlarged by the margin, "
-           "or two corners in world units (after normalizing).",
-       .defaultText = "cube",
-       .valueName = "cube|box|x0,y0,z0,x1,y1,z1",
-       .choices = {"cube", "box"},
-       .counts = {6}},
-      {.name = "margin",
-       .type = ParameterType::number,
-       .help = "By which part the cube or box is larger than the mesh, e.g. 0.1 for half-sizes times 1.1.",
-       .defaultText = "0.1",
-       .minimum = 0},
-      {.name = "normalize",
-       .type = ParameterType::flag,
-       .help = "Scale and centre the mesh so that its longest side spans [-1, 1], as the paper does. Without it the "
-               "field stays in the mesh's own units.",
-       .defaultText = "false"},
-  };
-}
+const std::vector<Parameter> kDomain = {
+    {"domain", numbers("cube|box|x0,y0,z0,x1,y1,z1", {6}).orWords({"cube", "box"}).byDefault("cube"),
+     "Where the field is defined by polynomials: the cube or the box around the mesh, enlarged by the margin, or two "
+     "corners in world units (after normalizing)."},
+    {"margin", number().atLeast(0).byDefault("0.1"),
+     "By which part the cube or box is larger than the mesh, e.g. 0.1 for half-sizes times 1.1."},
+    {"normalize", flag(),
+     "Scale and centre the mesh so that its longest side spans [-1, 1], as the paper does. Without it the field stays "
+     "in the mesh's own units."}};
 
-std::vector<Parameter> insideParameters() {
-  return {
-      {.name = "sign",
-       .type = ParameterType::choice,
-       .help = "How inside is told from outside. pseudonormal: by the normals of the closest faces, for closed meshes "
-               "that do not intersect themselves. winding: by how often the faces surround a point, for any mesh; "
-               "holes are closed. unsigned-shell: all is outside but a wall around the faces, --thickness wide, for "
-               "sheets. auto: pseudonormal where that is certain to be right, else winding, and says why.",
-       .defaultText = "auto",
-       .choices = {"auto", "pseudonormal", "winding", "unsigned-shell"}},
-      {.name = "hull",
-       .type = ParameterType::flag,
-       .help =
-           "Leave out faces, or parts of them, that have the inside on both sides, such as walls within bodies that "
-           "overlap: they are no surface then. The sign is by winding number.",
-       .defaultText = "false"},
-      {.name = "thickness",
-       .type = ParameterType::number,
-       .help = "Thickness of the wall that --sign unsigned-shell makes.",
-       .unit = "world units",
-       .minimum = 0,
-       .minimumExcluded = true},
-  };
-}
+const std::vector<Parameter> kInside = {
+    {"sign", choice({"auto", "pseudonormal", "winding", "unsigned-shell"}).byDefault("auto"),
+     "How inside is told from outside. pseudonormal: by the normals of the closest faces, for closed meshes that do "
+     "not intersect themselves. winding: by how often the faces surround a point, for any mesh; holes are closed. "
+     "unsigned-shell: all is outside but a wall around the faces, --thickness wide, for sheets. auto: pseudonormal "
+     "where that is certain to be right, else winding, and says why."},
+    {"hull", flag().alsoCalled("outer-hull"),
+     "Leave out faces, or parts of them, that have the inside on both sides, such as walls within bodies that "
+     "overlap: they are no surface then. The sign is by winding number."},
+    {"thickness", number().above(0).in("world units").advanced(),
+     "Thickness of the wall that --sign unsigned-shell makes."}};
 
-Parameter paperParameter() {
-  return {.name = "paper",
-          .type = ParameterType::flag,
-          .help =
-              "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, "
-              "max-degree 30, max-depth 10, quadrature 4 by products with samples of its own for each trial, "
-              "double. Options that are given too win.",
-          .defaultText = "false"};
-}
+const Parameter kPaper = {
+    "paper", flag().under("The paper's settings"),
+    "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, max-degree 30, "
+    "max-depth 10, quadrature 4 by products with samples of its own for each trial, double. Options that are given "
+    "too win."};
 
 void insertBefore(std::vector<Parameter>& parameters, const char* name, const std::vector<Parameter>& more) {
   parameters.insert(std::ranges::find(parameters, name, &Parameter::name), more.begin(), more.end());
@@ -115,60 +84,44 @@ InsideTest insideTestOf(const std::string& name) {
 
 }  // namespace
 
+ParameterKind settingKind(const char* name) { return kindOf(buildSetting(name)); }
+
 Parameter settingParameter(const char* name) { return parameterFrom(buildSetting(name)); }
 
 Parameter threadsParameter(const std::string& result) {
-  Parameter parameter = settingParameter("threads");
-  parameter.help = fmt::format("Threads to use; 0 for all. {} the same whatever their number.", result);
-  return parameter;
+  return {"threads", settingKind("threads").under(kGeneral),
+          fmt::format("Threads to use; 0 for all. {} the same whatever their number.", result)};
 }
 
 Parameter pointsParameter(std::string help, std::string count, double minimum) {
-  return {.name = "points",
-          .type = ParameterType::wholeNumber,
-          .help = std::move(help),
-          .defaultText = std::move(count),
-          .minimum = minimum,
-          .maximum = 1e8};  // about 100 bytes each
+  constexpr double kMost = 1e8;  // about 100 bytes each
+  return {"points", wholeNumber().within(minimum, kMost).byDefault(std::move(count)), std::move(help)};
 }
 
-Parameter seedParameter() {
-  return {.name = "seed",
-          .type = ParameterType::wholeNumber,
-          .help = "Which points.",
-          .defaultText = "1",
-          .minimum = 0,
-          .maximum = 1e9};
+Parameter seedParameter(std::string help) {
+  return {"seed", wholeNumber().within(0, 1e9).byDefault("1").under(kGeneral).advanced(), std::move(help)};
 }
 
 std::vector<Parameter> buildParameters() {
   std::vector<Parameter> parameters;
   for (const BuildSetting& setting : buildSettings())
     if (setting.isOffered) parameters.push_back(parameterFrom(setting));
-  insertBefore(parameters, "strategy", domainParameters());
-  insertBefore(parameters, "band", insideParameters());
-  parameters.push_back(paperParameter());
+  insertBefore(parameters, "strategy", under(setting_group::kResult, kDomain));
+  insertBefore(parameters, "band", under("The surface", kInside));
+  parameters.push_back(kPaper);
   return parameters;
 }
 
 std::vector<Parameter> checkpointParameters() {
   return {
-      {.name = "checkpoint",
-       .type = ParameterType::flag,
-       .help =
-           "Keep the state of the construction from time to time, as OUTPUT.checkpoint. Where that is there already, "
-           "because the program was killed, go on from it: the field is the same, to the byte, as in one go. "
-           "A state of another mesh, of other options but threads and memory-limit, or a damaged one is refused; "
-           "once the field is written it is removed.",
-       .defaultText = "false"},
-      {.name = "checkpoint-seconds",
-       .type = ParameterType::number,
-       .help = "Least time between two checkpoints. It is longer where writing takes long: at most 2 % of the time go "
-               "into it.",
-       .defaultText = "5",
-       .unit = "seconds",
-       .minimum = 0,
-       .maximum = 1e9},
+      {"checkpoint", flag().under(kFiles),
+       "Keep the state of the construction from time to time, as OUTPUT.checkpoint. Where that is there already, "
+       "because the program was killed, go on from it: the field is the same, to the byte, as in one go. A state of "
+       "another mesh, of other options but threads and memory-limit, or a damaged one is refused; once the field is "
+       "written it is removed."},
+      {"checkpoint-seconds", number().within(0, 1e9).in("seconds").under(kFiles).advanced().byDefault("5"),
+       "Least time between two checkpoints. It is longer where writing takes long: at most 2 % of the time go into "
+       "it."},
   };
 }
 

@@ -22,15 +22,16 @@ std::vector<Parameter> checkpointParameters();
 /// Names of the parameters that end a construction in one of these manners.
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
 
-/// The parameter of the table's setting `name`.
+/// The parameter of the table's setting `name`, or what it accepts.
 Parameter settingParameter(const char* name);
+ParameterKind settingKind(const char* name);
 
 /// The number of threads. `result`, such as "The field is", begins the sentence that it does not depend on them.
 Parameter threadsParameter(const std::string& result);
 
 /// The number of random points, and the seed that selects them.
 Parameter pointsParameter(std::string help, std::string count, double minimum);
-Parameter seedParameter();
+Parameter seedParameter(std::string help = "Which points.");
 
 /// The settings that arguments of `buildParameters` ask for. Options that are given win over --paper.
 BuildOptions buildOptions(const Arguments& arguments);

@@ -4,15 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
 
 #include "construction/build_arguments.h"
 #include "explorer/explorer.h"
 #include "explorer/explorer_picture_commands.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/append_parameters.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "text/json.h"
@@ -144,13 +141,8 @@ void runShot(Session& session, const Arguments& arguments) {
   reportPicture(session, arguments, file, frame.width, frame.height, session.lastRenderer());
 }
 
-Command panelCommand() {
-  Command command{.name = "panel",
-                  .summary = "Open or close parts of the explorer's frame.",
-                  .help = "What is not given stays as it is. The picture takes the room that closed parts leave.",
-                  .examples = {"panel all=false", "panel build=false worst=true"},
-                  .action = changing(changePanel)};
-  command.parameters.push_back({.name = "all", .type = ParameterType::flag, .help = "Every part, before the others."});
+/// The parameters of `panel`: its parts, and how far the columns are scrolled.
+std::vector<Parameter> panelParameters() {
   constexpr std::array kHelp = {"The buttons on top.",
                                 "What is shown.",
                                 "Settings of the construction.",
@@ -159,138 +151,114 @@ Command panelCommand() {
                                 "Figures of the whole field.",
                                 "The worst interfaces between cells.",
                                 "What the pointer is over."};
+  std::vector<Parameter> parameters = {{"all", flag(""), "Every part, before the others."}};
   for (std::size_t panel = 0; panel < kPanels; ++panel)
-    command.parameters.push_back({.name = kPanelNames[panel], .type = ParameterType::flag, .help = kHelp[panel]});
-  for (const char* side : {"left", "right"})
-    command.parameters.push_back({.name = fmt::format("{}-scroll", side),
-                                  .type = ParameterType::number,
-                                  .help = fmt::format("How far the {} column is scrolled.", side),
-                                  .unit = "pixels",
-                                  .minimum = 0});
-  return command;
+    parameters.push_back({kPanelNames[panel], flag(""), kHelp[panel]});
+  parameterNamed("view", parameters).under(kCamera);  // most of its controls move the camera
+  for (const std::string side : {"left", "right"})
+    parameters.push_back(
+        {side + "-scroll", number().atLeast(0).in("pixels"), fmt::format("How far the {} column is scrolled.", side)});
+  return parameters;
 }
 
-Command worstCommand() {
-  return {.name = "worst",
-          .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
-          .help = "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'.",
-          .examples = {"worst by=gradient page=2"},
-          .parameters = {{.name = "by",
-                          .type = ParameterType::choice,
-                          .help = "Greatest jump of the value, or of the gradient.",
-                          .choices = {"value", "gradient"}},
-                         {.name = "page",
-                          .type = ParameterType::wholeNumber,
-                          .help = "Of eight interfaces each.",
-                          .minimum = 1,
-                          .maximum = 1000}},
-          .action = changing(changeWorst)};
+void addFrameCommands(Registry& registry) {
+  registry.addForScripts({
+      .name = "panel",
+      .summary = "Open or close parts of the explorer's frame.",
+      .help = "What is not given stays as it is. The picture takes the room that closed parts leave.",
+      .examples = {"panel all=false", "panel build=false worst=true"},
+      .parameters = panelParameters(),
+      .action = changing(changePanel),
+  });
+  registry.addForScripts({
+      .name = "worst",
+      .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
+      .help = "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'.",
+      .examples = {"worst by=gradient page=2"},
+      .parameters = {{"by", choice({"value", "gradient"}), "Greatest jump of the value, or of the gradient."},
+                     {"page", wholeNumber().within(1, 1000), "Of eight interfaces each."}},
+      .action = changing(changeWorst),
+  });
+  registry.addForScripts({
+      .name = "fly",
+      .summary = "Take a close look at one of the worst interfaces between cells, or at a point.",
+      .help =
+          "A slice goes through it; a camera looks at it, and what lies before it is cut away. 'verify' writes such "
+          "lines for the worst points that it finds.",
+      .examples = {"fly 1", "fly to=0.2,0.6,-0.1"},
+      .parameters = {{"rank", wholeNumber().within(1, 8000).positional(), "Its place in the list, 1 for the worst."},
+                     {"to", numbers("X,Y,Z", {3}).in("world units"), "A point within the domain instead."}},
+      .action = runFly,
+      .check = checkFly,
+  });
 }
 
-Command flyCommand() {
-  return {.name = "fly",
-          .summary = "Take a close look at one of the worst interfaces between cells, or at a point.",
-          .help =
-              "A slice goes through it; a camera looks at it, and what lies before it is cut away. 'verify' "
-              "writes such lines for the worst points that it finds.",
-          .examples = {"fly 1", "fly to=0.2,0.6,-0.1"},
-          .parameters = {{.name = "rank",
-                          .type = ParameterType::wholeNumber,
-                          .help = "Its place in the list, 1 for the worst.",
-                          .minimum = 1,
-                          .maximum = 8000,
-                          .positional = true},
-                         {.name = "to",
-                          .type = ParameterType::numbers,
-                          .help = "A point within the domain instead.",
-                          .valueName = "X,Y,Z",
-                          .unit = "world units",
-                          .counts = {3}}},
-          .action = runFly,
-          .check = checkFly};
-}
-
-Command undoCommand() {
-  return {
+void addHistoryCommands(Registry& registry) {
+  registry.addForScripts({
       .name = "undo",
       .summary = "Take back the last change of what the explorer shows.",
       .help =
           "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, arrows, color, "
           "panel, worst and fly; what the mouse does in one go is one change. The field itself is not changed back.",
       .examples = {"undo"},
-      .action = runUndo};
-}
-
-Command redoCommand() {
-  return {.name = "redo",
-          .summary = "Do again what 'undo' took back.",
-          .help = "Until something else is changed.",
-          .examples = {"redo"},
-          .action = runRedo};
-}
-
-Command copyViewCommand() {
-  return {
+      .action = runUndo,
+  });
+  registry.addForScripts({
+      .name = "redo",
+      .summary = "Do again what 'undo' took back.",
+      .help = "Until something else is changed.",
+      .examples = {"redo"},
+      .action = runRedo,
+  });
+  registry.addForScripts({
       .name = "copy-view",
       .summary = "Write the lines of script that lead the explorer to what it shows.",
       .help = "To the file, or else to the standard output; in the window to its clipboard too.",
       .examples = {"copy-view", "copy-view output=view.hps"},
-      .parameters = {{.name = "output", .type = ParameterType::outputPath, .help = "The script's file.", .alias = 'o'}},
-      .action = runCopyView};
+      .parameters = {{"output", outputFile().as('o'), "The script's file."}},
+      .action = runCopyView,
+  });
 }
 
-Command settingsCommand() {
-  Command command{.name = "settings",
-                  .summary = "Set how 'rebuild' builds; what is not set is as it was.",
-                  .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
-                  .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
-                  .parameters = {{.name = "mesh",
-                                  .type = ParameterType::text,
-                                  .help = "Mesh file, builtin:SHAPE or analytic:SHAPE; at first what the current field "
-                                          "was made from.",
-                                  .valueName = "MESH"}},
-                  .action = runSettings};
-  append(command.parameters, buildParameters());
-  return command;
-}
-
-Command rebuildCommand() {
-  return {.name = "rebuild",
-          .summary = "Build the field anew, as 'settings' says.",
-          .help = "What 'settings' does not say is as it was for the current field.",
-          .examples = {"rebuild", "rebuild max-steps=100"},
-          .parameters = {{.name = "max-steps",
-                          .type = ParameterType::wholeNumber,
-                          .help = "End after so many steps of the refinement: an earlier state of the field.",
-                          .minimum = 0,
-                          .maximum = std::numeric_limits<int>::max()}},
-          .action = runRebuild};
-}
-
-Command shotCommand() {
-  return {
+void addFieldAndShotCommands(Registry& registry) {
+  registry.addForScripts({
+      .name = "settings",
+      .summary = "Set how 'rebuild' builds; what is not set is as it was.",
+      .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
+      .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
+      .parameters =
+          joined({{{"mesh", text("MESH"),
+                    "Mesh file, builtin:SHAPE or analytic:SHAPE; at first what the current field was made from."}},
+                  buildParameters()}),
+      .action = runSettings,
+  });
+  registry.addForScripts({
+      .name = "rebuild",
+      .summary = "Build the field anew, as 'settings' says.",
+      .help = "What 'settings' does not say is as it was for the current field.",
+      .examples = {"rebuild", "rebuild max-steps=100"},
+      .parameters = {{"max-steps", settingKind("max-steps").under(setting_group::kAsked).advanced(),
+                      "End after so many steps of the refinement: an earlier state of the field."}},
+      .action = runRebuild,
+  });
+  registry.addForScripts({
       .name = "shot",
       .summary = "Write the explorer's frame: the picture and the panels around it.",
-      .help =
-          "Pending work is finished first. 'pick' and 'expect pick(…)' then speak of its pixels. 'panel "
-          "all=false' leaves the picture alone.",
+      .help = "Pending work is finished first. 'pick' and 'expect pick(…)' then speak of its pixels. 'panel all=false' "
+              "leaves the picture alone.",
       .examples = {"shot output=frame.png"},
-      .parameters =
-          {{.name = "output", .type = ParameterType::outputPath, .help = "*.png.", .alias = 'o', .need = Need::always}},
-      .action = runShot};
+      .parameters = {{"output", outputFile().as('o').required(), "*.png."}},
+      .action = runShot,
+  });
 }
 
 }  // namespace
 
 void addExplorerCommands(Registry& registry) {
-  std::vector<Command> commands = explorerPictureCommands();
-  std::ranges::move(std::vector{panelCommand(), worstCommand(), flyCommand(), undoCommand(), redoCommand(),
-                                copyViewCommand(), settingsCommand(), rebuildCommand(), shotCommand()},
-                    std::back_inserter(commands));
-  for (Command& command : commands) {
-    command.scriptOnly = true;
-    registry.add(std::move(command));
-  }
+  addExplorerPictureCommands(registry);
+  addFrameCommands(registry);
+  addHistoryCommands(registry);
+  addFieldAndShotCommands(registry);
 }
 
 }  // namespace hpsdf::app

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "pictures/picture_names.h"
 
@@ -143,238 +142,139 @@ void changeBeside(ViewState& view, const Arguments& arguments, Session& session)
   if (!view.beside.empty()) session.other(view.beside);  // reports an unreadable file now, not at the next frame
 }
 
-Command showCommand() {
-  Command command{.name = "show",
-                  .summary = "Choose what the explorer shows: the surface in space, or the flat picture of a plane.",
-                  .help =
-                      "The explorer is a picture of the current field with panels around it: 'shot' writes it, "
-                      "'hpsdf view' opens it in a window. camera and surface lead the one, plane the other.",
-                  .examples = {"show slice size=1280x720", "show surface samples=2 gl=software"},
-                  .parameters = {{.name = "kind",
-                                  .type = ParameterType::choice,
-                                  .help = "The surface, or a slice.",
-                                  .choices = {"surface", "slice"},
-                                  .positional = true},
-                                 {.name = "size",
-                                  .type = ParameterType::size,
-                                  .help = "Of the whole frame, panels included; 1280x720 at first.",
-                                  .unit = "pixels",
-                                  .minimum = 64,
-                                  .maximum = 8192,
-                                  .whole = true,
-                                  .counts = {2}},
-                                 {.name = "samples",
-                                  .type = ParameterType::wholeNumber,
-                                  .help = "Samples a pixel along each axis; 1 at first.",
-                                  .minimum = 1,
-                                  .maximum = 8}},
-                  .action = changing(changeShow)};
-  append(command.parameters, backendParameters());
-  return command;
-}
-
 Parameter targetParameter(const std::string& help) {
-  return {.name = "target",
-          .type = ParameterType::numbers,
-          .help = help,
-          .valueName = "X,Y,Z",
-          .unit = "world units",
-          .choices = {"center"},
-          .counts = {3}};
+  return {"target", numbers("X,Y,Z", {3}).orWords({"center"}).in("world units").under(kCamera), help};
 }
 
-Command cameraCommand() {
+void addShowCommand(Registry& registry) {
+  registry.addForScripts({
+      .name = "show",
+      .summary = "Choose what the explorer shows: the surface in space, or the flat picture of a plane.",
+      .help =
+          "The explorer is a picture of the current field with panels around it: 'shot' writes it, 'hpsdf view' opens "
+          "it in a window. camera and surface lead the one, plane the other.",
+      .examples = {"show slice size=1280x720", "show surface samples=2 gl=software"},
+      .parameters = joined(
+          {{{"kind", choice({"surface", "slice"}).positional(), "The surface, or a slice."},
+            {"size", size(64, 8192).under(kPicture), "Of the whole frame, panels included; 1280x720 at first."},
+            {"samples", wholeNumber().within(1, 8).under(kPicture), "Samples a pixel along each axis; 1 at first."}},
+           backendParameters()}),
+      .action = changing(changeShow),
+  });
+}
+
+void addSurfaceCommands(Registry& registry) {
   std::vector<std::string> directions = viewNames();
   directions.insert(directions.begin(), "any");
-  return {.name = "camera",
-          .summary = "Move the explorer's camera.",
-          .help =
-              "It looks at the surface in space. What is not given stays as it is; 'copy-view' tells how it stands. "
-              "With the mouse: drag to turn, drag with the right button to move the target, wheel to go nearer.",
-          .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
-          .parameters =
-              {{.name = "orbit",
-                .type = ParameterType::numbers,
-                .help = "Azimuth and elevation in degrees, and the eye's distance from the target in "
-                        "diagonals of the domain; 30,20,1.1 at first.",
-                .valueName = "AZIMUTH,ELEVATION,DISTANCE",
-                .counts = {3},
-                .positional = true},
-               {.name = "view",
-                .type = ParameterType::choice,
-                .help = "A named direction instead; any leaves it.",
-                .choices = directions},
-               targetParameter("The point in the picture's middle; center is the domain's."),
-               {.name = "up", .type = ParameterType::choice, .help = "The axis that points up.", .choices = {"y", "z"}},
-               {.name = "projection",
-                .type = ParameterType::choice,
-                .help = "How rays run: from the eye, or parallel.",
-                .choices = {"perspective", "orthographic"}}},
-          .action = changing(changeCamera),
-          .check = checkCamera};
+  registry.addForScripts({
+      .name = "camera",
+      .summary = "Move the explorer's camera.",
+      .help =
+          "It looks at the surface in space. What is not given stays as it is; 'copy-view' tells how it stands. With "
+          "the mouse: drag to turn, drag with the right button to move the target, wheel to go nearer.",
+      .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
+      .parameters = {{"orbit", numbers("AZIMUTH,ELEVATION,DISTANCE", {3}).positional(),
+                      "Azimuth and elevation in degrees, and the eye's distance from the target in diagonals of the "
+                      "domain; 30,20,1.1 at first."},
+                     {"view", choice(directions).under(kCamera), "A named direction instead; any leaves it."},
+                     targetParameter("The point in the picture's middle; center is the domain's."),
+                     {"up", choice({"y", "z"}).under(kCamera).advanced(), "The axis that points up."},
+                     {"projection", choice({"perspective", "orthographic"}).under(kCamera).advanced(),
+                      "How rays run: from the eye, or parallel."}},
+      .action = changing(changeCamera),
+      .check = checkCamera,
+  });
+  registry.addForScripts({
+      .name = "surface",
+      .summary = "Choose which surface the explorer shows, and where it is cut open.",
+      .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
+      .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
+      .parameters = {{"shown", flag(""), "Whether it is drawn: without it, planes and cells can be looked at alone."},
+                     {"offset", number().in("world units"), "The distance whose surface is drawn; 0 at first."},
+                     {"cracks", flag("").under(kDrawn).advanced(),
+                      "Mark where the surface is torn at a face between two cells."},
+                     {"defects", text("MESH|own|none").under(kDrawn).advanced(),
+                      "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that the field was "
+                      "made from."},
+                     {"clip", choice({"none", "x", "y", "z"}).under(kDrawn),
+                      "Cut across this axis; the half towards the camera is left out."},
+                     {"clip-offset", number().in("world units").under(kDrawn), "Where the cut crosses that axis."}},
+      .action = changing(changeSurface),
+  });
 }
 
-Command surfaceCommand() {
-  return {.name = "surface",
-          .summary = "Choose which surface the explorer shows, and where it is cut open.",
-          .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
-          .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
-          .parameters = {{.name = "shown",
-                          .type = ParameterType::flag,
-                          .help = "Whether it is drawn: without it, planes and cells can be looked at alone."},
-                         {.name = "offset",
-                          .type = ParameterType::number,
-                          .help = "The distance whose surface is drawn; 0 at first.",
-                          .unit = "world units"},
-                         {.name = "cracks",
-                          .type = ParameterType::flag,
-                          .help = "Mark where the surface is torn at a face between two cells."},
-                         {.name = "defects",
-                          .type = ParameterType::text,
-                          .help = "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that "
-                                  "the field was made from.",
-                          .valueName = "MESH|own|none"},
-                         {.name = "clip",
-                          .type = ParameterType::choice,
-                          .help = "Cut across this axis; the half towards the camera is left out.",
-                          .choices = {"none", "x", "y", "z"}},
-                         {.name = "clip-offset",
-                          .type = ParameterType::number,
-                          .help = "Where the cut crosses that axis.",
-                          .unit = "world units"}},
-          .action = changing(changeSurface)};
-}
-
-Command planeCommand() {
-  return {.name = "plane",
-          .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
-          .help =
-              "As 'slice' has it, of the picture that 'show slice' chooses. What is not given stays as it is. With the "
+void addPlaneAndColorCommands(Registry& registry) {
+  registry.addForScripts({
+      .name = "plane",
+      .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
+      .help = "As 'slice' has it, of the picture that 'show slice' chooses. What is not given stays as it is. With the "
               "mouse: drag to move, wheel to zoom.",
-          .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
-          .parameters = {{.name = "axis",
-                          .type = ParameterType::choice,
-                          .help = "The plane is perpendicular to this axis; z at first.",
-                          .choices = {"x", "y", "z"}},
-                         {.name = "offset",
-                          .type = ParameterType::numbers,
-                          .help = "Where the plane crosses that axis; auto is 0, or the domain's middle where 0 lies "
-                                  "outside.",
-                          .valueName = "NUMBER",
-                          .unit = "world units",
-                          .choices = {"auto"},
-                          .counts = {1}},
-                         {.name = "through",
-                          .type = ParameterType::numbers,
-                          .help = "A point of the plane and its normal instead.",
-                          .valueName = "PX,PY,PZ,NX,NY,NZ",
-                          .unit = "world units",
-                          .counts = {6}},
-                         {.name = "in-space",
-                          .type = ParameterType::flag,
-                          .help = "Whether the plane stands in the surface's picture too."},
-                         {.name = "zoom",
-                          .type = ParameterType::number,
-                          .help = "How many times larger than with the whole section in the picture.",
-                          .minimum = 0,
-                          .minimumExcluded = true},
-                         targetParameter("The point in the picture's middle, moved into the plane; center is the "
-                                         "section's middle.")},
-          .action = changing(changePlane),
-          .check = checkPlane};
-}
-
-Command colorCommand() {
-  return {.name = "color",
-          .summary = "Choose what the explorer's colours mean.",
-          .help =
-              "As in 'slice' and 'render'; the surface and the slice have colours of their own. Another quantity than "
+      .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
+      .parameters = {{"axis", choice({"x", "y", "z"}), "The plane is perpendicular to this axis; z at first."},
+                     {"offset", numbers("NUMBER", {1}).orWords({"auto"}).in("world units"),
+                      "Where the plane crosses that axis; auto is 0, or the domain's middle where 0 lies outside."},
+                     {"through", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
+                      "A point of the plane and its normal instead."},
+                     {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},
+                     {"zoom", number().above(0), "How many times larger than with the whole section in the picture."},
+                     targetParameter("The point in the picture's middle, moved into the plane; center is the "
+                                     "section's middle.")},
+      .action = changing(changePlane),
+      .check = checkPlane,
+  });
+  registry.addForScripts({
+      .name = "color",
+      .summary = "Choose what the explorer's colours mean.",
+      .help = "As in 'slice' and 'render'; the surface and the slice have colours of their own. Another quantity than "
               "before gets an automatic range.",
-          .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
-          .parameters = {{.name = "by",
-                          .type = ParameterType::choice,
-                          .help = "As in 'slice' and 'render'. normal is for surfaces, distance for slices.",
-                          .choices = colorNames(),
-                          .positional = true,
-                          .need = Need::always},
-                         {.name = "of",
-                          .type = ParameterType::choice,
-                          .help = "Of which picture; of the one that is shown when left out.",
-                          .choices = {"surface", "slice"}},
-                         {.name = "range",
-                          .type = ParameterType::numbers,
-                          .help = "What the ends of the scale of a jump, slope or error stand for; auto chooses.",
-                          .valueName = "LOW,HIGH",
-                          .choices = {"auto"},
-                          .counts = {2}},
-                         {.name = "scale",
-                          .type = ParameterType::choice,
-                          .help = "How such colours run between them; log at first.",
-                          .choices = {"log", "linear"}},
-                         {.name = "other",
-                          .type = ParameterType::path,
-                          .help = "For difference: the field to compare with, or none.",
-                          .valueName = "FIELD"},
-                         {.name = "mesh",
-                          .type = ParameterType::text,
-                          .help = "For error: what the field was made from, where it does not know that; or none.",
-                          .valueName = "MESH"}},
-          .action = changing(changeColor)};
+      .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
+      .parameters = {{"by", choice(colorNames()).positional().required(),
+                      "As in 'slice' and 'render'. normal is for surfaces, distance for slices."},
+                     {"of", choice({"surface", "slice"}), "Of which picture; of the one that is shown when left out."},
+                     {"range", numbers("LOW,HIGH", {2}).orWords({"auto"}).under(kColours),
+                      "What the ends of the scale of a jump, slope or error stand for; auto chooses."},
+                     {"scale", choice({"log", "linear"}).under(kColours).advanced(),
+                      "How such colours run between them; log at first."},
+                     {"other", file("FIELD"), "For difference: the field to compare with, or none."},
+                     {"mesh", text("MESH"),
+                      "For error: what the field was made from, where it does not know that; or none."}},
+      .action = changing(changeColor),
+  });
 }
 
-Command cellsCommand() {
-  return {.name = "cells",
-          .summary = "Choose which of the octree's cells stand in the explorer's surface picture.",
-          .help = "As 'render' has it. What is not given stays as it is.",
-          .examples = {"cells lines depths=0-3", "cells boxes degrees=4,5 ; surface shown=false"},
-          .parameters = {{.name = "style",
-                          .type = ParameterType::choice,
-                          .help = "Lines along their edges, or boxes of 0.8 of their extent.",
-                          .choices = {"none", "lines", "boxes"},
-                          .positional = true},
-                         {.name = "degrees",
-                          .type = ParameterType::text,
-                          .help = "Only cells of these degrees: numbers and ranges, as in 2,4-6; or all.",
-                          .valueName = "LIST"},
-                         {.name = "depths",
-                          .type = ParameterType::text,
-                          .help = "Only cells of these depths; or all.",
-                          .valueName = "LIST"}},
-          .action = changing(changeCells)};
-}
-
-Command arrowsCommand() {
-  return {.name = "arrows",
-          .summary = "Draw arrows along the gradient in the explorer's picture.",
-          .help =
-              "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection "
-              "takes from it.",
-          .examples = {"arrows 40", "arrows 0"},
-          .parameters = {{.name = "apart",
-                          .type = ParameterType::wholeNumber,
-                          .help = "How far apart; 0 for none.",
-                          .unit = "pixels",
-                          .minimum = 0,
-                          .maximum = 1000,
-                          .positional = true,
-                          .need = Need::always}},
-          .action = changing(changeArrows)};
-}
-
-Command besideCommand() {
-  return {.name = "beside",
-          .summary = "Show another field beside the current one, in the same way.",
-          .help =
-              "Left is the current field, right the other one; camera, plane, colours and their scale are the "
-              "same for both. 'color difference' shows how far they are apart.",
-          .examples = {"beside coarse.hpsdf", "beside none"},
-          .parameters = {{.name = "field",
-                          .type = ParameterType::text,
-                          .help = "The other field's file; none for the current one alone.",
-                          .valueName = "FIELD",
-                          .positional = true,
-                          .need = Need::always}},
-          .action = changing(changeBeside)};
+void addCellsAndArrowsCommands(Registry& registry) {
+  registry.addForScripts({
+      .name = "cells",
+      .summary = "Choose which of the octree's cells stand in the explorer's surface picture.",
+      .help = "As 'render' has it. What is not given stays as it is.",
+      .examples = {"cells lines depths=0-3", "cells boxes degrees=4,5 ; surface shown=false"},
+      .parameters = {{"style", choice({"none", "lines", "boxes"}).positional(),
+                      "Lines along their edges, or boxes of 0.8 of their extent."},
+                     {"degrees", text("LIST").under(kDrawn).advanced(),
+                      "Only cells of these degrees: numbers and ranges, as in 2,4-6; or all."},
+                     {"depths", text("LIST").under(kDrawn).advanced(), "Only cells of these depths; or all."}},
+      .action = changing(changeCells),
+  });
+  registry.addForScripts({
+      .name = "arrows",
+      .summary = "Draw arrows along the gradient in the explorer's picture.",
+      .help =
+          "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection takes from it.",
+      .examples = {"arrows 40", "arrows 0"},
+      .parameters = {{"apart", wholeNumber().within(0, 1000).in("pixels").positional().required(),
+                      "How far apart; 0 for none."}},
+      .action = changing(changeArrows),
+  });
+  registry.addForScripts({
+      .name = "beside",
+      .summary = "Show another field beside the current one, in the same way.",
+      .help = "Left is the current field, right the other one; camera, plane, colours and their scale are the same for "
+              "both. 'color difference' shows how far they are apart.",
+      .examples = {"beside coarse.hpsdf", "beside none"},
+      .parameters = {{"field", text("FIELD").positional().required(),
+                      "The other field's file; none for the current one alone."}},
+      .action = changing(changeBeside),
+  });
 }
 
 }  // namespace
@@ -387,9 +287,11 @@ std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewStat
   };
 }
 
-std::vector<Command> explorerPictureCommands() {
-  return {showCommand(),  cameraCommand(), surfaceCommand(), planeCommand(),
-          colorCommand(), cellsCommand(),  arrowsCommand(),  besideCommand()};
+void addExplorerPictureCommands(Registry& registry) {
+  addShowCommand(registry);
+  addSurfaceCommands(registry);
+  addPlaneAndColorCommands(registry);
+  addCellsAndArrowsCommands(registry);
 }
 
 }  // namespace hpsdf::app

@@ -2,7 +2,6 @@
 // The commands that choose what the explorer's picture shows.
 
 #include <functional>
-#include <vector>
 
 #include "explorer/explorer.h"
 #include "language/registry.h"
@@ -13,7 +12,7 @@ namespace hpsdf::app {
 /// whole change back; a change that throws leaves the state alone.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
-/// The commands show, camera, surface, plane, color, cells, arrows and beside.
-std::vector<Command> explorerPictureCommands();
+/// Adds the commands show, camera, surface, plane, color, cells, arrows and beside.
+void addExplorerPictureCommands(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -30,9 +30,8 @@ Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
   if (found == widgets.end()) {
     std::vector<std::string> known;
     for (const auto& [path, widget] : widgets) known.push_back(path);
-    const std::string near = nearestName(target, known);
-    throw Error(fmt::format("the frame has no widget '{}'; {}", target,
-                            near.empty() ? "'ui list' names them" : fmt::format("did you mean '{}'?", near)));
+    throw Error(
+        fmt::format("the frame has no widget '{}'; {}", target, didYouMean(target, known, "'ui list' names them")));
   }
   const UiRect& rect = found->second.rect;
   if (!(rect.width() > 0 && rect.height() > 0))
@@ -102,51 +101,35 @@ void checkUi(const Arguments& arguments) {
     throw Error(fmt::format("ui wheel: expected a number of notches, found '{}'", arguments.text("value")));
   if (action == "key" && !keyNamed(arguments.text("target"))) {
     const auto names = keyNames();
-    const std::string near = nearestName(arguments.text("target"), names);
-    throw Error(fmt::format(
-        "ui key: unknown key '{}'; {}", arguments.text("target"),
-        near.empty() ? fmt::format("expected {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", near)));
+    throw Error(
+        fmt::format("ui key: unknown key '{}'; {}", arguments.text("target"),
+                    didYouMean(arguments.text("target"), names, fmt::format("expected {}", fmt::join(names, ", ")))));
   }
 }
 
 }  // namespace
 
 void addUiCommand(Registry& registry) {
-  registry.add(
-      {.name = "ui",
-       .summary = "Use the explorer's widgets as a person does, by mouse and keyboard.",
-       .help = "A widget is named panel/name, an entry of an open list panel/name/entry, the picture canvas; "
-               "'ui list' names those of the frame. X,Y is a pixel of the frame, from its upper left.",
-       .examples = {"ui click bar/slice", "ui click view/color ; ui click view/color/depth",
-                    "ui type build/target-error 1e-5", "ui drag canvas 120,-40", "ui hover 640,360",
-                    "ui wheel canvas 2"},
-       .parameters =
-           {{.name = "action",
-             .type = ParameterType::choice,
-             .help = "click; drag: by DX,DY pixels; type: a text into a field or slider, then "
-                     "Enter; hover: move the mouse there; wheel: notches, away from you; key: of "
-                     "the keyboard, by its name; list: name the widgets.",
-             .choices = {"click", "drag", "type", "hover", "wheel", "key", "list"},
-             .positional = true,
-             .need = Need::always},
-            {.name = "target",
-             .type = ParameterType::text,
-             .help = "The widget, the pixel, or the key.",
-             .valueName = "WIDGET|X,Y|KEY",
-             .positional = true},
-            {.name = "value", .type = ParameterType::text, .help = "What drag, type and wheel do.", .positional = true},
-            {.name = "button",
-             .type = ParameterType::choice,
-             .help = "Of the mouse.",
-             .defaultText = "left",
-             .choices = {"left", "right"}},
-            {.name = "control",
-             .type = ParameterType::flag,
-             .help = "With the Ctrl key held down.",
-             .defaultText = "false"}},
-       .action = runUi,
-       .check = checkUi,
-       .scriptOnly = true});
+  registry.addForScripts({
+      .name = "ui",
+      .summary = "Use the explorer's widgets as a person does, by mouse and keyboard.",
+      .help = "A widget is named panel/name, an entry of an open list panel/name/entry, the picture canvas; 'ui list' "
+              "names those of the frame. X,Y is a pixel of the frame, from its upper left.",
+      .examples = {"ui click bar/slice", "ui click view/color ; ui click view/color/depth",
+                   "ui type build/target-error 1e-5", "ui drag canvas 120,-40", "ui hover 640,360",
+                   "ui wheel canvas 2"},
+      .parameters = {{"action",
+                      choice({"click", "drag", "type", "hover", "wheel", "key", "list"}).positional().required(),
+                      "click; drag: by DX,DY pixels; type: a text into a field or slider, then Enter; hover: move the "
+                      "mouse there; wheel: notches, away from you; key: of the keyboard, by its name; list: name the "
+                      "widgets."},
+                     {"target", text("WIDGET|X,Y|KEY").positional(), "The widget, the pixel, or the key."},
+                     {"value", text().positional(), "What drag, type and wheel do."},
+                     {"button", choice({"left", "right"}).byDefault("left"), "Of the mouse."},
+                     {"control", flag(), "With the Ctrl key held down."}},
+      .action = runUi,
+      .check = checkUi,
+  });
 }
 
 }  // namespace hpsdf::app

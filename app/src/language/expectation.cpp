@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
 #include "language/registry.h"
-#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -76,7 +76,7 @@ const Source& sourceNamed(const std::string& name, const Reader& reader) {
     shown.push_back(fmt::format("{}{}", s.name, s.arguments));
   }
   reader.fail(fmt::format("unknown figures '{}'; {}", name,
-                          suggestion(name, known, fmt::format("expected {}", fmt::join(shown, ", ")))));
+                          didYouMean(name, known, fmt::format("expected {}", fmt::join(shown, ", ")))));
 }
 
 }  // namespace

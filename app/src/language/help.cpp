@@ -64,8 +64,8 @@ std::string valueName(const Parameter& parameter) {
 
 /// Spells a parameter as "-o, --output FILE".
 std::string spelling(const Parameter& parameter) {
-  if (parameter.positional) return valueName(parameter);
-  const std::string alias = parameter.alias == 0 ? "" : fmt::format("-{}, ", parameter.alias);
+  if (parameter.isPositional) return valueName(parameter);
+  const std::string alias = parameter.letter == 0 ? "" : fmt::format("-{}, ", parameter.letter);
   const std::string value = valueName(parameter);
   return fmt::format("{}--{}{}{}", alias, parameter.synonym.empty() ? parameter.name : parameter.synonym,
                      value.empty() ? "" : " ", value);
@@ -77,7 +77,7 @@ std::string facts(const Parameter& parameter) {
   const bool hasRange = parameter.minimum || parameter.maximum;
   if (hasRange) parts.push_back(expectedValue(parameter));
   if (!parameter.unit.empty()) parts.push_back("in " + parameter.unit);
-  if (parameter.repeatable) parts.push_back("may be repeated");
+  if (parameter.isRepeatable) parts.push_back("may be repeated");
   if (parameter.need == Need::always) parts.push_back("required");
   if (parameter.need == Need::onCommandLine) parts.push_back("required on the command line");
   if (!parameter.defaultText.empty() && parameter.type != ParameterType::flag)
@@ -89,20 +89,20 @@ std::string facts(const Parameter& parameter) {
 std::string usage(const Command& command) {
   std::string line = command.scriptOnly ? command.name : "hpsdf " + command.name;
   for (const Parameter& parameter : command.parameters) {
-    if (!parameter.positional && parameter.need == Need::optional) continue;
+    if (!parameter.isPositional && parameter.need == Need::optional) continue;
     std::string part =
-        parameter.positional
+        parameter.isPositional
             ? valueName(parameter)
-            : fmt::format("{} {}", parameter.alias != 0 ? fmt::format("-{}", parameter.alias) : "--" + parameter.name,
+            : fmt::format("{} {}", parameter.letter != 0 ? fmt::format("-{}", parameter.letter) : "--" + parameter.name,
                           valueName(parameter));
-    if (parameter.repeatable) part += " …";
+    if (parameter.isRepeatable) part += " …";
     line += parameter.need == Need::optional ? " [" + part + "]" : " " + part;
   }
   return line + " [options]";
 }
 
 std::string headingOf(const Parameter& parameter) {
-  if (parameter.positional) return "Arguments";
+  if (parameter.isPositional) return "Arguments";
   return parameter.group.empty() ? "Options" : parameter.group;
 }
 
@@ -111,7 +111,7 @@ struct Group {
   std::vector<const Parameter*> parameters = {};
 };
 
-/// Collects parameters under their headings, in the order in which the headings first appear; `kGeneralGroup` is last.
+/// Collects parameters under their headings, in the order in which the headings first appear; `kGeneral` is last.
 std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
   std::vector<Group> groups;
   for (const Parameter& parameter : parameters) {
@@ -120,7 +120,7 @@ std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
     if (group == groups.end()) group = groups.insert(group, {heading});
     group->parameters.push_back(&parameter);
   }
-  std::ranges::stable_partition(groups, [](const Group& group) { return group.heading != kGeneralGroup; });
+  std::ranges::stable_partition(groups, [](const Group& group) { return group.heading != kGeneral; });
   return groups;
 }
 
@@ -157,8 +157,8 @@ std::string markdownRows(const std::string& heading, const std::vector<const Par
 std::string markdownNames(const std::vector<const Parameter*>& parameters) {
   std::vector<std::string> names;
   for (const Parameter* parameter : parameters)
-    names.push_back(fmt::format("`{}{}`", parameter->positional ? valueName(*parameter) : "--" + parameter->name,
-                                parameter->repeatable ? " …" : ""));
+    names.push_back(fmt::format("`{}{}`", parameter->isPositional ? valueName(*parameter) : "--" + parameter->name,
+                                parameter->isRepeatable ? " …" : ""));
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -229,7 +229,7 @@ std::string commandHelp(const Command& command, HelpDetail detail) {
   for (const Group& group : byGroup(command.parameters)) {
     std::string options;
     for (const Parameter* parameter : group.parameters)
-      if (detail == HelpDetail::all || parameter->audience == Audience::common)
+      if (detail == HelpDetail::all || !parameter->isAdvanced)
         options += "  " + spelling(*parameter) + "\n" + wrapped(parameter->help + facts(*parameter), 6);
       else
         ++hidden;
@@ -271,10 +271,10 @@ nlohmann::ordered_json commandsJson(const Registry& registry) {
                             {"expected", expectedValue(parameter)},
                             {"default", parameter.defaultText},
                             {"unit", parameter.unit},
-                            {"positional", parameter.positional},
-                            {"repeatable", parameter.repeatable},
+                            {"positional", parameter.isPositional},
+                            {"repeatable", parameter.isRepeatable},
                             {"group", parameter.group},
-                            {"advanced", parameter.audience == Audience::advanced},
+                            {"advanced", parameter.isAdvanced},
                             {"help", parameter.help}});
     commands.push_back({{"name", command.name},
                         {"summary", command.summary},

@@ -9,11 +9,8 @@
 
 namespace hpsdf::app {
 
-/// The heading of options that many commands have, such as `json` and `threads`. It comes last in help texts.
-constexpr std::string_view kGeneralGroup = "General";
-
 enum class HelpDetail : std::uint8_t {
-  common,  ///< without options of `Audience::advanced`; the last line tells how many were left out
+  common,  ///< without options of `ParameterKind::isAdvanced`; the last line tells how many were left out
   all,
 };
 

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "text/text.h"
+#include "hpsdf/detail/nearest_name.h"
 
 namespace hpsdf::app {
 namespace {
@@ -149,33 +149,49 @@ std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tabl
   return parameters;
 }
 
+std::vector<Parameter> under(std::string_view heading, std::vector<Parameter> parameters) {
+  for (Parameter& parameter : parameters) parameter.under(heading);
+  return parameters;
+}
+
+std::vector<Parameter> without(const std::vector<std::string>& names, std::vector<Parameter> parameters) {
+  std::erase_if(parameters, [&](const Parameter& parameter) { return contains(names, parameter.name); });
+  return parameters;
+}
+
+Parameter& parameterNamed(std::string_view name, std::vector<Parameter>& parameters) {
+  const auto found = std::ranges::find(parameters, name, &Parameter::name);
+  if (found == parameters.end()) throw std::logic_error(fmt::format("no parameter '{}' in the table", name));
+  return *found;
+}
+
+std::string paragraphs(std::string_view text) {
+  if (text.starts_with('\n')) text.remove_prefix(1);
+  std::string result(text);
+  for (std::size_t i = 1; i + 1 < result.size(); ++i)
+    if (result[i] == '\n' && result[i - 1] != '\n' && result[i + 1] != '\n') result[i] = ' ';
+  return result;
+}
+
 void Registry::add(Command command) {
   if (std::ranges::find(commands_, command.name, &Command::name) != commands_.end())
     throw std::logic_error("two commands named " + command.name);
-  command.parameters.push_back({.name = "json",
-                                .type = ParameterType::flag,
-                                .help = "Writes the results as JSON to standard output, and nothing else. Use it in "
-                                        "programs that call hpsdf.",
-                                .defaultText = "false"});
+  command.parameters.push_back(
+      {"json", flag().under(kGeneral),
+       "Writes the results as JSON to standard output, and nothing else. Use it in programs that call hpsdf."});
   commands_.push_back(std::move(command));
 }
 
-void Registry::present(std::span<const ParameterPresentation> table) {
-  for (Command& command : commands_)
-    for (Parameter& parameter : command.parameters) {
-      const auto found = std::ranges::find(table, parameter.name, &ParameterPresentation::name);
-      if (found == table.end() || parameter.positional) continue;
-      if (parameter.group.empty()) parameter.group = found->group;
-      parameter.audience = found->audience;
-      parameter.synonym = found->synonym;
-    }
+void Registry::addForScripts(Command command) {
+  command.scriptOnly = true;
+  add(std::move(command));
 }
 
 const Command& Registry::command(std::string_view name) const {
   const auto found = std::ranges::find(commands_, name, &Command::name);
   if (found != commands_.end()) return *found;
   throw Error(
-      fmt::format("unknown command '{}'; {}", name, suggestion(name, namesOf(commands_), "'hpsdf --help' lists them")));
+      fmt::format("unknown command '{}'; {}", name, didYouMean(name, namesOf(commands_), "'hpsdf --help' lists them")));
 }
 
 /// Builds the `Arguments` of one call. CLI11 separates options, their values and positional words.
@@ -208,14 +224,14 @@ class ArgumentReader {
   static CLI::Option* addOption(CLI::App& parser, const Parameter& parameter) {
     std::string names = "--" + parameter.name;
     if (!parameter.synonym.empty()) names += ",--" + parameter.synonym;
-    if (parameter.alias != 0) names += fmt::format(",-{}", parameter.alias);
+    if (parameter.letter != 0) names += fmt::format(",-{}", parameter.letter);
     if (parameter.type == ParameterType::flag)
       return parser.add_flag(names)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    if (parameter.positional) names += "," + parameter.name;
+    if (parameter.isPositional) names += "," + parameter.name;
     CLI::Option* option = parser.add_option(names);
-    if (parameter.repeatable) option->expected(1, CLI::detail::expected_max_vector_size);
+    if (parameter.isRepeatable) option->expected(1, CLI::detail::expected_max_vector_size);
     // Each occurrence takes one value: `-e A B` must leave B to the positional words.
-    option->allow_extra_args(parameter.repeatable && parameter.positional);
+    option->allow_extra_args(parameter.isRepeatable && parameter.isPositional);
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
@@ -245,7 +261,7 @@ class ArgumentReader {
     const std::string list = fmt::format("'hpsdf help {} --all' lists them", command_.name);
     return ArgumentError(
         fmt::format("{}: unknown option '{}'; {}", command_.name, written,
-                    suggestion(name, namesOf(command_.parameters), list, origin_ == Origin::commandLine ? "--" : "")),
+                    didYouMean(name, namesOf(command_.parameters), list, origin_ == Origin::commandLine ? "--" : "")),
         word);
   }
 
@@ -272,10 +288,10 @@ class ArgumentReader {
   std::size_t wordOf(const Parameter& parameter, std::string_view value) const {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;
-      const bool aliased = parameter.alias != 0 && text.starts_with(fmt::format("-{}", parameter.alias));
+      const bool aliased = parameter.letter != 0 && text.starts_with(fmt::format("-{}", parameter.letter));
       const bool named =
           sets(words_[i], parameter.name) || (!parameter.synonym.empty() && sets(words_[i], parameter.synonym));
-      if (named || aliased || (parameter.positional && text == value)) return i;
+      if (named || aliased || (parameter.isPositional && text == value)) return i;
     }
     return 0;
   }
@@ -289,11 +305,11 @@ class ArgumentReader {
   }
 
   std::string shown(const Parameter& parameter) const {
-    return origin_ == Origin::commandLine && !parameter.positional ? "--" + parameter.name : parameter.name;
+    return origin_ == Origin::commandLine && !parameter.isPositional ? "--" + parameter.name : parameter.name;
   }
 
   void take(const Parameter& parameter, const std::vector<std::string>& results) {
-    if (results.size() > 1 && !parameter.repeatable)
+    if (results.size() > 1 && !parameter.isRepeatable)
       throw ArgumentError(fmt::format("{}: given {} times; once is enough", shown(parameter), results.size()),
                           wordOf(parameter, results.back()));
     Arguments::Entry entry;
@@ -324,7 +340,7 @@ class ArgumentReader {
         if (text.empty()) refuse();
         break;
       case ParameterType::choice:
-        if (!contains(parameter.choices, text)) refuse(suggestion(text, parameter.choices, ""));
+        if (!contains(parameter.choices, text)) refuse(didYouMean(text, parameter.choices, ""));
         break;
       case ParameterType::flag:
         if (const auto on = parseFlag(text))
@@ -340,7 +356,7 @@ class ArgumentReader {
         if (auto numbers = parseNumbers(parameter, text))
           value.numbers = std::move(*numbers);
         else
-          refuse(suggestion(text, parameter.choices, ""));
+          refuse(didYouMean(text, parameter.choices, ""));
         break;
     }
     return value;
@@ -398,7 +414,7 @@ void perform(const Command& command, Session& session, const Arguments& argument
     for (const Parameter& parameter : command.parameters) {
       const bool isInput = parameter.type == ParameterType::path || parameter.type == ParameterType::text;
       if (outputs ? parameter.type != ParameterType::outputPath : !isInput) continue;
-      if (arguments.given(parameter.name) && !parameter.repeatable) files.push_back(arguments.text(parameter.name));
+      if (arguments.given(parameter.name) && !parameter.isRepeatable) files.push_back(arguments.text(parameter.name));
     }
     return files;
   };

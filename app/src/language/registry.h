@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <span>
@@ -14,53 +13,11 @@
 #include <vector>
 
 #include "hpsdf/error.h"
+#include "language/parameter.h"
 
 namespace hpsdf::app {
 
 class Session;
-
-enum class ParameterType : std::uint8_t {
-  text,
-  path,        ///< name of a file to read
-  outputPath,  ///< name of a file or folder to write
-  number,
-  wholeNumber,
-  numbers,  ///< numbers separated by commas; `Parameter::counts` lists how many are accepted
-  choice,
-  flag,
-  size,  ///< WIDTHxHEIGHT
-};
-
-/// When a parameter is required. A script works on the current field, the command line starts without one.
-enum class Need : std::uint8_t { optional, onCommandLine, always };
-
-/// Where help texts show a parameter.
-enum class Audience : std::uint8_t {
-  common,    ///< in every help text
-  advanced,  ///< only where all options are asked for: --help-all, docs/commands.md
-};
-
-struct Parameter {
-  std::string name = {};
-  ParameterType type = ParameterType::text;
-  std::string help = {};
-  std::string defaultText = {};  ///< the default as a user would write it; "" without a default
-  std::string valueName = {};    ///< name of the value in help texts, e.g. "FILE"; "" for the name of its type
-  std::string unit = {};
-  std::optional<double> minimum = {};
-  std::optional<double> maximum = {};
-  bool minimumExcluded = false;
-  bool whole = false;                     ///< `numbers` accepts whole numbers only
-  std::vector<std::string> choices = {};  ///< values of a `choice`, or words that `numbers` accepts instead of numbers
-  std::vector<std::size_t> counts = {};   ///< how many values `numbers` accepts
-  char alias = 0;                         ///< one-letter spelling: o for -o
-  bool positional = false;
-  bool repeatable = false;
-  Need need = Need::optional;
-  std::string synonym = {};  ///< second accepted name, which help texts prefer; "" without one
-  std::string group = {};    ///< heading above the parameter in help texts; "" for the general one
-  Audience audience = Audience::common;
-};
 
 /// The validated values of one call.
 class Arguments {
@@ -99,7 +56,7 @@ class Arguments {
 struct Command {
   std::string name = {};
   std::string summary = {};                ///< one line
-  std::string help = {};                   ///< paragraphs separated by empty lines
+  std::string help = {};                   ///< paragraphs separated by empty lines; see `paragraphs`
   std::vector<std::string> examples = {};  ///< shell commands; script lines where the command is for scripts only
   std::vector<Parameter> parameters = {};
   std::function<void(Session&, const Arguments&)> action = {};
@@ -112,21 +69,13 @@ struct Command {
   bool includesScript = false;    ///< the lines of the script that the parameter `script` names replace the command
 };
 
-/// Group and audience of a parameter in help texts, for every command that has a parameter of this name.
-struct ParameterPresentation {
-  std::string_view name;
-  std::string_view group;
-  Audience audience = Audience::common;
-  std::string_view synonym = {};
-};
-
 class Registry {
  public:
   /// Adds the command, and to it the parameter `json`, which every command has. Throws std::logic_error where a command
   /// of that name exists.
   void add(Command command);
-  /// Applies the table to the parameters of all commands that have no group of their own.
-  void present(std::span<const ParameterPresentation> table);
+  /// Does the same with a command that the command line does not have.
+  void addForScripts(Command command);
   const std::vector<Command>& commands() const { return commands_; }
   /// Throws `Error` with the nearest known name where there is no such command.
   const Command& command(std::string_view name) const;
@@ -138,8 +87,8 @@ class Registry {
 /// Returns the parameter that has this name or synonym, or null.
 const Parameter* findParameter(const Command& command, std::string_view name);
 
-/// Concatenates tables of parameters.
-std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
+/// Joins the lines of each paragraph of a text, in which empty lines separate the paragraphs.
+std::string paragraphs(std::string_view text);
 
 /// One word of a call with its position.
 struct Word {

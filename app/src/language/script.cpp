@@ -8,6 +8,7 @@
 
 #include "console/failed.h"
 #include "files/text_file.h"
+#include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
 #include "text/text.h"
 
@@ -159,7 +160,7 @@ class Scanner {
     std::vector<std::string> known;
     for (const auto& [other, value] : variables) known.push_back(other);
     const std::string remedy = fmt::format("give {}=VALUE after the script, or 'set {}=VALUE'", name, name);
-    return fmt::format("unknown variable ${}; {}", name, suggestion(name, known, remedy, "$"));
+    return fmt::format("unknown variable ${}; {}", name, didYouMean(name, known, remedy, "$"));
   }
 
   std::string_view name_;

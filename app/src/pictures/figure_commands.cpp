@@ -4,12 +4,12 @@
 #include <fmt/ranges.h>
 
 #include "console/failed.h"
+#include "hpsdf/detail/nearest_name.h"
 #include "language/expectation.h"
 #include "pictures/readout.h"
 #include "session/field_summary.h"
 #include "session/session.h"
 #include "text/json.h"
-#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -83,7 +83,7 @@ double numberAt(Json json, const Expectation& expectation) {
       std::vector<std::string> known;
       for (const auto& [name, value] : json.items()) known.push_back(name);
       throw Error(fmt::format("{} has no '{}'; {}", path, key,
-                              suggestion(key, known, fmt::format("it has {}", fmt::join(known, ", ")))));
+                              didYouMean(key, known, fmt::format("it has {}", fmt::join(known, ", ")))));
     }
     json = isElement ? Json(json[std::size_t(*parseNumber(key))]) : Json(json[key]);
     path += "." + key;
@@ -124,54 +124,36 @@ void runExpect(Session& session, const Arguments& arguments) {
 }  // namespace
 
 void addFigureCommands(Registry& registry) {
-  registry.add({.name = "pick",
-                .summary = "Tell what a pixel of the last picture shows.",
-                .help =
-                    "Position, value as it was drawn, cell, degree and depth, and the field's gradient there. Pixels "
-                    "are counted from the upper left corner of the whole picture; of several samples the middle "
-                    "one is taken.",
-                .examples = {"pick 640,360", "pick 100,200 json=true"},
-                .parameters = {{.name = "pixel",
-                                .type = ParameterType::numbers,
-                                .help = "Column and row.",
-                                .valueName = "X,Y",
-                                .minimum = 0,
-                                .maximum = 16383,
-                                .whole = true,
-                                .counts = {2},
-                                .positional = true,
-                                .need = Need::always}},
-                .action = runPick,
-                .scriptOnly = true});
-  registry.add(
-      {.name = "expect",
-       .summary = "Check a figure: the script ends with status 1 where it does not hold.",
-       .help =
-           "EXPRESSION is FIGURE OPERATOR NUMBER, the operator ==, !=, <, <=, > or >=; with == and !=, 'within' and a "
-           "tolerance may follow. Figures are\n"
-           "\n"
-           "stats.NAME: what 'info --json' says, e.g. stats.leaves, stats.rms_estimate, stats.degree_volume.3;\n"
-           "\n"
-           "jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;\n"
-           "\n"
-           "pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, "
-           "gradient.0, slope; exact and error where the exact distance is known; jump.value and jump.gradient at the "
-           "nearest face of its cell;\n"
-           "\n"
-           "at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is "
-           "known.",
-       .examples = {"expect stats.leaves < 60000", "expect jumps.max < 1e-2", "expect pick(640,360).degree == 4",
-                    "expect at(0,0,0.5).value == 0.1 within 1e-5"},
-       .parameters = {{.name = "expression",
-                       .type = ParameterType::text,
-                       .help = "What should hold.",
-                       .valueName = "EXPRESSION",
-                       .positional = true,
-                       .repeatable = true,
-                       .need = Need::always}},
-       .action = runExpect,
-       .check = [](const Arguments& arguments) { parseExpectation(expressionOf(arguments)); },
-       .scriptOnly = true});
+  registry.addForScripts({
+      .name = "pick",
+      .summary = "Tell what a pixel of the last picture shows.",
+      .help = "Position, value as it was drawn, cell, degree and depth, and the field's gradient there. Pixels are "
+              "counted from the upper left corner of the whole picture; of several samples the middle one is taken.",
+      .examples = {"pick 640,360", "pick 100,200 json=true"},
+      .parameters = {{"pixel", wholeNumbers("X,Y", {2}).within(0, 16383).positional().required(), "Column and row."}},
+      .action = runPick,
+  });
+  registry.addForScripts({
+      .name = "expect",
+      .summary = "Check a figure: the script ends with status 1 where it does not hold.",
+      .help = paragraphs(R"(
+EXPRESSION is FIGURE OPERATOR NUMBER, the operator ==, !=, <, <=, > or >=; with == and !=, 'within' and a tolerance may
+follow. Figures are
+
+stats.NAME: what 'info --json' says, e.g. stats.leaves, stats.rms_estimate, stats.degree_volume.3;
+
+jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;
+
+pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, gradient.0, slope; exact
+and error where the exact distance is known; jump.value and jump.gradient at the nearest face of its cell;
+
+at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is known.)"),
+      .examples = {"expect stats.leaves < 60000", "expect jumps.max < 1e-2", "expect pick(640,360).degree == 4",
+                   "expect at(0,0,0.5).value == 0.1 within 1e-5"},
+      .parameters = {{"expression", text("EXPRESSION").positional().repeatable().required(), "What should hold."}},
+      .action = runExpect,
+      .check = [](const Arguments& arguments) { parseExpectation(expressionOf(arguments)); },
+  });
 }
 
 }  // namespace hpsdf::app

@@ -11,7 +11,6 @@
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
 #include "files/film.h"
-#include "language/append_parameters.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
@@ -23,36 +22,16 @@ namespace hpsdf::app {
 namespace {
 
 std::vector<Parameter> filmParameters(const std::string& frames, const std::string& help) {
-  return {{.name = "output",
-           .type = ParameterType::outputPath,
-           .help = "A folder, which receives frame-0000.png, frame-0001.png …; or *.mp4, for which ffmpeg must be "
-                   "installed. Frames of an earlier run are removed from the folder; one that holds other things is "
-                   "refused.",
-           .valueName = "FOLDER|FILE.mp4",
-           .alias = 'o',
-           .need = Need::always},
-          {.name = "frames",
-           .type = ParameterType::wholeNumber,
-           .help = help,
-           .defaultText = frames,
-           .minimum = 2,
-           .maximum = 10000},
-          {.name = "fps",
-           .type = ParameterType::number,
-           .help = "Frames a second of an .mp4.",
-           .defaultText = "12",
-           .minimum = 0.1,
-           .maximum = 240}};
+  return {{"output", outputFile("FOLDER|FILE.mp4").as('o').required(),
+           "A folder, which receives frame-0000.png, frame-0001.png …; or *.mp4, for which ffmpeg must be installed. "
+           "Frames of an earlier run are removed from the folder; one that holds other things is refused."},
+          {"frames", wholeNumber().within(2, 10000).byDefault(frames), help},
+          {"fps", number().within(0.1, 240).byDefault("12"), "Frames a second of an .mp4."}};
 }
 
-/// The parameters of another command but those named in `without`.
-std::vector<Parameter> parametersOf(const Registry& registry, std::string_view command,
-                                    std::initializer_list<std::string_view> without) {
-  std::vector<Parameter> parameters = registry.command(command).parameters;
-  std::erase_if(parameters, [&](const Parameter& parameter) {
-    return parameter.name == "json" || std::ranges::find(without, parameter.name) != without.end();
-  });
-  return parameters;
+/// The parameters of a command that draws, without those of its files.
+std::vector<Parameter> drawingParameters(const Registry& registry, std::string_view command) {
+  return without({"field", "output", "json"}, registry.command(command).parameters);
 }
 
 void step(const Progress& progress, std::size_t done, std::size_t all) {
@@ -105,7 +84,7 @@ Registry drawingCommands(const Registry& registry) {
   Registry result;
   for (const char* name : {"slice", "render"}) {
     Command command = registry.command(name);
-    command.parameters = parametersOf(registry, name, {"field", "output"});
+    command.parameters = drawingParameters(registry, name);
     result.add(std::move(command));
   }
   return result;
@@ -211,7 +190,7 @@ void runFrames(Session& session, const Registry& commands, const Arguments& argu
 }
 
 Command turntableCommand(const Registry& registry) {
-  Command command{
+  return {
       .name = "turntable",
       .summary = "Draw a field's surface from all around, as frames or an MP4.",
       .help =
@@ -220,43 +199,34 @@ Command turntableCommand(const Registry& registry) {
           "shown, that of the first frame holds for all.",
       .examples = {"hpsdf turntable bunny.hpsdf -o bunny.mp4 --size 960x540 --samples 2",
                    "hpsdf turntable bunny.hpsdf -o turn --frames 36 --color degree"},
-      .parameters = {fieldParameter()},
-      .action = runTurntable};
-  append(command.parameters, filmParameters("72", "How many, for the whole circle."));
-  append(command.parameters, parametersOf(registry, "render", {"field", "output"}));
-  return command;
+      .parameters = joined({{fieldParameter()},
+                            filmParameters("72", "How many, for the whole circle."),
+                            drawingParameters(registry, "render")}),
+      .action = runTurntable,
+  };
 }
 
 Command framesCommand(const Registry& registry) {
   const auto shared = std::make_shared<const Registry>(drawingCommands(registry));
-  Command command{
+  return {
       .name = "frames",
       .summary = "Draw how a field refines itself, as frames or an MP4.",
-      .help =
-          "The first frame has the base cells, the last the finished field; those between have a number of "
-          "refinement steps that grows by an even factor from 1. Takes the options of 'hpsdf build', and in 'of' the "
-          "command that draws each frame. Legend and scale are those of the finished field in all frames. The "
-          "surface's distances are taken twice: once to know the number of steps, once for the frames. In a script "
-          "the finished field becomes the current one.",
+      .help = paragraphs(R"(
+The first frame has the base cells, the last the finished field; those between have a number of refinement steps that
+grows by an even factor from 1. Takes the options of 'hpsdf build', and in 'of' the command that draws each frame.
+Legend and scale are those of the finished field in all frames. The surface's distances are taken twice: once to know
+the number of steps, once for the frames. In a script the finished field becomes the current one.)"),
       .examples = {"hpsdf frames bunny.obj -o refinement.mp4",
                    "hpsdf frames builtin:gear -o steps --frames 12 --of 'render color=depth size=960x540'"},
-      .parameters = {{.name = "mesh",
-                      .type = ParameterType::text,
-                      .help = "Mesh file, builtin:SHAPE or analytic:SHAPE.",
-                      .valueName = "MESH",
-                      .positional = true,
-                      .need = Need::always}},
+      .parameters =
+          joined({{{"mesh", text("MESH").positional().required(), "Mesh file, builtin:SHAPE or analytic:SHAPE."}},
+                  filmParameters("30", "How many; fewer where the construction has fewer steps."),
+                  {{"of", text("COMMAND").byDefault("slice"),
+                    "What draws each frame: slice or render with options of theirs, as a line of a script."}},
+                  buildParameters()}),
       .action = [shared](Session& session, const Arguments& arguments) { runFrames(session, *shared, arguments); },
-      .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); }};
-  append(command.parameters, filmParameters("30", "How many; fewer where the construction has fewer steps."));
-  command.parameters.push_back({.name = "of",
-                                .type = ParameterType::text,
-                                .help = "What draws each frame: slice or render with options of theirs, as a line of a "
-                                        "script.",
-                                .defaultText = "slice",
-                                .valueName = "COMMAND"});
-  append(command.parameters, buildParameters());
-  return command;
+      .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); },
+  };
 }
 
 }  // namespace

@@ -17,7 +17,6 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/picture.h"
-#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
@@ -194,35 +193,23 @@ void runReport(Session& session, const Arguments& arguments) {
 }  // namespace
 
 void addReportCommand(Registry& registry) {
-  Command command{
+  registry.add({
       .name = "report",
       .summary = "Write one offline page: pictures and figures of a field.",
       .help =
           "SOURCE is a field's file (*.hpsdf) or anything that 'hpsdf build' takes, with the same options. The folder "
           "receives index.html, its pictures, each with the command that makes it, and the field itself.",
       .examples = {"hpsdf report bunny.hpsdf -o report", "hpsdf report builtin:torus -o torus --target-error 1e-7"},
-      .parameters = {{.name = "source",
-                      .type = ParameterType::text,
-                      .help = "A field's file, a mesh or a shape; in a script, the current field when left out.",
-                      .valueName = "SOURCE",
-                      .positional = true,
-                      .need = Need::onCommandLine},
-                     {.name = "output",
-                      .type = ParameterType::outputPath,
-                      .help = "The folder; made when it is not there.",
-                      .valueName = "FOLDER",
-                      .alias = 'o',
-                      .need = Need::always},
-                     {.name = "samples",
-                      .type = ParameterType::wholeNumber,
-                      .help = "Samples a pixel of the pictures along each axis; the timed frame has one.",
-                      .defaultText = "2",
-                      .minimum = 1,
-                      .maximum = 8}},
-      .action = runReport};
-  append(command.parameters, buildParameters());
-  append(command.parameters, backendParameters());
-  registry.add(std::move(command));
+      .parameters =
+          joined({{{"source", text("SOURCE").positional().requiredOnCommandLine(),
+                    "A field's file, a mesh or a shape; in a script, the current field when left out."},
+                   {"output", outputFile("FOLDER").as('o').required(), "The folder; made when it is not there."},
+                   {"samples", wholeNumber().within(1, 8).byDefault("2").under(kPicture),
+                    "Samples a pixel of the pictures along each axis; the timed frame has one."}},
+                  buildParameters(),
+                  backendParameters()}),
+      .action = runReport,
+  });
 }
 
 }  // namespace hpsdf::app

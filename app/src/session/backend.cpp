@@ -7,17 +7,11 @@
 namespace hpsdf::app {
 
 std::vector<Parameter> backendParameters() {
-  return {{.name = "cpu",
-           .type = ParameterType::flag,
-           .help = "Draws in double precision on the CPU, without OpenGL. It is slow; use it as the reference, or "
-                   "where there is no "
-                   "OpenGL.",
-           .defaultText = "false"},
-          {.name = "gl",
-           .type = ParameterType::choice,
-           .help = "Selects the OpenGL device. auto takes a graphics card where there is one, else software.",
-           .defaultText = "auto",
-           .choices = {"auto", "software", "hardware"}}};
+  return {{"cpu", flag().under(kPicture),
+           "Draws in double precision on the CPU, without OpenGL. It is slow; use it as the reference, or where there "
+           "is no OpenGL."},
+          {"gl", choice({"auto", "software", "hardware"}).byDefault("auto").under(kPicture).advanced(),
+           "Selects the OpenGL device. auto takes a graphics card where there is one, else software."}};
 }
 
 render::GlChoice glChoice(const Arguments& arguments) {

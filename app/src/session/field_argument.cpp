@@ -8,12 +8,8 @@
 namespace hpsdf::app {
 
 Parameter fieldParameter() {
-  return {.name = "field",
-          .type = ParameterType::path,
-          .help = "The file of a field. A script may leave it out and works on the current field then.",
-          .valueName = "FIELD",
-          .positional = true,
-          .need = Need::onCommandLine};
+  return {"field", file("FIELD").positional().requiredOnCommandLine(),
+          "The file of a field. A script may leave it out and works on the current field then."};
 }
 
 void loadField(Session& session, const std::string& file) {

@@ -7,6 +7,12 @@
 
 namespace hpsdf::app {
 
+Parameter surfaceParameter() {
+  return {"mesh", text("MESH").positional(),
+          "The surface from which the field was made: a mesh file, builtin:SHAPE or analytic:SHAPE. It may be left out "
+          "where the field was made from a built-in or analytic shape."};
+}
+
 std::string surfaceOf(const CurrentField& current, const char* asked) {
   const std::string& source = current.field.metadata().source.name;
   if (!current.surface.empty()) return current.surface;

@@ -10,6 +10,9 @@
 
 namespace hpsdf::app {
 
+/// Returns the parameter `mesh` of commands that compare a field with its surface.
+Parameter surfaceParameter();
+
 /// Returns the mesh file or shape from which a field was made. Throws `Error` where that is unknown; the message asks
 /// for `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");

@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <functional>
-#include <iterator>
 #include <optional>
 
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "files/film.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/session.h"
@@ -232,13 +230,12 @@ void runSimulate(Session& session, const Arguments& arguments) {
 /// The camera parameters of `render`, with the meaning that camera and target have in simulations.
 std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
   std::vector<Parameter> parameters = cameraParameters(registry);
-  Parameter& camera = *std::ranges::find(parameters, "camera", &Parameter::name);
+  Parameter& camera = parameterNamed("camera", parameters);
   camera.help =
       "Azimuth and elevation in degrees, and how far the eye is: 1 is where all of the scene, as it starts, is just in "
       "view, which is the default; each scene has its own direction.";
   camera.defaultText.clear();
-  Parameter& target = *std::ranges::find(parameters, "target", &Parameter::name);
-  target.help =
+  parameterNamed("target", parameters).help =
       "The point in the picture's middle, in the scene's coordinates, z up; when left out, all of the scene is in the "
       "middle.";
   return parameters;
@@ -246,105 +243,43 @@ std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
 
 /// The parameters of the scene and its bodies.
 std::vector<Parameter> sceneParameters(const std::vector<std::string>& sceneNames) {
-  return {{.name = "scene",
-           .type = ParameterType::choice,
-           .help = "Which scene.",
-           .choices = sceneNames,
-           .positional = true,
-           .need = Need::always},
-          {.name = "seconds",
-           .type = ParameterType::number,
-           .help = "How long, in simulated time; each scene has its own default.",
-           .unit = "seconds",
-           .minimum = 0,
-           .maximum = 3600,
-           .minimumExcluded = true},
-          {.name = "bodies",
-           .type = ParameterType::wholeNumber,
-           .help = "How many bodies move.",
-           .minimum = 1,
-           .maximum = 20000},
-          {.name = "nodes",
-           .type = ParameterType::wholeNumber,
-           .help = "How many nodes the cloth has at least; 160,000 make 320,000 triangles.",
-           .minimum = 4,
-           .maximum = 1e6},
-          {.name = "points",
-           .type = ParameterType::wholeNumber,
-           .help = "Points on the surface of each kind of body.",
-           .minimum = 1,
-           .maximum = 1e6},
-          {.name = "body",
-           .type = ParameterType::text,
-           .help = "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope.",
-           .valueName = "MESH",
-           .repeatable = true},
-          {.name = "ground",
-           .type = ParameterType::text,
-           .help = "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where "
-                   "it is as large as it is: 2 wide suits the marbles.",
-           .valueName = "MESH"},
-          {.name = "up",
-           .type = ParameterType::choice,
-           .help = "The axis that points up in mesh files. In shapes it is z.",
-           .defaultText = "y",
-           .choices = {"y", "z"}}};
+  return {
+      {"scene", choice(sceneNames).positional().required(), "Which scene."},
+      {"seconds", number().above(0).atMost(3600).in("seconds"),
+       "How long, in simulated time; each scene has its own default."},
+      {"bodies", wholeNumber().within(1, 20000), "How many bodies move."},
+      {"nodes", wholeNumber().within(4, 1e6), "How many nodes the cloth has at least; 160,000 make 320,000 triangles."},
+      {"points", wholeNumber().within(1, 1e6), "Points on the surface of each kind of body."},
+      {"body", text("MESH").repeatable(),
+       "A mesh file or shape that bodies are made of; may be repeated. For poles, run and slope."},
+      {"ground", text("MESH"),
+       "The mesh file or shape that things fall on. For cloth, and for bowl, helix and run, where it is as large as it "
+       "is: 2 wide suits the marbles."},
+      {"up", choice({"y", "z"}).byDefault("y").under(kCamera).advanced(),
+       "The axis that points up in mesh files. In shapes it is z."}};
 }
 
 /// The parameters of the fields and of the solver.
 std::vector<Parameter> solverParameters() {
-  return {{.name = "target-error",
-           .type = ParameterType::number,
-           .help = "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, "
-                   "and 1e-8 in the bowl.",
-           .minimum = 0,
-           .minimumExcluded = true},
-          {.name = "cache",
-           .type = ParameterType::outputPath,
-           .help = "A folder in which fields are kept, and taken from the next time.",
-           .valueName = "FOLDER"},
-          {.name = "rate",
-           .type = ParameterType::number,
-           .help = "Steps a second. Fast or small things need more.",
-           .defaultText = "240",
-           .minimum = 1,
-           .maximum = 100000},
-          {.name = "iterations",
-           .type = ParameterType::wholeNumber,
-           .help = "Of Bullet's solver, in each step.",
-           .defaultText = "20",
-           .minimum = 1,
-           .maximum = 1000},
-          {.name = "seed",
-           .type = ParameterType::wholeNumber,
-           .help = "Which random places and directions bodies start with.",
-           .defaultText = "1",
-           .minimum = 0,
-           .maximum = 1e9},
-          threadsParameter("The simulation is")};
+  return {
+      {"target-error", number().above(0).under(setting_group::kAsked),
+       "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, and 1e-8 in the bowl."},
+      {"cache", outputFile("FOLDER"), "A folder in which fields are kept, and taken from the next time."},
+      {"rate", number().within(1, 100000).byDefault("240"), "Steps a second. Fast or small things need more."},
+      {"iterations", wholeNumber().within(1, 1000).byDefault("20"), "Of Bullet's solver, in each step."},
+      seedParameter("Which random places and directions bodies start with."),
+      threadsParameter("The simulation is")};
 }
 
-/// The parameters of its pictures.
-std::vector<Parameter> pictureParameters(const Registry& registry) {
-  std::vector<Parameter> parameters = {
-      {.name = "output",
-       .type = ParameterType::outputPath,
-       .help = "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as "
-               "'turntable' has it; or *.mp4, for which ffmpeg must be installed. Without it nothing is "
-               "drawn.",
-       .valueName = "FILE.png|FOLDER|FILE.mp4",
-       .alias = 'o'},
-      {.name = "fps",
-       .type = ParameterType::number,
-       .help = "Frames a simulated second, at which an .mp4 plays.",
-       .defaultText = "30",
-       .minimum = 0.1,
-       .maximum = 10000}};
-  append(parameters, sceneCameraParameters(registry));
-  return parameters;
-}
+const std::vector<Parameter> kFilm = {
+    {"output", outputFile("FILE.png|FOLDER|FILE.mp4").as('o'),
+     "*.png, a still of the end; a folder, which receives frame-0000.png, frame-0001.png … as 'turntable' has it; or "
+     "*.mp4, for which ffmpeg must be installed. Without it nothing is drawn."},
+    {"fps", number().within(0.1, 10000).byDefault("30"), "Frames a simulated second, at which an .mp4 plays."}};
 
-Command simulateCommand(const Registry& registry) {
+}  // namespace
+
+void addSimulateCommand(Registry& registry) {
   std::string kinds;
   std::vector<std::string> names;
   for (const SceneKind& kind : scenes()) {
@@ -353,37 +288,29 @@ Command simulateCommand(const Registry& registry) {
         fmt::format("{}: {}{}; {:g} s.\n", kind.name, kind.help,
                     kind.defaults.bodies > 1 ? fmt::format(", {} by default", kind.defaults.bodies) : "", kind.seconds);
   }
-  Command command{
+  registry.add({
       .name = "simulate",
       .summary = "Let things fall onto each other, their fields as colliders: the paper's scenes, by Bullet.",
-      .help = "SCENE is one of\n" + kinds +
-              "\n"
-              "Each body's surface is sampled, and the samples are looked up in the fields of the bodies around, which "
-              "tell depth and direction; Bullet's solver does the rest. Bodies have a size of 1 or so, gravity is "
-              "9.81. Tells how many samples lay in other bodies, how deep, and what a step took. The same scene, "
-              "settings and seed end in the same state, whatever the number of threads.\n"
-              "\n"
-              "With --output it is drawn, which changes nothing of it: bodies in colours of their own, what stands in "
-              "clay, what has yet to come not at all. The field of one standing body is traced; in a script a still is "
-              "its picture, and it becomes the current field. All else are meshes, whose vertices within a pixel of "
-              "each other are drawn as one. Without a graphics card a frame takes some tenths of a second, with "
-              "hundreds of bodies of 100,000 triangles several seconds.\n"
-              "\n"
-              "The paper's meshes are not part of the program: give your own with --body and --ground.",
+      .help = "SCENE is one of\n" + kinds + "\n" + paragraphs(R"(
+Each body's surface is sampled, and the samples are looked up in the fields of the bodies around, which tell depth and
+direction; Bullet's solver does the rest. Bodies have a size of 1 or so, gravity is 9.81. Tells how many samples lay in
+other bodies, how deep, and what a step took. The same scene, settings and seed end in the same state, whatever the
+number of threads.
+
+With --output it is drawn, which changes nothing of it: bodies in colours of their own, what stands in clay, what has
+yet to come not at all. The field of one standing body is traced; in a script a still is its picture, and it becomes the
+current field. All else are meshes, whose vertices within a pixel of each other are drawn as one. Without a graphics
+card a frame takes some tenths of a second, with hundreds of bodies of 100,000 triangles several seconds.
+
+The paper's meshes are not part of the program: give your own with --body and --ground.)"),
       .examples = {"hpsdf simulate bowl", "hpsdf simulate poles --body bunny.obj --body dragon.obj --cache fields",
                    "hpsdf simulate cloth --ground dragon.obj --nodes 10000", "hpsdf simulate helix --json",
                    "hpsdf simulate bowl --bodies 300 --seconds 2 -o bowl.png --samples 2",
                    "hpsdf simulate slope -o slope.mp4 --view front --size 960x540"},
-      .parameters = sceneParameters(names),
+      .parameters = joined({sceneParameters(names), solverParameters(), kFilm, sceneCameraParameters(registry)}),
       .action = runSimulate,
-      .check = checkSimulate};
-  append(command.parameters, solverParameters());
-  append(command.parameters, pictureParameters(registry));
-  return command;
+      .check = checkSimulate,
+  });
 }
-
-}  // namespace
-
-void addSimulateCommand(Registry& registry) { registry.add(simulateCommand(registry)); }
 
 }  // namespace hpsdf::app

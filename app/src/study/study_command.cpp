@@ -74,9 +74,8 @@ void checkStudy(const Arguments& arguments) {
 }  // namespace
 
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names) {
-  std::vector<Parameter> parameters = buildParameters();
-  std::erase_if(parameters, [&](const Parameter& p) { return std::ranges::find(names, p.name) != names.end(); });
-  for (Parameter& parameter : parameters) parameter.repeatable = parameter.type != ParameterType::flag;
+  std::vector<Parameter> parameters = without(names, buildParameters());
+  for (Parameter& parameter : parameters) parameter.isRepeatable = parameter.type != ParameterType::flag;
   return parameters;
 }
 
@@ -140,49 +139,32 @@ std::string rowText(const Json& row, const char* separator) {
   return fmt::format("{}", fmt::join(cells, separator));
 }
 
-namespace {
-
-const Command kStudy = {
-    .name = "study",
-    .summary = "Study size, time and accuracy of fields, as the paper does.",
-    .help =
-        "Builds fields of each MESH and writes tables and plots into a folder, as text for people and JSON for "
-        "programs. KIND selects the study:",
-    .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
-                 "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error 1e-7 --grid 6 "
-                 "--grid 10",
-                 "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
-    .parameters = {{.name = "kind",
-                    .type = ParameterType::choice,
-                    .help = "Kind of the study.",
-                    .positional = true,
-                    .need = Need::always},
-                   {.name = "mesh",
-                    .type = ParameterType::text,
-                    .help = "Mesh files, builtin:SHAPE or analytic:SHAPE.",
-                    .valueName = "MESH",
-                    .positional = true,
-                    .repeatable = true,
-                    .need = Need::always},
-                   {.name = "output",
-                    .type = ParameterType::outputPath,
-                    .help = "Folder of the results. It is created where it does not exist.",
-                    .valueName = "FOLDER",
-                    .alias = 'o',
-                    .need = Need::always}},
-    .action = [](Session& session, const Arguments& arguments) { studyOf(arguments).run(session, arguments); },
-    .check = checkStudy};
-
-}  // namespace
-
 void addStudyCommand(Registry& registry) {
-  Command command = kStudy;
+  std::string help =
+      "Builds fields of each MESH and writes tables and plots into a folder, as text for people and JSON for programs. "
+      "KIND selects the study:";
+  std::vector<std::string> kinds;
   for (const Study& study : studies()) {
-    command.parameters[0].choices.push_back(study.name);
-    command.help += fmt::format("\n\n{}: {}", study.name, study.help);
+    kinds.push_back(study.name);
+    help += fmt::format("\n\n{}: {}", study.name, study.help);
   }
-  command.parameters = joined({command.parameters, kindParameters()});
-  registry.add(std::move(command));
+  registry.add({
+      .name = "study",
+      .summary = "Study size, time and accuracy of fields, as the paper does.",
+      .help = help,
+      .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
+                   "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error 1e-7 --grid 6 "
+                   "--grid 10",
+                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
+      .parameters = joined(
+          {{{"kind", choice(kinds).positional().required(), "Kind of the study."},
+            {"mesh", text("MESH").positional().repeatable().required(), "Mesh files, builtin:SHAPE or analytic:SHAPE."},
+            {"output", outputFile("FOLDER").as('o').required(),
+             "Folder of the results. It is created where it does not exist."}},
+           kindParameters()}),
+      .action = [](Session& session, const Arguments& arguments) { studyOf(arguments).run(session, arguments); },
+      .check = checkStudy,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <numeric>
 
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
@@ -13,6 +14,7 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
+#include "language/script.h"
 #include "session/session.h"
 #include "study/study_command.h"
 #include "text/json.h"
@@ -146,32 +148,25 @@ void runContinuity(Session& session, const Arguments& arguments) {
 }  // namespace
 
 Study continuityStudy() {
-  std::vector<std::size_t> counts;
-  for (std::size_t count = 1; count <= 32; ++count) counts.push_back(count);
-  Study study{
+  std::vector<std::size_t> counts(32);
+  std::iota(counts.begin(), counts.end(), 1);
+  std::vector<std::string> left = endParameters({BuildSetting::Ending::otherQuantity, BuildSetting::Ending::steps});
+  left.insert(left.end(), {"enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"});
+  return {
       .name = "continuity",
-      .help =
-          "the trade of weak continuity. Each mesh is built twice, as the options say and with every degree one "
-          "higher at the end, and each field is smoothed with each weight. For each: the RMS jump and the "
-          "greatest between cells, the measured RMS error over the domain and near the surface, bytes, the "
-          "solver's steps, and its time over the construction's. Ratios are over the mesh's field that was "
-          "neither enriched nor smoothed. Writes continuity.csv and continuity.json.",
-      .parameters = {{.name = "weights",
-                      .type = ParameterType::numbers,
-                      .help = "λ of weak continuity, one row each.",
-                      .defaultText = "30,10,2.5,1,0.4,0.1,0.03",
-                      .valueName = "λ,λ,…",
-                      .minimum = 0,
-                      .maximum = kMaxContinuityWeight,
-                      .minimumExcluded = true,
-                      .counts = counts}},
-      .run = runContinuity};
-  std::vector<std::string> without = endParameters({BuildSetting::Ending::otherQuantity, BuildSetting::Ending::steps});
-  for (const char* name : {"enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"})
-    without.emplace_back(name);
-  for (const auto& parameters : {samplingParameters(), buildParametersWithout(without)})
-    append(study.parameters, parameters);
-  return study;
+      .help = paragraphs(R"(
+the trade of weak continuity. Each mesh is built twice, as the options say and with every degree one higher at the end,
+and each field is smoothed with each weight. For each: the RMS jump and the greatest between cells, the measured RMS
+error over the domain and near the surface, bytes, the solver's steps, and its time over the construction's. Ratios are
+over the mesh's field that was neither enriched nor smoothed. Writes continuity.csv and continuity.json.)"),
+      .parameters = joined(
+          {{{"weights",
+             numbers("λ,λ,…", counts).above(0).atMost(kMaxContinuityWeight).byDefault("30,10,2.5,1,0.4,0.1,0.03"),
+             "λ of weak continuity, one row each."}},
+           samplingParameters(),
+           buildParametersWithout(left)}),
+      .run = runContinuity,
+  };
 }
 
 }  // namespace hpsdf::app

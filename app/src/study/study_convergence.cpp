@@ -19,6 +19,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
+#include "language/script.h"
 #include "session/field_summary.h"
 #include "session/session.h"
 #include "study/study_command.h"
@@ -262,53 +263,37 @@ void runConvergence(Session& session, const Arguments& arguments) {
 /// The parameters of `build`, with a nearness of 0, because the paper's curves show unweighted errors.
 std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
-  std::vector<std::string> without =
+  std::vector<std::string> left =
       endParameters({Ending::target, Ending::byDistance, Ending::otherQuantity, Ending::steps});
-  for (const char* name : {"near-distance", "strategy", "coefficients", "band", "bounds", "paper"})
-    without.emplace_back(name);
-  auto parameters = buildParametersWithout(without);
-  std::ranges::find(parameters, "nearness", &Parameter::name)->defaultText = "0";
+  left.insert(left.end(), {"near-distance", "strategy", "coefficients", "band", "bounds", "paper"});
+  std::vector<Parameter> parameters = buildParametersWithout(left);
+  parameterNamed("nearness", parameters).defaultText = "0";
   return parameters;
 }
 
 }  // namespace
 
 Study convergenceStudy() {
-  Study study{.name = "convergence",
-              .help =
-                  "error over the number of coefficients, for hp and for plain octrees of degree 2 and 1 (the "
-                  "paper's Figs. 3 and 4), each curve from one construction. The estimated RMS error of the "
-                  "construction stands beside RMS error and maximum measured at random points, whose exact "
-                  "distances are taken once. Errors are at the scale where the mesh's longest side is 2. Writes "
-                  "convergence.csv, convergence.json and, with gnuplot, a picture of each mesh; tells how many "
-                  "coefficients each strategy needs for the same measured RMS error.",
-              .parameters = {{.name = "at",
-                              .type = ParameterType::number,
-                              .help = "The measured RMS error at which strategies are compared. When left out, the "
-                                      "least that all of them reach.",
-                              .minimum = 0,
-                              .minimumExcluded = true},
-                             {.name = "max-coefficients",
-                              .type = ParameterType::wholeNumber,
-                              .help = "Where the curves end.",
-                              .defaultText = "1000000",
-                              .minimum = 100,
-                              .maximum = 4e8},
-                             {.name = "stages",
-                              .type = ParameterType::wholeNumber,
-                              .help = "How many points of a curve, about, for each factor of ten in the number of "
-                                      "coefficients.",
-                              .defaultText = "8",
-                              .minimum = 1,
-                              .maximum = 100},
-                             {.name = "no-plot",
-                              .type = ParameterType::flag,
-                              .help = "Write no pictures: gnuplot is not needed then.",
-                              .defaultText = "false"}},
-              .run = runConvergence};
-  for (const auto& parameters : {samplingParameters(), unweightedBuildParameters()})
-    append(study.parameters, parameters);
-  return study;
+  return {
+      .name = "convergence",
+      .help = paragraphs(R"(
+error over the number of coefficients, for hp and for plain octrees of degree 2 and 1 (the paper's Figs. 3 and 4), each
+curve from one construction. The estimated RMS error of the construction stands beside RMS error and maximum measured at
+random points, whose exact distances are taken once. Errors are at the scale where the mesh's longest side is 2. Writes
+convergence.csv, convergence.json and, with gnuplot, a picture of each mesh; tells how many coefficients each strategy
+needs for the same measured RMS error.)"),
+      .parameters =
+          joined({{{"at", number().above(0),
+                    "The measured RMS error at which strategies are compared. When left out, the least that all of "
+                    "them reach."},
+                   {"max-coefficients", wholeNumber().within(100, 4e8).byDefault("1000000"), "Where the curves end."},
+                   {"stages", wholeNumber().within(1, 100).byDefault("8"),
+                    "How many points of a curve, about, for each factor of ten in the number of coefficients."},
+                   {"no-plot", flag(), "Write no pictures: gnuplot is not needed then."}},
+                  samplingParameters(),
+                  unweightedBuildParameters()}),
+      .run = runConvergence,
+  };
 }
 
 }  // namespace hpsdf::app

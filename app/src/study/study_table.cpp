@@ -17,6 +17,7 @@
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/append_parameters.h"
+#include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_summary.h"
@@ -283,17 +284,16 @@ void runTable(Session& session, const Arguments& arguments) {
 }  // namespace
 
 Study tableStudy() {
-  Study study{.name = "table",
-              .help =
-                  "the paper's Table 1: vertices, faces, base grid, time, cells, degrees and depths as bars, τ, "
-                  "memory, error as estimated and as measured, slices. target-error, grid and the other options "
-                  "of 'hpsdf build' are given once for all meshes, or once for each in their order. Writes "
-                  "index.html, one page without network that can be mailed, table.md with its pictures, and "
-                  "table.json.",
-              .run = runTable};
-  for (const auto& parameters : {samplingParameters(), buildParametersWithout({"max-steps"}), backendParameters()})
-    append(study.parameters, parameters);
-  return study;
+  return {
+      .name = "table",
+      .help = paragraphs(R"(
+the paper's Table 1: vertices, faces, base grid, time, cells, degrees and depths as bars, τ, memory, error as estimated
+and as measured, slices. target-error, grid and the other options of 'hpsdf build' are given once for all meshes, or
+once for each in their order. Writes index.html, one page without network that can be mailed, table.md with its
+pictures, and table.json.)"),
+      .parameters = joined({samplingParameters(), buildParametersWithout({"max-steps"}), backendParameters()}),
+      .run = runTable,
+  };
 }
 
 }  // namespace hpsdf::app

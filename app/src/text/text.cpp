@@ -7,8 +7,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "hpsdf/detail/nearest_name.h"
-
 namespace hpsdf::app {
 
 std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
@@ -80,12 +78,6 @@ std::string plainName(const std::string& source) {
   std::ranges::replace_if(
       name, [](unsigned char c) { return !(std::isalnum(c) || c == '.' || c == '-' || c == '_'); }, '_');
   return name.empty() ? "field" : name;
-}
-
-std::string suggestion(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
-                       std::string_view prefix) {
-  const std::string nearest = nearestName(wanted, known);
-  return nearest.empty() ? std::string(otherwise) : fmt::format("did you mean '{}{}'?", prefix, nearest);
 }
 
 std::string boxText(const Box& box) { return vectorText(box.min(), box) + " to " + vectorText(box.max(), box); }

@@ -51,9 +51,4 @@ std::string printable(std::string_view text);
 /// Formats one indented line of a summary: a label and its value.
 std::string summaryRow(std::string_view label, const std::string& value);
 
-/// Returns "did you mean 'NAME'?" for the known name that is nearest to `wanted`, preceded by `prefix` within the
-/// quotes, or `otherwise` where none is near.
-std::string suggestion(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
-                       std::string_view prefix = "");
-
 }  // namespace hpsdf::app

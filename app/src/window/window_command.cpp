@@ -5,7 +5,6 @@
 #include "construction/surface.h"
 #include "explorer/view_state.h"
 #include "hpsdf/detail/output_file.h"
-#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "text/json.h"
@@ -43,51 +42,33 @@ void checkView(const Arguments& arguments) {
 }  // namespace
 
 void addWindowCommand(Registry& registry) {
-  Command command{
+  registry.add({
       .name = "view",
       .summary = "Look at a field in a window: turn it, cut it, colour it, build it anew.",
-      .help =
-          "FIELD is a field's file (*.hpsdf), or what 'build' takes: a mesh, builtin:SHAPE or analytic:SHAPE, from "
-          "which a field is built with the default settings first.\n"
-          "\n"
-          "Mouse over the picture: drag to turn the surface or move the slice, drag with the right button to move the "
-          "surface, wheel to go nearer or farther, hover to read out what is there. In the panels: Ctrl+click a "
-          "slider to type its number, Enter to set it; click one of the worst interfaces to fly there.\n"
-          "\n"
-          "Keys: Ctrl+Z undo, Ctrl+Y redo, Ctrl+C copy the view as lines of script, F12 write the frame as "
-          "hpsdf-0001.png or the next free number, Escape cancel a construction, Ctrl+Q close the window.\n"
-          "\n"
-          "Whatever is done is a command of scripts: with --record the whole session is one, and 'hpsdf run' does it "
-          "again without a window, to the same pixels. Open lists and texts that were not entered yet are put away "
-          "before a frame is written.",
+      .help = paragraphs(R"(
+FIELD is a field's file (*.hpsdf), or what 'build' takes: a mesh, builtin:SHAPE or analytic:SHAPE, from which a field is
+built with the default settings first.
+
+Mouse over the picture: drag to turn the surface or move the slice, drag with the right button to move the surface,
+wheel to go nearer or farther, hover to read out what is there. In the panels: Ctrl+click a slider to type its number,
+Enter to set it; click one of the worst interfaces to fly there.
+
+Keys: Ctrl+Z undo, Ctrl+Y redo, Ctrl+C copy the view as lines of script, F12 write the frame as hpsdf-0001.png or the
+next free number, Escape cancel a construction, Ctrl+Q close the window.
+
+Whatever is done is a command of scripts: with --record the whole session is one, and 'hpsdf run' does it again without
+a window, to the same pixels. Open lists and texts that were not entered yet are put away before a frame is written.)"),
       .examples = {"hpsdf view bunny.hpsdf", "hpsdf view builtin:torus --record session.hps --shot last.png"},
-      .parameters = {{.name = "field",
-                      .type = ParameterType::text,
-                      .help = "A field's file, a mesh, builtin:SHAPE or analytic:SHAPE.",
-                      .valueName = "FIELD|MESH",
-                      .positional = true,
-                      .need = Need::always},
-                     {.name = "size",
-                      .type = ParameterType::size,
-                      .help = "Of the window at first.",
-                      .defaultText = "1280x720",
-                      .unit = "pixels",
-                      .minimum = 64,
-                      .maximum = 8192,
-                      .whole = true,
-                      .counts = {2}},
-                     {.name = "record",
-                      .type = ParameterType::outputPath,
-                      .help = "Write what was done as a script, at the end.",
-                      .valueName = "SCRIPT"},
-                     {.name = "shot",
-                      .type = ParameterType::outputPath,
-                      .help = "Write the last frame, *.png, at the end."}},
+      .parameters = joined({{{"field", text("FIELD|MESH").positional().required(),
+                              "A field's file, a mesh, builtin:SHAPE or analytic:SHAPE."},
+                             {"size", size(64, 8192).byDefault("1280x720").under(kPicture), "Of the window at first."},
+                             {"record", outputFile("SCRIPT"), "Write what was done as a script, at the end."},
+                             {"shot", outputFile(), "Write the last frame, *.png, at the end."}},
+                            backendParameters()}),
       .action = runView,
       .check = checkView,
-      .commandLineOnly = true};
-  append(command.parameters, backendParameters());
-  registry.add(std::move(command));
+      .commandLineOnly = true,
+  });
 }
 
 }  // namespace hpsdf::app

@@ -10,6 +10,7 @@
 namespace hpsdf {
 namespace {
 
+using namespace setting_group;
 using Type = BuildSetting::Type;
 using Ending = BuildSetting::Ending;
 using Numbers = std::vector<double>;
@@ -52,280 +53,207 @@ struct Member<std::array<std::uint32_t, 3>> {
   }
 };
 
-/// Completes a setting with the access to its member of `BuildOptions`.
-template <auto kMember>
-BuildSetting member(BuildSetting setting) {
-  using Access = Member<std::remove_reference_t<decltype(std::declval<BuildOptions>().*kMember)>>;
-  setting.isChecked = Access::isChecked;
-  setting.get = [](const BuildOptions& options) { return Access::get(options.*kMember); };
-  setting.set = [](BuildOptions& options, Values numbers) { Access::set(options.*kMember, numbers); };
-  return setting;
-}
+/// What a setting accepts and how it takes part in a construction; the other columns of its row complete it.
+struct Kind : BuildSetting {
+  Kind& atLeast(double limit) { return with(minimum, limit); }
+  Kind& above(double limit) { return atLeast(limit).with(minimumExcluded, true); }
+  Kind& atMost(double limit) { return with(maximum, limit); }
+  Kind& within(double least, double most) { return atLeast(least).atMost(most); }
+  Kind& in(std::string_view nameOfUnit) { return with(unit, nameOfUnit); }
+  Kind& byDefault(double value) { return with(fallback, {value}); }
+  Kind& ends(Ending manner) { return with(ending, manner); }
+  Kind& insteadOf(std::string_view other) { return with(exclusive, other); }
+  Kind& of(std::string_view other, bool (*isOn)(const BuildOptions&)) {
+    return with(owner, other).with(hasOwner, isOn);
+  }
+  Kind& stored(int position) { return with(storedAt, position); }
+  Kind& inJson(std::string_view nameInJson) { return with(key, nameInJson); }
+  Kind& advanced() { return with(isAdvanced, true); }
+  Kind& undeciding() { return with(decides, false); }
+  Kind& hidden() { return with(isOffered, false); }
 
-/// Makes 0 of a number stand for a setting that asks for nothing.
-template <auto kMember>
-BuildSetting positiveMember(BuildSetting setting) {
-  setting = member<kMember>(setting);
-  setting.get = [](const BuildOptions& options) {
-    const double value = options.*kMember;
-    return value == 0 ? Numbers{} : Numbers{value};
-  };
-  return setting;
-}
+ private:
+  template <typename T>
+  Kind& with(T& value, std::type_identity_t<T> changed) {
+    value = std::move(changed);
+    return *this;
+  }
+};
 
-/// Completes a setting with the access to a member of the errors by distance, for which 0 stands for none.
-template <auto kMember>
-BuildSetting nearFarMember(BuildSetting setting) {
-  setting.isChecked = true;
-  setting.get = [](const BuildOptions& options) {
-    const double value = options.targetError.byDistance().*kMember;
-    return value == 0 ? Numbers{} : Numbers{value};
-  };
-  setting.set = [](BuildOptions& options, Values numbers) {
-    NearFarError error = options.targetError.byDistance();
-    error.*kMember = numbers.empty() ? 0 : numbers[0];
-    options.targetError = error;
-  };
-  return setting;
-}
+Kind number() { return {}; }
+Kind wholeNumber() { return {{.type = Type::wholeNumber}}; }
+Kind wholeNumbers() { return {{.type = Type::wholeNumbers}}; }
+Kind flag() { return {{.type = Type::flag}}; }
+Kind choice(std::vector<std::string_view> words) { return {{.type = Type::choice, .words = std::move(words)}}; }
 
-BuildSetting targetError(BuildSetting setting) {
-  setting.isChecked = true;
-  setting.get = [](const BuildOptions& options) {
-    const double weighted = options.targetError.weighted();
-    return weighted == 0 ? Numbers{} : Numbers{weighted};
-  };
-  setting.set = [](BuildOptions& options, Values numbers) { options.targetError = numbers.empty() ? 0 : numbers[0]; };
-  return setting;
-}
+/// Reads and changes a setting's value.
+struct Access {
+  bool isChecked;
+  Numbers (*get)(const BuildOptions&);
+  void (*set)(BuildOptions&, Values);
+};
+
+/// The access to a member of `BuildOptions`.
+template <auto kMember, typename M = Member<std::remove_reference_t<decltype(std::declval<BuildOptions>().*kMember)>>>
+constexpr Access member = {M::isChecked, [](const BuildOptions& options) { return M::get(options.*kMember); },
+                           [](BuildOptions& options, Values numbers) { M::set(options.*kMember, numbers); }};
+
+/// No number where `value` is 0, which stands for a setting that asks for nothing.
+Numbers unlessZero(double value) { return value == 0 ? Numbers{} : Numbers{value}; }
+
+/// The access to a member for which 0 stands for none.
+template <auto kMember>
+constexpr Access positive = {true, [](const BuildOptions& options) { return unlessZero(options.*kMember); },
+                             member<kMember>.set};
+
+/// The access to a member of the errors by distance, for which 0 stands for none.
+template <auto kMember>
+constexpr Access nearFar = {
+    true, [](const BuildOptions& options) { return unlessZero(options.targetError.byDistance().*kMember); },
+    [](BuildOptions& options, Values numbers) {
+      NearFarError error = options.targetError.byDistance();
+      error.*kMember = numbers.empty() ? 0 : numbers[0];
+      options.targetError = error;
+    }};
+
+constexpr Access kWeightedError = {
+    true, [](const BuildOptions& options) { return unlessZero(options.targetError.weighted()); },
+    [](BuildOptions& options, Values numbers) { options.targetError = numbers.empty() ? 0 : numbers[0]; }};
 
 /// Both kinds of continuity as one choice: weak has bit 0 of the word's index, exact bit 1.
-BuildSetting continuity(BuildSetting setting) {
-  setting.get = [](const BuildOptions& options) {
-    return Numbers{(options.continuityWeight ? 1.0 : 0.0) + (options.blend > 0 ? 2.0 : 0.0)};
-  };
-  setting.set = [](BuildOptions& options, Values numbers) {
-    const int kinds = static_cast<int>(numbers[0]);
-    options.continuityWeight.reset();
-    if ((kinds & 1) != 0) options.continuityWeight = WeakContinuity{}.weight;
-    options.blend = (kinds & 2) != 0 ? kDefaultBlend : 0;
-  };
-  return setting;
-}
+constexpr Access kContinuity = {
+    false,
+    [](const BuildOptions& options) {
+      return Numbers{(options.continuityWeight ? 1.0 : 0.0) + (options.blend > 0 ? 2.0 : 0.0)};
+    },
+    [](BuildOptions& options, Values numbers) {
+      const int kinds = static_cast<int>(numbers[0]);
+      options.continuityWeight.reset();
+      if ((kinds & 1) != 0) options.continuityWeight = WeakContinuity{}.weight;
+      options.blend = (kinds & 2) != 0 ? kDefaultBlend : 0;
+    }};
 
-/// The goal of the construction, and its limits of bytes.
-const std::vector<BuildSetting> kGoals = {
-    targetError(
-        {.name = "target-error",
-         .help = "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, "
-                 "where L is that side in mesh units, so that the same τ gives the same cells in any unit. Smaller "
-                 "is more exact.",
-         .unit = "units^5 at that scale",
-         .minimum = 0,
-         .minimumExcluded = true,
-         .ending = Ending::target,
-         .storedAt = 1}),
-    member<&BuildOptions::grid>({.name = "grid",
-                                 .type = Type::wholeNumbers,
-                                 .help = "Base cells an axis: one number for all, or NX,NY,NZ.",
-                                 .minimum = 1,
-                                 .maximum = kMostInt}),
-    member<&BuildOptions::nearness>(
-        {.name = "nearness",
-         .help = "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike.",
-         .minimum = 0,
-         .maximum = 1000,
-         .storedAt = 2}),
-    member<&BuildOptions::nearnessKind>(
-        {.name = "nearness-kind",
-         .type = Type::choice,
-         .help = "How an error's weight falls with the distance s, where d is the domain's diagonal: polynomial, (1 − "
-                 "s/d)^θ, as in the paper, or exponential, exp(−θ s/d), which goes on falling far away.",
-         .words = {"polynomial", "exponential"},
-         .storedAt = 10}),
-    nearFarMember<&NearFarError::near>(
-        {.name = "near-error",
-         .help =
-             "RMS error to reach near the surface, with far-error, in place of target error and nearness, which then "
-             "follow, nearness by its exponential kind. By the estimate: 'hpsdf verify' measures what came of it.",
-         .unit = "world units",
-         .minimum = 0,
-         .minimumExcluded = true,
-         .ending = Ending::byDistance,
-         .exclusive = "target-error"}),
-    nearFarMember<&NearFarError::far>(
-        {.name = "far-error",
-         .help = "RMS error to reach farther away than near-distance, with near-error; not below it.",
-         .unit = "world units",
-         .minimum = 0,
-         .minimumExcluded = true,
-         .ending = Ending::byDistance,
-         .exclusive = "target-error"}),
-    nearFarMember<&NearFarError::nearDistance>(
-        {.name = "near-distance",
-         .help = "Distance up to which near-error holds. When left out, a hundredth of the mesh's longest side.",
-         .unit = "world units",
-         .minimum = 0,
-         .minimumExcluded = true,
-         .owner = "near-error",
-         .hasOwner = [](const BuildOptions& options) { return options.targetError.byDistance().near > 0; }}),
-    positiveMember<&BuildOptions::maxError>(
-        {.name = "max-error",
-         .help = "Error to be exceeded nowhere (within the band, if there is one): after the target, if one is "
-                 "given, every cell is probed at 512 points and refined where the error is greater. Expensive; "
-                 "takes no target error unless one is given.",
-         .unit = "world units",
-         .minimum = 0,
-         .minimumExcluded = true,
-         .ending = Ending::otherQuantity,
-         .storedAt = 11}),
-    member<&BuildOptions::maxBytes>(
-        {.name = "max-bytes",
-         .type = Type::wholeNumber,
-         .help = "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is "
-                 "given; with max-error it ends where that is reached.",
-         .unit = "bytes",
-         .minimum = 1,
-         .maximum = kMostBytes,
-         .ending = Ending::otherQuantity}),
-    member<&BuildOptions::memoryLimit>(
-        {.name = "memory-limit",
-         .type = Type::wholeNumber,
-         .help = "Memory that the construction may take, the mesh's exact distance included. Where more will be "
-                 "needed it stops as soon as that is certain, and tells how much. Weak continuity's solver takes "
-                 "about 50 bytes a coefficient on top, and a hull's pieces 80 MB at most. Left out: 1e8 besides that "
-                 "distance, some 240,000 cells, where target error, grid and max-steps are left out too; most "
-                 "meshes take less than 100,000 then. Else three quarters of the machine's memory, or of what its "
-                 "control group allows.",
-         .unit = "bytes",
-         .minimum = 1,
-         .maximum = kMostBytes,
-         .decides = false}),
+bool isByDistance(const BuildOptions& options) { return options.targetError.byDistance().near > 0; }
+bool isSmoothed(const BuildOptions& options) { return options.continuityWeight.has_value(); }
+bool isBlended(const BuildOptions& options) { return options.blend > 0; }
+
+struct Row : BuildSetting {
+  Row(std::string_view itsName, std::string_view itsGroup, const Kind& kind, const Access& access,
+      std::string_view itsHelp)
+      : BuildSetting(kind) {
+    name = itsName;
+    group = itsGroup;
+    help = itsHelp;
+    isChecked = access.isChecked;
+    get = access.get;
+    set = access.set;
+  }
 };
 
-/// The refinement of cells.
-const std::vector<BuildSetting> kRefinement = {
-    member<&BuildOptions::estimator>(
-        {.name = "estimator",
-         .type = Type::choice,
-         .help = "What estimates a cell's error: embedded, the coefficients of the top degree, as in the paper, or "
-                 "residual, the part of its samples that the fit does not represent. Neither evaluates the distance.",
-         .words = {"embedded", "residual"},
-         .storedAt = 8}),
-    member<&BuildOptions::criterion>(
-        {.name = "criterion",
-         .type = Type::choice,
-         .help = "How degrees and depths are chosen. paper: step by step, by the gain a coefficient. optimal: a "
-                 "little farther than needed, then back where that saves most bytes for the error: about half of the "
-                 "coefficients at equal error, for 1.3 times the distances.",
-         .words = {"paper", "optimal"},
-         .storedAt = 9}),
-    member<&BuildOptions::maxDegree>({.name = "max-degree",
-                                      .type = Type::wholeNumber,
-                                      .help = "Highest degree of a cell's polynomial.",
-                                      .minimum = 1,
-                                      .maximum = kMaxDegree,
-                                      .storedAt = 3}),
-    member<&BuildOptions::maxDepth>({.name = "max-depth",
-                                     .type = Type::wholeNumber,
-                                     .help = "How often a base cell may be halved.",
-                                     .minimum = 0,
-                                     .maximum = kMaxDepth,
-                                     .storedAt = 4}),
-    member<&BuildOptions::maxSteps>(
-        {.name = "max-steps",
-         .type = Type::wholeNumber,
-         .help = "End after so many steps of the refinement, each of which raises one cell's degree or halves it "
-                 "along each axis, though the target has not been reached: 0 for the base cells alone. When left "
-                 "out, no limit.",
-         .minimum = 0,
-         .maximum = kMostInt,
-         .ending = Ending::steps}),
-    member<&BuildOptions::strategy>(
-        {.name = "strategy",
-         .type = Type::choice,
-         .help = "hp refines degree and depth; h1 and h2 are octrees of degree 1 or 2, for comparison.",
-         .words = {"hp", "h1", "h2"},
-         .storedAt = 6}),
-    member<&BuildOptions::coefficients>(
-        {.name = "coefficients",
-         .type = Type::choice,
-         .help = "Precision of the coefficients. auto takes float where that changes the error by less than 1 %.",
-         .words = {"auto", "float", "double"}}),
-    member<&BuildOptions::quadrature>(
-        {.name = "quadrature",
-         .type = Type::wholeNumber,
-         .help = "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of "
-                 "the distances for the same error.",
-         .minimum = 2,
-         .maximum = 8,
-         .storedAt = 5}),
-    member<&BuildOptions::cubature>(
-        {.name = "cubature",
-         .type = Type::choice,
-         .help = "Rule by which cells are sampled: compact needs half the points for the same order where such rules "
-                 "are known (orders up to 13); product takes Gauss points along each axis, as the paper does.",
-         .words = {"compact", "product"}}),
-    member<&BuildOptions::trialSamples>(
-        {.name = "trial-samples", .type = Type::choice, .words = {"children", "own"}, .isOffered = false}),
-    member<&BuildOptions::band>({.name = "band",
-                                 .help = "Width of a narrow band: cells farther from the surface than this are not "
-                                         "refined and do not count. 0: no band.",
-                                 .unit = "world units",
-                                 .minimum = 0,
-                                 .storedAt = 7}),
-};
-
-/// Changes to the finished octree, and the number of threads.
-const std::vector<BuildSetting> kFinishing = {
-    member<&BuildOptions::enrich>(
-        {.name = "enrich",
-         .type = Type::flag,
-         .help = "Fit every cell anew at the end, one degree higher where max-degree allows: about twice the bytes, "
-                 "with which weak continuity costs hardly any error.",
-         .storedAt = 12,
-         .key = "enriched"}),
-    continuity({.name = "continuity",
-                .type = Type::choice,
-                .help =
-                    "What is done about the jumps from cell to cell. weak lets the cells' polynomials give way to "
-                    "each other at the end, so that the field jumps less for somewhat more error ('study continuity' "
-                    "shows the trade). exact: value and gradient are continuous everywhere, neighbours being blended "
-                    "in a thin zone along their faces; queries take up to twice as long. both: weak, then exact.",
-                .words = {"none", "weak", "exact", "both"}}),
-    member<&BuildOptions::continuityWeight>(
-        {.name = "continuity-weight",
-         .help = "λ of weak continuity: the cost of changing the field relative to that of its jumps. Small for "
-                 "little jump, great for little error.",
-         .minimum = 0,
-         .maximum = kMaxContinuityWeight,
-         .minimumExcluded = true,
-         .fallback = {WeakContinuity{}.weight},
-         .owner = "continuity weak",
-         .hasOwner = [](const BuildOptions& options) { return options.continuityWeight.has_value(); },
-         .storedAt = 13}),
-    positiveMember<&BuildOptions::blend>(
-        {.name = "blend-width",
-         .help = "How wide the blended zones are on either side of a face, as a part of a cell's edges: the wider, "
-                 "the gentler the gradients, and the slower the queries.",
-         .minimum = 0,
-         .maximum = kMaxBlend,
-         .minimumExcluded = true,
-         .fallback = {kDefaultBlend},
-         .owner = "continuity exact",
-         .hasOwner = [](const BuildOptions& options) { return options.blend > 0; },
-         .key = "blend"}),
-    member<&BuildOptions::bounds>(
-        {.name = "bounds",
-         .type = Type::flag,
-         .help = "Keep for each cell a proven bound of its error, and of its slope. With them rays and collisions "
-                 "miss nothing. They hold for closed meshes that do not intersect themselves."}),
-    member<&BuildOptions::threads>({.name = "threads",
-                                    .type = Type::wholeNumber,
-                                    .help = "Threads to use; 0 for all. The field is the same whatever their number.",
-                                    .minimum = 0,
-                                    .maximum = 1024,
-                                    .decides = false}),
+const std::vector<Row> kRows = {
+    // the goal of the construction, and its limits of bytes
+    {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
+     kWeightedError,
+     "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "
+     "that side in mesh units, so that the same τ gives the same cells in any unit. Smaller is more exact."},
+    {"grid", kMethod, wholeNumbers().within(1, kMostInt), member<&BuildOptions::grid>,
+     "Base cells an axis: one number for all, or NX,NY,NZ."},
+    {"nearness", kMethod, number().within(0, 1000).stored(2).advanced(), member<&BuildOptions::nearness>,
+     "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike."},
+    {"nearness-kind", kMethod, choice({"polynomial", "exponential"}).stored(10).advanced(),
+     member<&BuildOptions::nearnessKind>,
+     "How an error's weight falls with the distance s, where d is the domain's diagonal: polynomial, (1 − s/d)^θ, as "
+     "in the paper, or exponential, exp(−θ s/d), which goes on falling far away."},
+    {"near-error", kAsked, number().above(0).in("world units").ends(Ending::byDistance).insteadOf("target-error"),
+     nearFar<&NearFarError::near>,
+     "RMS error to reach near the surface, with far-error, in place of target error and nearness, which then follow, "
+     "nearness by its exponential kind. By the estimate: 'hpsdf verify' measures what came of it."},
+    {"far-error", kAsked, number().above(0).in("world units").ends(Ending::byDistance).insteadOf("target-error"),
+     nearFar<&NearFarError::far>, "RMS error to reach farther away than near-distance, with near-error; not below it."},
+    {"near-distance", kAsked, number().above(0).in("world units").of("near-error", isByDistance).advanced(),
+     nearFar<&NearFarError::nearDistance>,
+     "Distance up to which near-error holds. When left out, a hundredth of the mesh's longest side."},
+    {"max-error", kAsked, number().above(0).in("world units").ends(Ending::otherQuantity).stored(11),
+     positive<&BuildOptions::maxError>,
+     "Error to be exceeded nowhere (within the band, if there is one): after the target, if one is given, every cell "
+     "is probed at 512 points and refined where the error is greater. Expensive; takes no target error unless one is "
+     "given."},
+    {"max-bytes", kAsked, wholeNumber().within(1, kMostBytes).in("bytes").ends(Ending::otherQuantity),
+     member<&BuildOptions::maxBytes>,
+     "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given; with "
+     "max-error it ends where that is reached."},
+    {"memory-limit", kMethod, wholeNumber().within(1, kMostBytes).in("bytes").undeciding().advanced(),
+     member<&BuildOptions::memoryLimit>,
+     "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it stops as "
+     "soon as that is certain, and tells how much. Weak continuity's solver takes about 50 bytes a coefficient on top, "
+     "and a hull's pieces 80 MB at most. Left out: 1e8 besides that distance, some 240,000 cells, where target error, "
+     "grid and max-steps are left out too; most meshes take less than 100,000 then. Else three quarters of the "
+     "machine's memory, or of what its control group allows."},
+    // the refinement of cells
+    {"estimator", kMethod, choice({"embedded", "residual"}).stored(8).advanced(), member<&BuildOptions::estimator>,
+     "What estimates a cell's error: embedded, the coefficients of the top degree, as in the paper, or residual, the "
+     "part of its samples that the fit does not represent. Neither evaluates the distance."},
+    {"criterion", kMethod, choice({"paper", "optimal"}).stored(9), member<&BuildOptions::criterion>,
+     "How degrees and depths are chosen. paper: step by step, by the gain a coefficient. optimal: a little farther "
+     "than needed, then back where that saves most bytes for the error: about half of the coefficients at equal error, "
+     "for 1.3 times the distances."},
+    {"max-degree", kMethod, wholeNumber().within(1, kMaxDegree).stored(3).advanced(), member<&BuildOptions::maxDegree>,
+     "Highest degree of a cell's polynomial."},
+    {"max-depth", kMethod, wholeNumber().within(0, kMaxDepth).stored(4).advanced(), member<&BuildOptions::maxDepth>,
+     "How often a base cell may be halved."},
+    {"max-steps", kAsked, wholeNumber().within(0, kMostInt).ends(Ending::steps).advanced(),
+     member<&BuildOptions::maxSteps>,
+     "End after so many steps of the refinement, each of which raises one cell's degree or halves it along each axis, "
+     "though the target has not been reached: 0 for the base cells alone. When left out, no limit."},
+    {"strategy", kMethod, choice({"hp", "h1", "h2"}).stored(6).advanced(), member<&BuildOptions::strategy>,
+     "hp refines degree and depth; h1 and h2 are octrees of degree 1 or 2, for comparison."},
+    {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
+     "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
+    {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
+     "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
+     "for the same error."},
+    {"cubature", kMethod, choice({"compact", "product"}).advanced(), member<&BuildOptions::cubature>,
+     "Rule by which cells are sampled: compact needs half the points for the same order where such rules are known "
+     "(orders up to 13); product takes Gauss points along each axis, as the paper does."},
+    {"trial-samples", kMethod, choice({"children", "own"}).hidden(), member<&BuildOptions::trialSamples>, ""},
+    {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,
+     "Width of a narrow band: cells farther from the surface than this are not refined and do not count. 0: no band."},
+    // changes to the finished octree, and the number of threads
+    {"enrich", kMethod, flag().stored(12).inJson("enriched").advanced(), member<&BuildOptions::enrich>,
+     "Fit every cell anew at the end, one degree higher where max-degree allows: about twice the bytes, with which "
+     "weak continuity costs hardly any error."},
+    {"continuity", kResult, choice({"none", "weak", "exact", "both"}), kContinuity,
+     "What is done about the jumps from cell to cell. weak lets the cells' polynomials give way to each other at the "
+     "end, so that the field jumps less for somewhat more error ('study continuity' shows the trade). exact: value and "
+     "gradient are continuous everywhere, neighbours being blended in a thin zone along their faces; queries take up "
+     "to twice as long. both: weak, then exact."},
+    {"continuity-weight", kResult,
+     number()
+         .above(0)
+         .atMost(kMaxContinuityWeight)
+         .byDefault(WeakContinuity{}.weight)
+         .of("continuity weak", isSmoothed)
+         .stored(13)
+         .advanced(),
+     member<&BuildOptions::continuityWeight>,
+     "λ of weak continuity: the cost of changing the field relative to that of its jumps. Small for little jump, great "
+     "for little error."},
+    {"blend-width", kResult,
+     number()
+         .above(0)
+         .atMost(kMaxBlend)
+         .byDefault(kDefaultBlend)
+         .of("continuity exact", isBlended)
+         .inJson("blend")
+         .advanced(),
+     positive<&BuildOptions::blend>,
+     "How wide the blended zones are on either side of a face, as a part of a cell's edges: the wider, the gentler the "
+     "gradients, and the slower the queries."},
+    {"bounds", kResult, flag(), member<&BuildOptions::bounds>,
+     "Keep for each cell a proven bound of its error, and of its slope. With them rays and collisions miss nothing. "
+     "They hold for closed meshes that do not intersect themselves."},
+    {"threads", "General", wholeNumber().within(0, 1024).undeciding(), member<&BuildOptions::threads>,
+     "Threads to use; 0 for all. The field is the same whatever their number."},
 };
 
 /// Does not compile when `BuildOptions` gets a member more. Then the table needs another row, and this list a name.
@@ -354,11 +282,7 @@ std::string valueText(const BuildSetting& setting, Values numbers) {
 }  // namespace
 
 std::span<const BuildSetting> buildSettings() {
-  static const std::vector<BuildSetting> table = [] {
-    std::vector<BuildSetting> all;
-    for (const auto& part : {kGoals, kRefinement, kFinishing}) all.insert(all.end(), part.begin(), part.end());
-    return all;
-  }();
+  static const std::vector<BuildSetting> table(kRows.begin(), kRows.end());
   return table;
 }
 

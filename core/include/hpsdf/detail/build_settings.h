@@ -14,6 +14,11 @@
 
 namespace hpsdf {
 
+/// Headings above settings in help texts.
+namespace setting_group {
+constexpr std::string_view kAsked = "What you ask for", kResult = "What you get", kMethod = "How it is built";
+}
+
 /// One setting of `BuildOptions`. Its value is a list of numbers: one for a number; 0 or 1 for a flag; the index of a
 /// word for a choice; one for each axis of the grid; none where the setting asks for nothing.
 struct BuildSetting {
@@ -27,9 +32,10 @@ struct BuildSetting {
     steps,          ///< early, whatever the target
   };
 
-  std::string_view name;  ///< as users write it: "max-depth"
+  std::string_view name = {};  ///< as users write it: "max-depth"
   Type type = Type::number;
   std::string_view help = {};
+  std::string_view group = {};  ///< heading above it in help texts
   std::string_view unit = {};
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
@@ -43,6 +49,7 @@ struct BuildSetting {
   int storedAt = 0;           ///< its position among the settings in a field's file; 0: it is not stored
   bool decides = true;        ///< the field depends on it
   bool isOffered = true;      ///< the program has an option for it
+  bool isAdvanced = false;    ///< help texts show it only where all options are asked for
   bool isChecked = false;     ///< values out of range can be given in C++ and are refused
   std::string_view key = {};  ///< its name in JSON where that is not `name` with underscores
   std::vector<double> (*get)(const BuildOptions&) = nullptr;

@@ -55,10 +55,12 @@ inline std::string nearestName(std::string_view wanted, std::span<const std::str
   return best;
 }
 
-/// The end of a message about an unknown name: "did you mean 'NAME'?" where a known name is near, else `otherwise`.
-inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise) {
+/// The end of a message about an unknown name: "did you mean 'NAME'?" where a known name is near, with `prefix` before
+/// it, else `otherwise`.
+inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
+                              std::string_view prefix = "") {
   const std::string name = nearestName(wanted, known);
-  return name.empty() ? std::string(otherwise) : "did you mean '" + name + "'?";
+  return name.empty() ? std::string(otherwise) : "did you mean '" + std::string(prefix) + name + "'?";
 }
 
 }  // namespace hpsdf

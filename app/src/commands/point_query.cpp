@@ -1,4 +1,4 @@
-#include "language/point_query.h"
+#include "commands/point_query.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,123 @@
+#pragma once
+// What a command takes, described as rows of a table: name, kind and help text, for example
+//   {"zoom", number().above(0).byDefault("1"), "Magnification; 1 shows the whole section."}
+
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace hpsdf::app {
+
+enum class ParameterType : std::uint8_t {
+  text,
+  path,        ///< name of a file to read
+  outputPath,  ///< name of a file or folder to write
+  number,
+  wholeNumber,
+  numbers,  ///< numbers separated by commas; `ParameterKind::counts` lists how many are accepted
+  choice,
+  flag,
+  size,  ///< WIDTHxHEIGHT
+};
+
+/// When a parameter is required. A script works on the current field, the command line starts without one.
+enum class Need : std::uint8_t { optional, onCommandLine, always };
+
+/// Headings of parameters that several commands have. Help texts show the general ones last.
+constexpr std::string_view kGeneral = "General", kFiles = "Files", kCamera = "Camera", kColours = "Colours",
+                           kDrawn = "What is drawn", kPicture = "Picture";
+
+/// What a parameter accepts, and where help texts show it.
+struct ParameterKind {
+  ParameterType type = ParameterType::text;
+  std::string valueName = {};             ///< name of the value in help texts, e.g. "FILE"; "" for the name of its type
+  std::vector<std::string> choices = {};  ///< values of a `choice`, or words that `numbers` accepts instead of numbers
+  std::vector<std::size_t> counts = {};   ///< how many values `numbers` accepts
+  bool whole = false;                     ///< `numbers` accepts whole numbers only
+  std::string defaultText = {};           ///< the default as a user would write it; "" without a default
+  std::string unit = {};
+  std::optional<double> minimum = {};
+  std::optional<double> maximum = {};
+  bool minimumExcluded = false;
+  char letter = 0;  ///< one-letter spelling: o for -o
+  bool isPositional = false;
+  bool isRepeatable = false;
+  Need need = Need::optional;
+  std::string synonym = {};  ///< second accepted name, which help texts prefer; "" without one
+  std::string group = {};    ///< heading above the parameter in help texts; "" for the general one
+  bool isAdvanced = false;   ///< help texts show it only where all options are asked for: --help-all, docs/commands.md
+
+  ParameterKind& byDefault(std::string text) { return set(defaultText, std::move(text)); }
+  ParameterKind& in(std::string nameOfUnit) { return set(unit, std::move(nameOfUnit)); }
+  ParameterKind& atLeast(double limit) { return set(minimum, limit); }
+  ParameterKind& atMost(double limit) { return set(maximum, limit); }
+  ParameterKind& within(double least, double most) { return atLeast(least).atMost(most); }
+  ParameterKind& above(double limit) { return atLeast(limit).set(minimumExcluded, true); }
+  ParameterKind& orWords(std::vector<std::string> words) { return set(choices, std::move(words)); }
+  ParameterKind& as(char option) { return set(letter, option); }
+  ParameterKind& alsoCalled(std::string name) { return set(synonym, std::move(name)); }
+  ParameterKind& positional() { return set(isPositional, true); }
+  ParameterKind& repeatable() { return set(isRepeatable, true); }
+  ParameterKind& required() { return set(need, Need::always); }
+  ParameterKind& requiredOnCommandLine() { return set(need, Need::onCommandLine); }
+  ParameterKind& under(std::string_view heading) { return set(group, heading); }
+  ParameterKind& advanced() { return set(isAdvanced, true); }
+
+ private:
+  template <typename T, typename Value>
+  ParameterKind& set(T& member, Value value) {
+    member = std::move(value);
+    return *this;
+  }
+};
+
+struct Parameter : ParameterKind {
+  Parameter(std::string itsName, ParameterKind kind, std::string itsHelp)
+      : ParameterKind(std::move(kind)), name(std::move(itsName)), help(std::move(itsHelp)) {}
+
+  std::string name;
+  std::string help;
+};
+
+inline ParameterKind text(std::string valueName = "") { return {ParameterType::text, std::move(valueName)}; }
+inline ParameterKind file(std::string valueName = "") { return {ParameterType::path, std::move(valueName)}; }
+inline ParameterKind outputFile(std::string valueName = "") {
+  return {ParameterType::outputPath, std::move(valueName)};
+}
+inline ParameterKind number() { return {ParameterType::number}; }
+inline ParameterKind wholeNumber(std::string valueName = "") {
+  return {ParameterType::wholeNumber, std::move(valueName)};
+}
+inline ParameterKind numbers(std::string valueName, std::vector<std::size_t> counts) {
+  return {ParameterType::numbers, std::move(valueName), {}, std::move(counts)};
+}
+inline ParameterKind wholeNumbers(std::string valueName, std::vector<std::size_t> counts) {
+  return {ParameterType::numbers, std::move(valueName), {}, std::move(counts), true};
+}
+inline ParameterKind choice(std::vector<std::string> words) { return {ParameterType::choice, "", std::move(words)}; }
+/// A flag that is off by default, or has another default: "" where it is left as it was.
+inline ParameterKind flag(std::string byDefault = "false") {
+  return {ParameterType::flag, "", {}, {}, false, std::move(byDefault)};
+}
+/// A size in pixels, each side from `least` to `most`.
+inline ParameterKind size(double least, double most) {
+  return {ParameterType::size, "", {}, {2}, true, "", "pixels", least, most};
+}
+
+/// Concatenates tables of parameters.
+std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
+
+/// Puts the parameters under a heading of help texts.
+std::vector<Parameter> under(std::string_view heading, std::vector<Parameter> parameters);
+
+/// Returns the parameters but those of these names.
+std::vector<Parameter> without(const std::vector<std::string>& names, std::vector<Parameter> parameters);
+
+/// Returns the parameter of this name. Throws std::logic_error where there is none.
+Parameter& parameterNamed(std::string_view name, std::vector<Parameter>& parameters);
+
+}  // namespace hpsdf::app
