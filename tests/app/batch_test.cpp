@@ -31,6 +31,7 @@ namespace hpsdf::app {
 namespace {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using testing::Contains;
 using testing::Each;
 using testing::SizeIs;
