@@ -8,15 +8,11 @@
 #include "commands/tool_commands.h"
 #include "commands/verify_command.h"
 #include "explorer/explorer_commands.h"
-#include "explorer/ui_command.h"
 #include "language/help.h"
-#include "pictures/figure_commands.h"
-#include "pictures/motion_commands.h"
 #include "pictures/picture_commands.h"
-#include "pictures/report_command.h"
 #include "simulate/simulate_command.h"
 #include "study/study_command.h"
-#include "window/window_command.h"
+#include "window/window.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,9 +1,9 @@
-#include "explorer/ui_command.h"
 
 #include <fmt/format.h>
 
 #include "explorer/explorer.h"
-#include "hpsdf/detail/nearest_name.h"
+#include "explorer/explorer_commands.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -30,9 +30,8 @@ Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
   if (found == widgets.end()) {
     std::vector<std::string> known;
     for (const auto& [path, widget] : widgets) known.push_back(path);
-    const std::string near = nearestName(target, known);
-    throw Error(fmt::format("the frame has no widget '{}'; {}", target,
-                            near.empty() ? "'ui list' names them" : fmt::format("did you mean '{}'?", near)));
+    throw Error(
+        fmt::format("the frame has no widget '{}'; {}", target, suggestion(target, known, "'ui list' names them")));
   }
   const UiRect& rect = found->second.rect;
   if (!(rect.width() > 0 && rect.height() > 0))
@@ -102,10 +101,9 @@ void checkUi(const Arguments& arguments) {
     throw Error(fmt::format("ui wheel: expected a number of notches, found '{}'", arguments.text("value")));
   if (action == "key" && !keyNamed(arguments.text("target"))) {
     const auto names = keyNames();
-    const std::string near = nearestName(arguments.text("target"), names);
-    throw Error(fmt::format(
-        "ui key: unknown key '{}'; {}", arguments.text("target"),
-        near.empty() ? fmt::format("expected {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", near)));
+    throw Error(
+        fmt::format("ui key: unknown key '{}'; {}", arguments.text("target"),
+                    suggestion(arguments.text("target"), names, fmt::format("expected {}", fmt::join(names, ", ")))));
   }
 }
 

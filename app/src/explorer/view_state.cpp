@@ -5,7 +5,6 @@
 
 #include "pictures/picture_arguments.h"
 #include "pictures/picture_names.h"
-#include "session/backend.h"
 
 namespace hpsdf::app {
 namespace {

@@ -41,13 +41,13 @@ std::string shareText(double share) {
   return share > 0 && share < 0.5e-4 ? "<0.01 %" : fmt::format("{:.2f} %", 100 * share);
 }
 
-std::string levels(const std::string& title, const std::vector<ReportBar>& bars) {
+std::string levels(const std::string& title, const std::map<int, double>& shares) {
   std::string rows;
-  for (const ReportBar& bar : bars)
+  for (const auto& [level, share] : shares)
     rows += fmt::format(
         "<tr><th>{}</th><td class=\"share\">{}</td><td class=\"bar\"><span "
         "style=\"width:{:.2f}%\"></span></td></tr>\n",
-        bar.level, htmlEscaped(shareText(bar.share)), 100 * bar.share);
+        level, htmlEscaped(shareText(share)), 100 * share);
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 

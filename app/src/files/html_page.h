@@ -1,6 +1,7 @@
 #pragma once
 // The page of a report: one HTML file beside its pictures, without scripts and without network access.
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,17 +16,11 @@ struct ReportPicture {
   std::string command;  ///< command that draws the picture
 };
 
-struct ReportBar {
-  int level;
-  double share;  ///< share of the domain's volume, 0 to 1
-};
-
 struct ReportPage {
   std::string title;
   std::string subtitle;
   std::vector<std::pair<std::string, std::string>> figures = {};
-  std::vector<ReportBar> degrees = {};
-  std::vector<ReportBar> depths = {};
+  std::map<int, double> degrees = {}, depths = {};  ///< the share of the domain's volume of each, 0 to 1
   std::vector<ReportPicture> pictures = {};
   std::string buildCommand = {};  ///< "" where the command is unknown
   std::string footer = {};

@@ -9,7 +9,6 @@
 #include "console/console.h"
 #include "hpsdf/error.h"
 #include "pictures/picture_names.h"
-#include "session/backend.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -93,8 +92,22 @@ render::ShownCells shownCells(const Arguments& arguments) {
 
 render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
 
+render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, const char* offsetName,
+                            const Box& domain) {
+  const int axis = arguments.text(axisName)[0] - 'x';
+  return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(domain, axis)};
+}
+
+/// Sets the size and the samples of a picture.
+template <typename Picture>
+void setPixels(Picture& picture, const Arguments& arguments) {
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+}
+
 /// The plane that `render` draws: six numbers, or an axis with an offset.
-std::optional<render::Plane> scenePlane(const Arguments& arguments) {
+std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& domain) {
   if (!arguments.given("plane")) {
     if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
     return std::nullopt;
@@ -104,8 +117,7 @@ std::optional<render::Plane> scenePlane(const Arguments& arguments) {
       throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
     return freePlane(numbers);
   }
-  return render::AxisPlane{arguments.text("plane")[0] - 'x',
-                           arguments.given("plane-offset") ? arguments.number("plane-offset") : 0};
+  return axisPlane(arguments, "plane", "plane-offset", domain);
 }
 
 }  // namespace
@@ -115,31 +127,21 @@ Vector3 pointOf(const Arguments& arguments, const char* name) {
   return {p[0], p[1], p[2]};
 }
 
-render::SlicePicture slicePicture(const Arguments& arguments) {
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
     if (arguments.given("axis") || arguments.given("offset"))
       throw Error("plane: excludes axis and offset; give one or the other");
     picture.plane = freePlane(arguments.numbers("plane"));
   } else {
-    picture.plane =
-        render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
+    picture.plane = axisPlane(arguments, "axis", "offset", domain);
   }
   picture.zoom = arguments.number("zoom");
   if (arguments.given("target")) picture.target = pointOf(arguments, "target");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
+  setPixels(picture, arguments);
   picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
-  render::SlicePicture picture = slicePicture(arguments);
-  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
-    plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 
@@ -171,14 +173,12 @@ render::SurfacePicture cameraPicture(const Arguments& arguments) {
   if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
   picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                              : render::Projection::perspective;
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
+  setPixels(picture, arguments);
   render::checkPictureSize(picture.width, picture.height, picture.samples);
   return picture;
 }
 
-render::SurfacePicture surfacePicture(const Arguments& arguments) {
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
   render::SurfacePicture picture = cameraPicture(arguments);
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
@@ -188,18 +188,11 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
     throw Error("clip-offset: needs clip, the axis that it lies on");
   picture.cracks = arguments.flag("cracks");
   picture.surface = arguments.flag("surface");
-  picture.plane = scenePlane(arguments);
+  picture.plane = scenePlane(arguments, domain);
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
-  render::SurfacePicture picture = surfacePicture(arguments);
-  auto* plane = picture.plane ? std::get_if<render::AxisPlane>(&*picture.plane) : nullptr;
-  if (plane != nullptr && !arguments.given("plane-offset")) plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 

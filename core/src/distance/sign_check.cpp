@@ -4,11 +4,11 @@
 #include <mutex>
 #include <numbers>
 
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
 #include "sign/solid_angle.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
 
 namespace hpsdf {
 namespace {

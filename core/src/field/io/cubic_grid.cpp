@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
 #include "util/sums.h"
 
 namespace hpsdf {
