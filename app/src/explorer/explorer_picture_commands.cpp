@@ -6,7 +6,6 @@
 #include "explorer/explorer_commands.h"
 #include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
 
 namespace hpsdf::app {
 namespace {

@@ -5,7 +5,6 @@
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/field.h"
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
 #include "session/field_summary.h"
 #include "text/text.h"
 

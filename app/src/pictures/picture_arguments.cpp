@@ -8,15 +8,31 @@
 
 #include "console/console.h"
 #include "hpsdf/error.h"
-#include "pictures/picture_names.h"
 #include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
-
 namespace {
 
 using render::ColorBy;
+
+constexpr std::pair<std::string_view, ColorBy> kColors[] = {
+    {"normal", ColorBy::normal},       {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
+    {"distance", ColorBy::distance},   {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
+    {"slope", ColorBy::slope},         {"error", ColorBy::error},          {"difference", ColorBy::difference},
+    {"cell-error", ColorBy::cellError}};
+
+struct NamedView {
+  std::string_view name;
+  double azimuthDegrees, elevationDegrees;
+};
+constexpr NamedView kViews[] = {{"front", 0, 0},
+                                {"back", 180, 0},
+                                {"left", -90, 0},
+                                {"right", 90, 0},
+                                {"top", 0, 90},
+                                {"bottom", 0, -90},
+                                {"corner", 45, 35.264389682754654}};
 
 render::ScaleOptions scaleOptions(const Arguments& arguments) {
   render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
@@ -47,39 +63,6 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   }
   return options;
 }
-
-}  // namespace
-
-std::vector<int> levelList(const std::string& text, const char* name, int most) {
-  if (text.empty()) return {};
-  const auto refuse = [&] {
-    throw Error(
-        fmt::format("{}: expected whole numbers and ranges from 0 to {} with commas between them, as in 2,4-6; "
-                    "found '{}'",
-                    name, most, text));
-  };
-  const auto level = [&](std::string_view word) {
-    const auto number = parseNumber(word);
-    if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
-    return static_cast<int>(*number);
-  };
-  std::vector<int> levels;
-  for (std::size_t start = 0; start <= text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    const std::string_view part = std::string_view(text).substr(start, end - start);
-    const std::size_t dash = part.find('-');
-    const int first = level(part.substr(0, dash));
-    const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
-    if (first > last) refuse();
-    for (int i = first; i <= last; ++i) levels.push_back(i);
-    start = end + 1;
-  }
-  std::ranges::sort(levels);
-  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-  return levels;
-}
-
-namespace {
 
 render::ShownCells shownCells(const Arguments& arguments) {
   const std::string style = arguments.text("cells");
@@ -121,6 +104,80 @@ std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& d
 }
 
 }  // namespace
+
+std::vector<std::string> viewNames() {
+  std::vector<std::string> names;
+  for (const NamedView& view : kViews) names.emplace_back(view.name);
+  return names;
+}
+
+void turnTo(render::OrbitCamera& camera, std::string_view view) {
+  const NamedView& named = *std::ranges::find(kViews, view, &NamedView::name);
+  camera.azimuthDegrees = named.azimuthDegrees;
+  camera.elevationDegrees = named.elevationDegrees;
+}
+
+std::string viewName(const render::OrbitCamera& camera) {
+  for (const NamedView& view : kViews)
+    if (view.azimuthDegrees == camera.azimuthDegrees && view.elevationDegrees == camera.elevationDegrees)
+      return std::string(view.name);
+  return {};
+}
+
+std::vector<std::string> colorNames(std::optional<ColorBy> without) {
+  std::vector<std::string> names;
+  for (const auto& [name, color] : kColors)
+    if (color != without) names.emplace_back(name);
+  return names;
+}
+
+std::string_view colorName(ColorBy color) {
+  return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
+}
+
+/// The registry accepts only the names above, so that one is always found.
+ColorBy colorNamed(std::string_view name) {
+  return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
+}
+
+render::CellStyle cellStyle(std::string_view name) {
+  return name == "lines"   ? render::CellStyle::lines
+         : name == "boxes" ? render::CellStyle::boxes
+                           : render::CellStyle::none;
+}
+
+std::string cellStyleName(render::CellStyle style) {
+  return style == render::CellStyle::lines ? "lines" : style == render::CellStyle::boxes ? "boxes" : "none";
+}
+
+std::vector<int> levelList(const std::string& text, const char* name, int most) {
+  if (text.empty()) return {};
+  const auto refuse = [&] {
+    throw Error(
+        fmt::format("{}: expected whole numbers and ranges from 0 to {} with commas between them, as in 2,4-6; "
+                    "found '{}'",
+                    name, most, text));
+  };
+  const auto level = [&](std::string_view word) {
+    const auto number = parseNumber(word);
+    if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
+    return static_cast<int>(*number);
+  };
+  std::vector<int> levels;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    const std::string_view part = std::string_view(text).substr(start, end - start);
+    const std::size_t dash = part.find('-');
+    const int first = level(part.substr(0, dash));
+    const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
+    if (first > last) refuse();
+    for (int i = first; i <= last; ++i) levels.push_back(i);
+    start = end + 1;
+  }
+  std::ranges::sort(levels);
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+  return levels;
+}
 
 Vector3 pointOf(const Arguments& arguments, const char* name) {
   const auto p = arguments.numbers(name);

@@ -1,9 +1,11 @@
 #pragma once
-// Converts validated arguments into the renderer's settings.
+// Converts validated arguments, and names as commands spell them, into the renderer's settings.
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hpsdf/render/picture.h"
@@ -12,6 +14,22 @@
 #include "session/session.h"
 
 namespace hpsdf::app {
+
+/// Names of the quantities that colours show: degree, depth, distance, ….
+std::string_view colorName(render::ColorBy color);
+std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
+render::ColorBy colorNamed(std::string_view name);
+
+/// Names of a camera's directions: front, back, ….
+std::vector<std::string> viewNames();
+/// Turns the camera into a direction that `viewNames` contains.
+void turnTo(render::OrbitCamera& camera, std::string_view view);
+/// The name of the camera's direction; "" if it has none.
+std::string viewName(const render::OrbitCamera& camera);
+
+/// The names are none, lines and boxes.
+render::CellStyle cellStyle(std::string_view name);
+std::string cellStyleName(render::CellStyle style);
 
 /// The levels of a list such as "2,4-6", each from 0 to `most`; empty for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);

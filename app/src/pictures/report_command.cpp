@@ -18,7 +18,6 @@
 #include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 #include "pictures/picture_commands.h"
-#include "pictures/picture_names.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
