@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <string>
 
 #include "hpsdf/error.h"
@@ -112,14 +111,6 @@ void keepDeepest(std::size_t count, std::size_t first, std::vector<Contact>& con
   contacts.erase(end, contacts.end());
 }
 
-/// Appends the pair's contacts.
-QueryCost append(const BodyPair& pair, const ContactOptions& options, std::vector<Contact>& contacts) {
-  const std::size_t first = contacts.size();
-  const QueryCost cost = Search(pair, options, contacts).run();
-  if (options.deepest) keepDeepest(*options.deepest, first, contacts);
-  return cost;
-}
-
 }  // namespace
 
 QueryCost& QueryCost::operator+=(const QueryCost& other) {
@@ -132,9 +123,20 @@ QueryCost& QueryCost::operator+=(const QueryCost& other) {
 std::span<const Contact> ContactQuery::find(const BodyPair& pair, const ContactOptions& options) {
   requireValid(options);
   requireValid(pair);
-  contacts_.clear();
-  cost_ = append(pair, options, contacts_);
+  clear();
+  append(pair, options);
   return contacts_;
+}
+
+void ContactQuery::clear() {
+  contacts_.clear();
+  cost_ = {};
+}
+
+void ContactQuery::append(const BodyPair& pair, const ContactOptions& options) {
+  const std::size_t first = contacts_.size();
+  cost_ += Search(pair, options, contacts_).run();
+  if (options.deepest) keepDeepest(*options.deepest, first, contacts_);
 }
 
 std::span<const Contact> PairContacts::of(std::size_t pair) const {
@@ -152,12 +154,11 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
   out.pairs_ = pairs.size();
   out.ends_.resize(pairs.size());
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t number) {
-    PairContacts::Block& block = out.blocks_[number];
-    block.contacts.clear();
-    block.cost = {};
+    ContactQuery& block = out.blocks_[number];
+    block.clear();
     for (std::size_t i = number * kBlock; i < std::min(pairs.size(), (number + 1) * kBlock); ++i) {
-      block.cost += append(pairs[i], options, block.contacts);
-      out.ends_[i] = block.contacts.size();
+      block.append(pairs[i], options);
+      out.ends_[i] = block.contacts_.size();
     }
   });
 
@@ -165,11 +166,11 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
   out.contacts_.clear();
   out.cost_ = {};
   for (std::size_t number = 0; number < blocks; ++number) {
-    const PairContacts::Block& block = out.blocks_[number];
+    const ContactQuery& block = out.blocks_[number];
     for (std::size_t i = number * kBlock; i < std::min(pairs.size(), (number + 1) * kBlock); ++i)
       out.ends_[i] += out.contacts_.size();
-    out.contacts_.insert(out.contacts_.end(), block.contacts.begin(), block.contacts.end());
-    out.cost_ += block.cost;
+    out.contacts_.insert(out.contacts_.end(), block.contacts_.begin(), block.contacts_.end());
+    out.cost_ += block.cost_;
   }
 }
 

@@ -5,7 +5,8 @@
 #include <limits>
 #include <utility>
 #include <variant>
-#include <vector>
+
+#include "hpsdf/detail/legendre_part.h"
 
 namespace hpsdf::physics {
 namespace {
@@ -14,25 +15,6 @@ constexpr std::size_t kMostCells = std::size_t{1} << 20;
 constexpr double kUnits = 32;        // units of a bound in a cell's shortest edge: 16 bits suffice for 2048 cells
 constexpr double kTolerance = 0.05;  // error of the bounds of polynomials, as a share of that edge
 constexpr double kRounding = 1e-12;  // relative error of sums by rounding
-
-/// The coefficients of Legendre polynomials restricted to a part of their interval: L_i(shift + scale·t) =
-/// Σ_a rows[i][a] L_a(t) for a ≤ i; other elements are not set.
-using Rows = std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>;
-
-/// Follows from the recurrences of L_i and of t·L_a.
-Rows restrictedLegendre(double shift, double scale, int degree) {
-  Rows row;
-  row[0][0] = 1;
-  for (int i = 0; i < degree; ++i)
-    for (int a = 0; a <= i + 1; ++a) {
-      double product = 0;  // coefficient of (shift + scale·t)·L_i
-      if (a <= i) product += shift * row[i][a];
-      if (a > 0) product += scale * row[i][a - 1] * a / (2 * a - 1);
-      if (a + 1 <= i) product += scale * row[i][a + 1] * (a + 1) / (2 * a + 3);
-      row[i + 1][a] = ((2 * i + 1) * product - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
-    }
-  return row;
-}
 
 /// A polynomial in the local coordinates [−1, 1]³ of a box.
 struct Piece {
@@ -54,20 +36,7 @@ struct Piece {
   }
 
   /// Restricts the polynomial to a part of one axis, which the rows describe.
-  void restrict(int axis, const Rows& rows) {
-    for (int a = 0; a <= degree; ++a)
-      for (int b = 0; a + b <= degree; ++b) {
-        const auto along = [&](int i) -> double& {
-          return axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i);
-        };
-        for (int to = 0; to <= degree - a - b;
-             ++to) {  // ascending, because the sum uses higher coefficients before they change
-          double sum = 0;
-          for (int from = to; from <= degree - a - b; ++from) sum += rows[from][to] * along(from);
-          along(to) = sum;
-        }
-      }
-  }
+  void restrict(int axis, const detail::LegendreRows& rows) { detail::restrictToPart(c, degree, axis, rows); }
 
   /// Leaves out as many of the highest degrees as have a sum of at most `tolerance`.
   void trim(double tolerance) {
@@ -137,7 +106,7 @@ class LowerBounds {
       const double below = extentBeyond(false), above = extentBeyond(true);
       piece.lower[axis] -= below;
       piece.upper[axis] += above;
-      piece.restrict(axis, restrictedLegendre((above - below) / edge, piece.width(axis) / edge, degree));
+      piece.restrict(axis, detail::legendreOfPart((above - below) / edge, piece.width(axis) / edge, degree));
     }
     return piece;
   }
@@ -194,7 +163,8 @@ class LowerBounds {
   double tolerance_;
   std::vector<double> least_;
   std::array<std::vector<double>, 3> linear_;
-  Rows lowerHalf_ = restrictedLegendre(-0.5, 0.5, kMaxDegree), upperHalf_ = restrictedLegendre(0.5, 0.5, kMaxDegree);
+  detail::LegendreRows lowerHalf_ = detail::legendreOfPart(-0.5, 0.5, kMaxDegree);
+  detail::LegendreRows upperHalf_ = detail::legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
 using CellIndex = std::array<std::int64_t, 3>;

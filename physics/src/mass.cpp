@@ -1,7 +1,6 @@
 #include "hpsdf/physics/mass.h"
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
 
 #include "hpsdf/error.h"
 

@@ -3,8 +3,6 @@
 
 #include <Eigen/Geometry>
 
-#include "hpsdf/types.h"
-
 namespace hpsdf::physics {
 
 /// The greatest deviation of RᵀR from the identity for which R counts as a rotation.

@@ -1,7 +1,6 @@
 #include "hpsdf/physics/sphere_tree.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 

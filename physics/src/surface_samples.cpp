@@ -8,27 +8,13 @@
 #include <string>
 #include <utility>
 
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kCandidates = 5;  // random candidates for each sample
-
-/// The mixing function of SplitMix64 (Steele, Lea, Flood 2014).
-std::uint64_t mixed(std::uint64_t x) {
-  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;
-  x = (x ^ x >> 27) * 0x94d049bb133111eb;
-  return x ^ x >> 31;
-}
-
-/// Three random numbers in [0, 1) that depend only on a seed and a number in the sequence.
-std::array<double, 3> randomNumbers(std::uint64_t seed, std::uint64_t number) {
-  std::uint64_t state = mixed(mixed(seed) + number);
-  std::array<double, 3> result;
-  for (double& x : result) x = static_cast<double>(mixed(state += 0x9e3779b97f4a7c15) >> 11) * 0x1p-53;
-  return result;
-}
 
 struct Candidate {
   Vector3 point;
@@ -83,7 +69,8 @@ std::vector<Candidate> drawCandidates(const TriangleMesh& mesh, const Surface& s
   std::vector<Candidate> candidates(count);
   std::size_t triangle = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto [along, u, v] = randomNumbers(seed, i);
+    detail::Random random(seed, i);
+    const double along = random.unit(), u = random.unit(), v = random.unit();
     const double upTo = (double(i) + along) / double(count) * surface.area();
     while (triangle + 1 < surface.areasUpTo.size() && surface.areasUpTo[triangle] <= upTo) ++triangle;
     const auto& [a, b, c] = mesh.triangles[triangle];

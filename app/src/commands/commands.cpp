@@ -2,14 +2,11 @@
 
 #include "check/check_command.h"
 #include "explorer/explorer_commands.h"
-#include "explorer/ui_command.h"
-#include "pictures/figure_commands.h"
-#include "pictures/motion_commands.h"
+#include "language/help.h"
 #include "pictures/picture_commands.h"
-#include "pictures/report_command.h"
 #include "simulate/simulate_command.h"
 #include "study/study_command.h"
-#include "window/window_command.h"
+#include "window/window.h"
 
 namespace hpsdf::app {
 Registry makeRegistry() {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "hpsdf/detail/build_settings.h"
@@ -95,17 +96,10 @@ void Explorer::change(ViewState next) {
   redone_.clear();
 }
 
-bool Explorer::undo() {
-  if (undone_.empty()) return false;
-  redone_.push_back(std::exchange(view_, withFrameOf(view_, undone_.back())));
-  undone_.pop_back();
-  return true;
-}
-
-bool Explorer::redo() {
-  if (redone_.empty()) return false;
-  undone_.push_back(std::exchange(view_, withFrameOf(view_, redone_.back())));
-  redone_.pop_back();
+bool Explorer::goBack(std::vector<ViewState>& from, std::vector<ViewState>& to) {
+  if (from.empty()) return false;
+  to.push_back(std::exchange(view_, withFrameOf(view_, from.back())));
+  from.pop_back();
   return true;
 }
 
@@ -187,10 +181,6 @@ void Explorer::run(const std::string& line) {
   replaces_ = false;
 }
 
-void Explorer::runAll(const std::vector<std::string>& commands) {
-  for (const std::string& command : commands) run(command);
-}
-
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
   // Long work must not start within a frame of the panels, because its listener draws frames too.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
@@ -237,11 +227,11 @@ void Explorer::input(const Input& event) {
   std::vector<std::string> commands;
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
-  runAll(commands);
+  for (const std::string& command : commands) run(command);
   // An open list must be drawn once before it takes input.
   std::vector<std::string> late;
   drawPanels(nullptr, late);
-  runAll(late);
+  for (const std::string& command : late) run(command);
   if (!ui_.busy()) lastKind_.clear();
 }
 
@@ -347,15 +337,12 @@ void Explorer::drawPicture(int shrink) {
   render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
   if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
   const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
-  const auto levels = [&](const FieldStatistics& all) {
-    for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
-      scale.levels.push_back(level);
-  };
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
-    levels(figures());
-    levels(statistics(*other));
-    std::ranges::sort(scale.levels);
-    scale.levels.erase(std::unique(scale.levels.begin(), scale.levels.end()), scale.levels.end());
+    std::set<int> levels;
+    for (const FieldStatistics& all : {figures(), statistics(*other)})
+      for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
+        levels.insert(level);
+    scale.levels.assign(levels.begin(), levels.end());
   }
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;

@@ -34,8 +34,8 @@ class Explorer final : public SessionExtension {
   /// never changes the frame's size and the renderer.
   void change(ViewState next);
   /// `undo` and `redo` return false when there is no state to go to.
-  bool undo();
-  bool redo();
+  bool undo() { return goBack(undone_, redone_); }
+  bool redo() { return goBack(redone_, undone_); }
   bool canUndo() const { return !undone_.empty(); }
   bool canRedo() const { return !redone_.empty(); }
 
@@ -99,6 +99,8 @@ class Explorer final : public SessionExtension {
   std::optional<Readout> readout();
 
  private:
+  /// Returns to the last state of `from`, and keeps the present one in `to`.
+  bool goBack(std::vector<ViewState>& from, std::vector<ViewState>& to);
   std::string pictureKey() const;
   /// The parameters of `build` that made the current field, as far as its metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
@@ -108,7 +110,6 @@ class Explorer final : public SessionExtension {
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settlePanels();
   void inputWhileWorking(const Input& event);
-  void runAll(const std::vector<std::string>& commands);
   std::optional<std::string> canvasCommand(const Input& event);
   std::string wheelCommand(double notches) const;
   std::string dragCommand(double dx, double dy) const;

@@ -7,7 +7,6 @@
 
 #include "construction/build_arguments.h"
 #include "explorer/explorer.h"
-#include "explorer/explorer_picture_commands.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "language/script.h"
@@ -107,11 +106,10 @@ void runRedo(Session& session, const Arguments&) {
 void runCopyView(Session& session, const Arguments& arguments) {
   const std::string script = scriptOf(explorerOf(session).view());
   explorerOf(session).setClipboard(script);
-  if (!arguments.has("output")) {
+  if (arguments.has("output"))
+    writeTextFile(arguments.text("output"), script);
+  else
     session.console().out << script;
-    return;
-  }
-  writeTextFile(arguments.text("output"), script);
 }
 
 void runSettings(Session& session, const Arguments& arguments) {

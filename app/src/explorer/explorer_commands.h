@@ -1,10 +1,24 @@
 #pragma once
 
+#include <functional>
+#include <vector>
+
+#include "explorer/view_state.h"
 #include "language/registry.h"
 
 namespace hpsdf::app {
 
 /// Adds all commands of the explorer but `ui`: show, camera, plane, color, panel, ….
 void addExplorerCommands(Registry& registry);
+
+/// Adds `ui`, by which a script uses mouse and keyboard on the explorer.
+void addUiCommand(Registry& registry);
+
+/// The action of a command that changes a copy of the explorer's state, which then becomes the state. `undo` takes the
+/// whole change back; a change that throws leaves the state alone.
+std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
+
+/// The commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.
+std::vector<Command> explorerPictureCommands();
 
 }  // namespace hpsdf::app

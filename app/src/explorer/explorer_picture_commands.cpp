@@ -1,11 +1,11 @@
-#include "explorer/explorer_picture_commands.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 
+#include "explorer/explorer.h"
+#include "explorer/explorer_commands.h"
+#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,5 +1,6 @@
-#include "explorer/figure_panels.h"
+// The panels of the right column.
 
+#include "explorer/panels.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
 #include "text/text.h"

@@ -1,9 +1,6 @@
 // The panels around the picture.
 
-#include "explorer/explorer.h"
-#include "explorer/figure_panels.h"
-#include "explorer/panel_controls.h"
-#include "explorer/setting_panels.h"
+#include "explorer/panels.h"
 
 namespace hpsdf::app {
 namespace {

@@ -55,12 +55,10 @@ void paintTriangle(render::Image& image, const Coverage& texture, const Clip& cl
     std::swap(b, c);
     area = -area;
   }
-  const auto low = [](float x, float y, float z) { return int(std::floor(std::min({x, y, z}))); };
-  const auto high = [](float x, float y, float z) { return int(std::ceil(std::max({x, y, z}))); };
-  const int x0 = std::max(clip.x0, low(a->pos.x, b->pos.x, c->pos.x));
-  const int x1 = std::min(clip.x1, high(a->pos.x, b->pos.x, c->pos.x));
-  const int y0 = std::max(clip.y0, low(a->pos.y, b->pos.y, c->pos.y));
-  const int y1 = std::min(clip.y1, high(a->pos.y, b->pos.y, c->pos.y));
+  const auto [left, right] = std::minmax({a->pos.x, b->pos.x, c->pos.x});
+  const auto [top, bottom] = std::minmax({a->pos.y, b->pos.y, c->pos.y});
+  const int x0 = std::max(clip.x0, int(std::floor(left))), x1 = std::min(clip.x1, int(std::ceil(right)));
+  const int y0 = std::max(clip.y0, int(std::floor(top))), y1 = std::min(clip.y1, int(std::ceil(bottom)));
   const bool oneTexel = a->uv.x == b->uv.x && a->uv.x == c->uv.x && a->uv.y == b->uv.y && a->uv.y == c->uv.y;
   const float constantCoverage = oneTexel ? coverageAt(texture, a->uv.x, a->uv.y) : 0;
   const Channels colorA = channelsOf(a->col), colorB = channelsOf(b->col), colorC = channelsOf(c->col);

@@ -1,10 +1,10 @@
-#include "explorer/setting_panels.h"
+// The panels of the left column.
 
+#include "explorer/panels.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/field.h"
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
 #include "session/field_summary.h"
 #include "text/text.h"
 
@@ -65,10 +65,8 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Bo
   if (view.planeInSpace) drawPlaneOffset(controls, view, domain);
   controls.choice("view/cells", "cells", {"none", "lines", "boxes"}, cellStyleName(view.cells.style), "cells ");
   if (view.cells.style == render::CellStyle::none) return;
-  if (const auto list = controls.ui.field("view/degrees", "of degrees", levelText(view.cells.degrees)))
-    controls.commands.push_back("cells degrees=" + scriptWord(*list));
-  if (const auto list = controls.ui.field("view/depths", "of depths", levelText(view.cells.depths)))
-    controls.commands.push_back("cells depths=" + scriptWord(*list));
+  controls.field("view/degrees", "of degrees", levelText(view.cells.degrees), "cells degrees=");
+  controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
 }
 
 /// Draws the limits of the colour scale; `automatic` are those of the present picture.
@@ -96,11 +94,9 @@ void drawColors(const Controls& controls, const ViewState& view, const std::opti
   controls.choice("view/color", "color", colorNames(without), std::string(colorName(colors.by)), "color ");
   const std::string command = fmt::format("color {} ", colorName(colors.by));
   if (colors.by == render::ColorBy::difference)
-    if (const auto file = controls.ui.field("view/other", "other field", colors.other))
-      controls.commands.push_back(command + "other=" + wordOrNone(*file));
+    controls.field("view/other", "other field", colors.other, command + "other=", true);
   if (colors.by == render::ColorBy::error)
-    if (const auto mesh = controls.ui.field("view/mesh", "made from", colors.mesh))
-      controls.commands.push_back(command + "mesh=" + wordOrNone(*mesh));
+    controls.field("view/mesh", "made from", colors.mesh, command + "mesh=", true);
   if (!render::isQuantity(colors.by)) return;
   controls.choice("view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
                   command + "scale=");
@@ -118,8 +114,7 @@ struct BuildControls {
   }
 
   void field(const char* name, const std::string& ofField) const {
-    if (const auto text = controls.ui.field(path(name), name, value(name, ofField)))
-      controls.commands.push_back(command(name) + scriptWord(*text));
+    controls.field(path(name), name, value(name, ofField), command(name));
   }
 
   void slider(const char* name, double ofField, double low, double high, const char* format) const {
@@ -173,8 +168,7 @@ void drawViewPanel(const Controls& controls, Explorer& explorer) {
   if (const auto v = controls.ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
     controls.commands.push_back(fmt::format("arrows {:.0f}", *v));
   drawColors(controls, view, explorer.picture());
-  if (const auto file = controls.ui.field("view/beside", "beside", view.beside))
-    controls.commands.push_back("beside " + wordOrNone(*file));
+  controls.field("view/beside", "beside", view.beside, "beside ", true);
 }
 
 void drawBuildPanel(const Controls& controls, Explorer& explorer) {

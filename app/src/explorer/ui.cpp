@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "console/console.h"
 #include "explorer/raster.h"
 #include "hpsdf/render/font.h"
 
@@ -108,8 +107,7 @@ struct Ui::State {
 
 Ui::Ui() : state_(std::make_unique<State>()) {
   state_->context = ImGui::CreateContext();
-  ImGui::SetCurrentContext(state_->context);
-  ImGuiIO& io = ImGui::GetIO();
+  ImGuiIO& io = activate();
   io.IniFilename = nullptr;
   io.LogFilename = nullptr;
   io.ConfigInputTextCursorBlink = false;
@@ -141,8 +139,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
 Ui::~Ui() { ImGui::DestroyContext(state_->context); }
 
 void Ui::frame(int width, int height, const Input* input, const std::function<void()>& widgets) {
-  ImGui::SetCurrentContext(state_->context);
-  ImGuiIO& io = ImGui::GetIO();
+  ImGuiIO& io = activate();
   io.DisplaySize = {float(width), float(height)};
   io.DeltaTime = kStep;
   io.MouseWheel = 0;
@@ -177,30 +174,19 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
 }
 
 void Ui::paint(render::Image& image) const {
-  ImGui::SetCurrentContext(state_->context);
+  activate();
   app::paint(image, *ImGui::GetDrawData(), state_->texture);
 }
 
-bool Ui::wantsMouse() const {
+ImGuiIO& Ui::activate() const {
   ImGui::SetCurrentContext(state_->context);
-  return ImGui::GetIO().WantCaptureMouse;
+  return ImGui::GetIO();
 }
 
-bool Ui::busy() const {
-  ImGui::SetCurrentContext(state_->context);
-  const ImGuiIO& io = ImGui::GetIO();
-  return io.MouseDown[0] || io.MouseDown[1] || io.MouseDown[2] || ImGui::IsAnyItemActive();
-}
-
-bool Ui::holds(int button) const {
-  ImGui::SetCurrentContext(state_->context);
-  return ImGui::GetIO().MouseDown[button];
-}
-
-bool Ui::editing() const {
-  ImGui::SetCurrentContext(state_->context);
-  return ImGui::GetIO().WantTextInput;
-}
+bool Ui::wantsMouse() const { return activate().WantCaptureMouse; }
+bool Ui::busy() const { return holds(0) || holds(1) || holds(2) || ImGui::IsAnyItemActive(); }
+bool Ui::holds(int button) const { return activate().MouseDown[button]; }
+bool Ui::editing() const { return activate().WantTextInput; }
 
 const std::string& Ui::clipboard() const { return state_->clipboard; }
 void Ui::setClipboard(const std::string& text) { state_->clipboard = text; }
@@ -276,16 +262,16 @@ std::optional<bool> Ui::checkbox(const std::string& path, const char* label, boo
   return changed ? std::optional(value) : std::nullopt;
 }
 
-std::optional<int> Ui::combo(const std::string& path, const char* label, std::span<const std::string> items,
-                             int current) {
-  std::optional<int> chosen;
-  const bool open =
-      ImGui::BeginCombo(id(path, label), items[std::size_t(current)].c_str(), ImGuiComboFlags_HeightLargest);
+std::optional<std::string> Ui::combo(const std::string& path, const char* label, std::span<const std::string> items,
+                                     const std::string& current) {
+  std::optional<std::string> chosen;
+  const std::string& shown = std::ranges::find(items, current) != items.end() ? current : items.front();
+  const bool open = ImGui::BeginCombo(id(path, label), shown.c_str(), ImGuiComboFlags_HeightLargest);
   note(path);
   if (!open) return chosen;
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    const std::string itemPath = path + "/" + items[i];
-    if (ImGui::Selectable(id(itemPath, items[i].c_str()), int(i) == current)) chosen = int(i);
+  for (const std::string& item : items) {
+    const std::string itemPath = path + "/" + item;
+    if (ImGui::Selectable(id(itemPath, item.c_str()), item == shown)) chosen = item;
     note(itemPath);
   }
   ImGui::EndCombo();

@@ -14,6 +14,8 @@
 #include "console/console.h"
 #include "hpsdf/render/image.h"
 
+struct ImGuiIO;
+
 namespace hpsdf::app {
 
 enum class Key : std::uint8_t { enter, escape, backspace, remove, left, right, home, end, tab, a, c, v, x, y, z };
@@ -88,7 +90,9 @@ class Ui {
   bool heading(const std::string& path, const char* label);
   bool button(const std::string& path, const char* label, bool pressed = false);
   std::optional<bool> checkbox(const std::string& path, const char* label, bool value);
-  std::optional<int> combo(const std::string& path, const char* label, std::span<const std::string> items, int current);
+  /// A list of names, which shows the first where `current` is none of them.
+  std::optional<std::string> combo(const std::string& path, const char* label, std::span<const std::string> items,
+                                   const std::string& current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
                                const char* format = "%.4g", When when = When::moved);
   /// A text field, which returns its text when Enter is pressed.
@@ -106,6 +110,8 @@ class Ui {
   void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:
+  /// Makes this object's context the current one of Dear ImGui.
+  ImGuiIO& activate() const;
   void note(const std::string& path, bool takesText = false);
   void setDisabled(bool disabled);
   const char* id(const std::string& path, const char* label);

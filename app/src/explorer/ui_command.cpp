@@ -1,9 +1,8 @@
-#include "explorer/ui_command.h"
-
 #include <fmt/format.h>
 
 #include "explorer/explorer.h"
-#include "hpsdf/detail/nearest_name.h"
+#include "explorer/explorer_commands.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -4,8 +4,6 @@
 #include <fmt/ranges.h>
 
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
-#include "session/backend.h"
 
 namespace hpsdf::app {
 namespace {

@@ -46,7 +46,14 @@ Film::Film(const std::string& output) : output_(output) {
   checkWritable(output_ / kAbout);
 }
 
-void Film::add(const render::Image& image) { savePng(image, work_.path() / frameName(frames_++)); }
+void Film::add(const render::Image& image, Json figures) {
+  Json row = {{"file", frameName(frames())}};
+  savePng(image, work_.path() / frameName(frames()));
+  row.update(figures);
+  rows_.push_back(std::move(row));
+  width_ = image.width;
+  height_ = image.height;
+}
 
 void Film::encode(double framesPerSecond, const Progress& progress) {
   if (folder_) return;
@@ -61,28 +68,26 @@ void Film::encode(double framesPerSecond, const Progress& progress) {
   if (!problem.empty()) throw Error(fmt::format("{}: {}; give a folder instead", output_.string(), problem));
 }
 
-Json Film::about(const render::Image& last, const std::string& renderer, Json rows) const {
-  for (std::size_t frame = 0; frame < rows.size(); ++frame) rows[frame]["file"] = frameName(frame);
-  return {{"output", output_.string()},
-          {"width", last.width},
-          {"height", last.height},
-          {"renderer", renderer},
-          {"frames", std::move(rows)}};
-}
-
 std::string Film::line(const Json& about) {
   return fmt::format("{}: {} frames, {}x{}, {}\n", about["output"].get<std::string>(), about["frames"].size(),
                      about["width"].get<int>(), about["height"].get<int>(), about["renderer"].get<std::string>());
 }
 
-void Film::publish(const Json& about) {
-  const auto copy = [&](const std::string& name, const fs::path& to) {
-    writeTextFile(to, readWholeFile((work_.path() / name).string()));
-  };
-  if (!folder_) return copy(kMovie, output_);
+Json Film::publish(const std::string& renderer) {
+  const Json about = {
+      {"output", output_.string()}, {"width", width_}, {"height", height_}, {"renderer", renderer}, {"frames", rows_}};
+  if (folder_)
+    publishFolder(about);
+  else
+    copyFile(work_.path() / kMovie, output_);
+  return about;
+}
+
+void Film::publishFolder(const Json& about) {
   folder_->keep();
   folder_->startAnew(kAbout, isFrameName);
-  for (std::size_t frame = 0; frame < frames_; ++frame) copy(frameName(frame), output_ / frameName(frame));
+  for (std::size_t frame = 0; frame < frames(); ++frame)
+    copyFile(work_.path() / frameName(frame), output_ / frameName(frame));
   writeTextFile(output_ / kAbout, jsonText(about));
 }
 

@@ -21,21 +21,19 @@ class Film {
   /// folder holds files that are not an earlier film, or where an MP4 is wanted and ffmpeg is not installed.
   explicit Film(const std::string& output);
 
-  void add(const render::Image& image);
-  std::size_t frames() const { return frames_; }
+  /// Adds a frame with its figures, an object for frames.json.
+  void add(const render::Image& image, Json figures);
+  std::size_t frames() const { return rows_.size(); }
 
   /// Encodes the MP4 after the last frame; does nothing for a folder. Throws `Error` with ffmpeg's last line on
   /// failure.
   void encode(double framesPerSecond, const Progress& progress);
 
-  /// Describes the film as JSON. `rows` holds one object a frame, whose "file" is filled in here; `last` is any frame.
-  Json about(const render::Image& last, const std::string& renderer, Json rows) const;
+  /// Moves the film to its output, and returns its description, which a folder also receives as frames.json.
+  Json publish(const std::string& renderer);
 
-  /// Describes the film in one line, from the result of `about`.
+  /// Describes the film in one line, from the result of `publish`.
   static std::string line(const Json& about);
-
-  /// Moves the film to its output. A folder also receives frames.json, which holds `about`.
-  void publish(const Json& about);
 
  private:
   static std::string frameName(std::size_t frame);
@@ -44,7 +42,8 @@ class Film {
   std::filesystem::path ffmpeg_;          // empty for a folder
   std::unique_ptr<OutputFolder> folder_;  // null for an MP4
   TemporaryFolder work_;
-  std::size_t frames_ = 0;
+  int width_ = 0, height_ = 0;  // size of the last frame
+  Json rows_ = Json::array();   // name and figures of each frame
 };
 
 }  // namespace hpsdf::app

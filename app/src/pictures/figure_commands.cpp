@@ -1,11 +1,10 @@
-#include "pictures/figure_commands.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "console/failed.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "language/expectation.h"
+#include "pictures/picture_commands.h"
 #include "pictures/readout.h"
 #include "session/field_summary.h"
 #include "session/session.h"
@@ -14,19 +13,26 @@
 namespace hpsdf::app {
 namespace {
 
+/// The figures of a field at a point of one of its cells.
+Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int degree, int depth,
+                  const Vector3& gradient) {
+  return {{"position", vectorJson(position)},
+          {"value", value},
+          {"cell", cell},
+          {"degree", degree},
+          {"depth", depth},
+          {"gradient", vectorJson(gradient)},
+          {"slope", gradient.norm()}};
+}
+
 /// The figures of the field at a pixel of the last picture; null where the pixel shows no part of the field. `withAll`
 /// adds those that take long to compute: the exact distance, if it is known, and the jumps at the cell's nearest face.
 Json pickJson(Session& session, int x, int y, bool withAll) {
-  const auto pick = render::pickAt(session.current().field, session.picture(), x, y);
+  const Field& field = session.current().field;
+  const auto pick = render::pickAt(field, session.picture(), x, y);
   if (!pick) return {};
-  const Vector3 gradient = session.current().field.valueAndGradient(pick->position).gradient;
-  Json json = {{"position", vectorJson(pick->position)},
-               {"value", pick->value},
-               {"cell", pick->cell},
-               {"degree", pick->degree},
-               {"depth", pick->depth},
-               {"gradient", vectorJson(gradient)},
-               {"slope", gradient.norm()}};
+  Json json = pointFigures(pick->position, pick->value, pick->cell, pick->degree, pick->depth,
+                           field.valueAndGradient(pick->position).gradient);
   if (!withAll) return json;
   const Readout readout = readoutAt(session, *pick);
   json["jump"] = {{"value", readout.valueJump.max}, {"gradient", readout.gradientJump.max}};
@@ -38,9 +44,7 @@ Json pointJson(Session& session, const Vector3& x, bool withExact) {
   const Field& field = session.current().field;
   const auto [value, gradient] = field.valueAndGradient(x);
   const Cell cell = field.cellAt(x);
-  Json json = {{"position", vectorJson(x)}, {"value", value},      {"cell", cell.id},
-               {"degree", cell.degree},     {"depth", cell.depth}, {"gradient", vectorJson(gradient)},
-               {"slope", gradient.norm()}};
+  Json json = pointFigures(x, value, cell.id, cell.degree, cell.depth, gradient);
   if (!withExact) return json;
   double exact = 0;
   session.exact("")(std::span(&x, 1), std::span(&exact, 1));

@@ -1,7 +1,3 @@
-#include "pictures/motion_commands.h"
-
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,6 +9,7 @@
 #include "files/film.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_commands.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/session.h"
@@ -34,14 +31,9 @@ std::vector<Parameter> drawingParameters(const Registry& registry, std::string_v
   return without({"field", "output", "json"}, registry.command(command).parameters);
 }
 
-void step(const Progress& progress, std::size_t done, std::size_t all) {
-  progress.update("drawing frames", double(done) / double(all));
-}
-
-/// Publishes the film and reports it. `rows` holds the figures of each frame, for the folder's frames.json.
-void publish(Session& session, const Arguments& arguments, Film& film, const render::Image& image, Json rows) {
-  const Json about = film.about(image, session.lastRenderer(), std::move(rows));
-  film.publish(about);
+/// Publishes the film and reports it.
+void publish(Session& session, const Arguments& arguments, Film& film) {
+  const Json about = film.publish(session.lastRenderer());
   if (session.wantsJson(arguments)) return printJson(session.console().out, about);
   session.console().out << Film::line(about);
 }
@@ -58,25 +50,21 @@ void runTurntable(Session& session, const Arguments& arguments) {
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, field.domain());
   const double first = picture.camera.azimuthDegrees;
-  Json rows = Json::array();
-  bool seen = false;
-  const render::Image last = withProgress(session.console(), [&](const Progress& progress) {
-    render::Image image;
+  const bool seen = withProgress(session.console(), [&](const Progress& progress) {
+    bool any = false;
     for (int frame = 0; frame < frames; ++frame) {
-      step(progress, film.frames(), std::size_t(frames));
+      progress.update("drawing frames", double(frame) / frames);
       picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
-      render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
+      const render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
       picture.scale = drawn.scale;  // colours keep the meaning that they have in the first frame
-      seen |= drawn.seen;
-      image = std::move(drawn.image);
-      film.add(image);
-      rows.push_back({{"file", ""}, {"azimuth", picture.camera.azimuthDegrees}});
+      any |= drawn.seen;
+      film.add(drawn.image, {{"azimuth", picture.camera.azimuthDegrees}});
     }
     film.encode(arguments.number("fps"), progress);
-    return image;
+    return any;
   });
   noteOddSurface(session.console(), field, picture, seen);
-  publish(session, arguments, film, last, rows);
+  publish(session, arguments, film);
 }
 
 /// The commands that --of takes: `slice` and `render` without the parameters field and output.
@@ -146,8 +134,8 @@ void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy
   std::iota(scale.levels.begin(), scale.levels.end(), first);
 }
 
-Json frameRow(const Field& field) {
-  return {{"file", ""}, {"steps", *field.metadata().steps}, {"leaves", statistics(field).leaves}};
+Json frameFigures(const Field& field) {
+  return {{"steps", *field.metadata().steps}, {"leaves", statistics(field).leaves}};
 }
 
 void runFrames(Session& session, const Registry& commands, const Arguments& arguments) {
@@ -163,30 +151,27 @@ void runFrames(Session& session, const Registry& commands, const Arguments& argu
   const auto steps = frameSteps(std::size_t(arguments.whole("frames")), *finished.metadata().steps);
   render::ScaleOptions scale = drawFrame(session, call, std::nullopt).scale;
 
-  Json rows = Json::array();
   std::ostream silent(nullptr);  // hides the messages of each frame
   const auto addStage = [&](Field field) {
     if (film.frames() == 0) widenLevels(scale, field, colorOf(call));
-    rows.push_back(frameRow(field));
+    const Json figures = frameFigures(field);
     Session stage(session.registry(), {session.console().in, silent, silent});
     stage.setField({std::move(field), surface});
     stage.setExact(exact);
-    film.add(drawFrame(stage, call, scale).image);
+    film.add(drawFrame(stage, call, scale).image, figures);
   };
-  const render::Image last = withProgress(session.console(), [&](const Progress& progress) {
+  withProgress(session.console(), [&](const Progress& progress) {
     buildStages(*exact, finished.domain(), buildOptions(arguments), std::span(steps).first(steps.size() - 1),
                 [&](Field field) {
-                  step(progress, film.frames(), steps.size());
+                  progress.update("drawing frames", double(film.frames()) / double(steps.size()));
                   addStage(std::move(field));
                 },
                 {.report = {}, .cancelled = progress.cancelled});
-    rows.push_back(frameRow(finished));
-    render::Image image = drawFrame(session, call, scale).image;
-    film.add(image);
+    film.add(drawFrame(session, call, scale).image, frameFigures(finished));
     film.encode(arguments.number("fps"), progress);
-    return image;
+    return true;
   });
-  publish(session, arguments, film, last, rows);
+  publish(session, arguments, film);
 }
 
 Command turntableCommand(const Registry& registry) {

@@ -8,16 +8,31 @@
 
 #include "console/console.h"
 #include "hpsdf/error.h"
-#include "pictures/picture_names.h"
-#include "session/backend.h"
 #include "text/json.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
-
 namespace {
 
 using render::ColorBy;
+
+constexpr std::pair<std::string_view, ColorBy> kColors[] = {
+    {"normal", ColorBy::normal},       {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
+    {"distance", ColorBy::distance},   {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
+    {"slope", ColorBy::slope},         {"error", ColorBy::error},          {"difference", ColorBy::difference},
+    {"cell-error", ColorBy::cellError}};
+
+struct NamedView {
+  std::string_view name;
+  double azimuthDegrees, elevationDegrees;
+};
+constexpr NamedView kViews[] = {{"front", 0, 0},
+                                {"back", 180, 0},
+                                {"left", -90, 0},
+                                {"right", 90, 0},
+                                {"top", 0, 90},
+                                {"bottom", 0, -90},
+                                {"corner", 45, 35.264389682754654}};
 
 render::ScaleOptions scaleOptions(const Arguments& arguments) {
   render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
@@ -49,7 +64,91 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   return options;
 }
 
+render::ShownCells shownCells(const Arguments& arguments) {
+  const std::string style = arguments.text("cells");
+  for (const char* name : {"degrees", "depths"})
+    if (style == "none" && arguments.given(name))
+      throw Error(fmt::format("{}: needs cells=lines or cells=boxes, of which it chooses some", name));
+  return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
+          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
+}
+
+render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
+
+render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, const char* offsetName,
+                            const Box& domain) {
+  const int axis = arguments.text(axisName)[0] - 'x';
+  return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(domain, axis)};
+}
+
+/// Sets the size and the samples of a picture.
+template <typename Picture>
+void setPixels(Picture& picture, const Arguments& arguments) {
+  picture.width = arguments.size("size")[0];
+  picture.height = arguments.size("size")[1];
+  picture.samples = arguments.whole("samples");
+}
+
+/// The plane that `render` draws: six numbers, or an axis with an offset.
+std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& domain) {
+  if (!arguments.given("plane")) {
+    if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
+    return std::nullopt;
+  }
+  if (const auto numbers = arguments.numbers("plane"); !numbers.empty()) {
+    if (arguments.given("plane-offset"))
+      throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
+    return freePlane(numbers);
+  }
+  return axisPlane(arguments, "plane", "plane-offset", domain);
+}
+
 }  // namespace
+
+std::vector<std::string> viewNames() {
+  std::vector<std::string> names;
+  for (const NamedView& view : kViews) names.emplace_back(view.name);
+  return names;
+}
+
+void turnTo(render::OrbitCamera& camera, std::string_view view) {
+  const NamedView& named = *std::ranges::find(kViews, view, &NamedView::name);
+  camera.azimuthDegrees = named.azimuthDegrees;
+  camera.elevationDegrees = named.elevationDegrees;
+}
+
+std::string viewName(const render::OrbitCamera& camera) {
+  for (const NamedView& view : kViews)
+    if (view.azimuthDegrees == camera.azimuthDegrees && view.elevationDegrees == camera.elevationDegrees)
+      return std::string(view.name);
+  return {};
+}
+
+std::vector<std::string> colorNames(std::optional<ColorBy> without) {
+  std::vector<std::string> names;
+  for (const auto& [name, color] : kColors)
+    if (color != without) names.emplace_back(name);
+  return names;
+}
+
+std::string_view colorName(ColorBy color) {
+  return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
+}
+
+/// The registry accepts only the names above, so that one is always found.
+ColorBy colorNamed(std::string_view name) {
+  return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
+}
+
+render::CellStyle cellStyle(std::string_view name) {
+  return name == "lines"   ? render::CellStyle::lines
+         : name == "boxes" ? render::CellStyle::boxes
+                           : render::CellStyle::none;
+}
+
+std::string cellStyleName(render::CellStyle style) {
+  return style == render::CellStyle::lines ? "lines" : style == render::CellStyle::boxes ? "boxes" : "none";
+}
 
 std::vector<int> levelList(const std::string& text, const char* name, int most) {
   if (text.empty()) return {};
@@ -80,66 +179,26 @@ std::vector<int> levelList(const std::string& text, const char* name, int most) 
   return levels;
 }
 
-namespace {
-
-render::ShownCells shownCells(const Arguments& arguments) {
-  const std::string style = arguments.text("cells");
-  for (const char* name : {"degrees", "depths"})
-    if (style == "none" && arguments.given(name))
-      throw Error(fmt::format("{}: needs cells=lines or cells=boxes, of which it chooses some", name));
-  return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
-          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
-}
-
-render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
-
-/// The plane that `render` draws: six numbers, or an axis with an offset.
-std::optional<render::Plane> scenePlane(const Arguments& arguments) {
-  if (!arguments.given("plane")) {
-    if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
-    return std::nullopt;
-  }
-  if (const auto numbers = arguments.numbers("plane"); !numbers.empty()) {
-    if (arguments.given("plane-offset"))
-      throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
-    return freePlane(numbers);
-  }
-  return render::AxisPlane{arguments.text("plane")[0] - 'x',
-                           arguments.given("plane-offset") ? arguments.number("plane-offset") : 0};
-}
-
-}  // namespace
-
 Vector3 pointOf(const Arguments& arguments, const char* name) {
   const auto p = arguments.numbers(name);
   return {p[0], p[1], p[2]};
 }
 
-render::SlicePicture slicePicture(const Arguments& arguments) {
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
     if (arguments.given("axis") || arguments.given("offset"))
       throw Error("plane: excludes axis and offset; give one or the other");
     picture.plane = freePlane(arguments.numbers("plane"));
   } else {
-    picture.plane =
-        render::AxisPlane{arguments.text("axis")[0] - 'x', arguments.has("offset") ? arguments.number("offset") : 0};
+    picture.plane = axisPlane(arguments, "axis", "offset", domain);
   }
   picture.zoom = arguments.number("zoom");
   if (arguments.given("target")) picture.target = pointOf(arguments, "target");
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
+  setPixels(picture, arguments);
   picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
-  render::SlicePicture picture = slicePicture(arguments);
-  if (auto* plane = std::get_if<render::AxisPlane>(&picture.plane); plane != nullptr && !arguments.given("offset"))
-    plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 
@@ -171,14 +230,12 @@ render::SurfacePicture cameraPicture(const Arguments& arguments) {
   if (arguments.given("target")) picture.camera.target = pointOf(arguments, "target");
   picture.camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                              : render::Projection::perspective;
-  picture.width = arguments.size("size")[0];
-  picture.height = arguments.size("size")[1];
-  picture.samples = arguments.whole("samples");
+  setPixels(picture, arguments);
   render::checkPictureSize(picture.width, picture.height, picture.samples);
   return picture;
 }
 
-render::SurfacePicture surfacePicture(const Arguments& arguments) {
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
   render::SurfacePicture picture = cameraPicture(arguments);
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
@@ -188,18 +245,11 @@ render::SurfacePicture surfacePicture(const Arguments& arguments) {
     throw Error("clip-offset: needs clip, the axis that it lies on");
   picture.cracks = arguments.flag("cracks");
   picture.surface = arguments.flag("surface");
-  picture.plane = scenePlane(arguments);
+  picture.plane = scenePlane(arguments, domain);
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.arrows = arguments.whole("arrows");
-  return picture;
-}
-
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
-  render::SurfacePicture picture = surfacePicture(arguments);
-  auto* plane = picture.plane ? std::get_if<render::AxisPlane>(&*picture.plane) : nullptr;
-  if (plane != nullptr && !arguments.given("plane-offset")) plane->offset = defaultOffset(domain, plane->axis);
   return picture;
 }
 

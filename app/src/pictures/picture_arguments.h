@@ -1,5 +1,5 @@
 #pragma once
-// Converts validated arguments into the renderer's settings.
+// Converts validated arguments, and names as commands spell them, into the renderer's settings.
 
 #include <array>
 #include <memory>
@@ -15,16 +15,34 @@
 
 namespace hpsdf::app {
 
+/// Names of the quantities that colours show: degree, depth, distance, ….
+std::string_view colorName(render::ColorBy color);
+std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
+render::ColorBy colorNamed(std::string_view name);
+
+/// Names of a camera's directions: front, back, ….
+std::vector<std::string> viewNames();
+/// Turns the camera into a direction that `viewNames` contains.
+void turnTo(render::OrbitCamera& camera, std::string_view view);
+/// The name of the camera's direction; "" if it has none.
+std::string viewName(const render::OrbitCamera& camera);
+
+/// The names are none, lines and boxes.
+render::CellStyle cellStyle(std::string_view name);
+std::string cellStyleName(render::CellStyle style);
+
 /// The levels of a list such as "2,4-6", each from 0 to `most`; empty for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 
 /// The point that a parameter of three numbers holds, which must have been given.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// The settings of `slice`. Without an offset the plane is at 0, or, if a domain is given, at `defaultOffset`. Throws
-/// `Error` when plane and axis are both given.
-render::SlicePicture slicePicture(const Arguments& arguments);
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain);
+/// Stands for the domain of a field that is not loaded yet, when arguments are checked.
+inline const Box kAnyDomain(Vector3::Constant(-1), Vector3::Constant(1));
+
+/// The settings of `slice`. Without an offset the plane is at `defaultOffset`. Throws `Error` when plane and axis are
+/// both given.
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
 /// The parameters of `render` that every picture with a camera takes.
 inline constexpr std::array kCameraParameters = {"camera", "view",    "target", "projection",
@@ -37,10 +55,9 @@ std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh>
 /// The settings that `kCameraParameters` give. Throws `Error` for a camera or a size out of range.
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
-/// The settings of `render`. Without an offset the plane is at 0, or, if a domain is given, at `defaultOffset`. Throws
-/// `Error` for a camera out of range, and for parameters that exclude or need each other.
-render::SurfacePicture surfacePicture(const Arguments& arguments);
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain);
+/// The settings of `render`. Without an offset the plane is at `defaultOffset`. Throws `Error` for a camera out of
+/// range, and for parameters that exclude or need each other.
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
 /// Writes a note that explains an empty picture, or a surface that is cut off by the walls of the domain.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);

@@ -2,16 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <limits>
 #include <span>
 
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "pictures/picture_arguments.h"
-#include "pictures/picture_names.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/session.h"

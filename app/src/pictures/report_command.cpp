@@ -1,11 +1,9 @@
-#include "pictures/report_command.h"
-
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <filesystem>
 
+#include "console/long_work.h"
 #include "console/version.h"
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
@@ -18,6 +16,7 @@
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/picture.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/picture_commands.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
@@ -56,39 +55,33 @@ double frameSeconds(render::Renderer& renderer, const Field& field, const render
     renderer.surface(view, picture.width, picture.height);
     ++frames;
   }
-  return std::chrono::duration<double>(Clock::now() - start).count() / frames;
+  return secondsSince(start) / frames;
 }
 
 struct Drawing {
-  std::string file;
-  std::string title;
-  std::string caption;
-  std::string command;  ///< arguments after "hpsdf", with {} for the field's file
+  std::string_view name, title, caption;
   bool slice;
   render::ColorBy color;
 };
 
-std::vector<Drawing> drawings() {
-  using render::ColorBy;
-  return {
-      {"surface.png", "Surface", "Sphere-traced, lit by the field's own gradient.", "render {} -o surface.png", false,
-       ColorBy::normal},
-      {"degree.png", "Degree", "The polynomial degree of each cell in the plane through the middle.",
-       "slice {} --color degree -o degree.png", true, ColorBy::degree},
-      {"depth.png", "Depth", "How often the octree has halved the base cells, in the same plane.",
-       "slice {} --color depth -o depth.png", true, ColorBy::depth},
-      {"distance.png", "Distance",
-       "The signed distance: iso-lines, and the surface as the heavy line where it is zero.",
-       "slice {} --color distance -o distance.png", true, ColorBy::distance},
-      {"surface-degree.png", "Degree on the surface", "The degree of the cells that hold the surface.",
-       "render {} --color degree -o surface-degree.png", false, ColorBy::degree},
-  };
-}
+using render::ColorBy;
+constexpr Drawing kDrawings[] = {
+    {"surface", "Surface", "Sphere-traced, lit by the field's own gradient.", false, ColorBy::normal},
+    {"degree", "Degree", "The polynomial degree of each cell in the plane through the middle.", true, ColorBy::degree},
+    {"depth", "Depth", "How often the octree has halved the base cells, in the same plane.", true, ColorBy::depth},
+    {"distance", "Distance", "The signed distance: iso-lines, and the surface as the heavy line where it is zero.",
+     true, ColorBy::distance},
+    {"surface-degree", "Degree on the surface", "The degree of the cells that hold the surface.", false,
+     ColorBy::degree}};
 
+/// Draws into the folder. The page tells the command that draws the same picture from the field's file.
 ReportPicture drawInto(const fs::path& folder, Session& session, render::Renderer& renderer,
                        const std::string& fieldFile, const Drawing& drawing, int samples) {
   const Field& field = session.current().field;
-  std::string command = "hpsdf " + fmt::format(fmt::runtime(drawing.command), fieldFile);
+  const std::string file = fmt::format("{}.png", drawing.name);
+  std::string command = fmt::format("hpsdf {} {}", drawing.slice ? "slice" : "render", fieldFile);
+  if (drawing.color != ColorBy::normal) command += fmt::format(" --color {}", colorName(drawing.color));
+  command += " -o " + file;
   render::Image image;
   if (drawing.slice) {
     const double offset = defaultOffset(field.domain(), 2);
@@ -103,8 +96,8 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
     image = render::draw(renderer, field, picture);
   }
   if (samples != 1) command += fmt::format(" --samples={}", samples);
-  savePng(image, folder / drawing.file);
-  return {drawing.file, drawing.title, drawing.caption, command};
+  savePng(image, folder / file);
+  return {file, std::string(drawing.title), std::string(drawing.caption), command};
 }
 
 std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
@@ -165,7 +158,7 @@ void runReport(Session& session, const Arguments& arguments) {
                   .depths = counts.depthVolume,
                   .buildCommand = built ? buildCommandLine(arguments.text("source"), fieldFile, arguments) : "",
                   .footer = fmt::format("{}; {}", versionText(), renderer.description())};
-  for (const Drawing& drawing : drawings())
+  for (const Drawing& drawing : kDrawings)
     page.pictures.push_back(drawInto(folder.path(), session, renderer, fieldFile, drawing, arguments.whole("samples")));
   const render::SurfacePicture traced;  // the timed frame has one sample per pixel
   const double seconds = frameSeconds(renderer, field, traced);

@@ -44,6 +44,24 @@ Field cachedField(const std::filesystem::path& file, std::uint64_t print, double
   }
 }
 
+Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRequest& request) {
+  const std::uint64_t print = fingerprint(mesh);
+  std::filesystem::path file;
+  if (request.cache) {
+    file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
+    std::error_code unknown;
+    if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request.targetError);
+    checkWritable(file);  // fails before the long construction
+  }
+  const int threads = tbb::this_task_arena::max_concurrency();
+  Field field = withProgress(console, [&](const Progress& progress) {
+    const ExactDistance distance(mesh, {.threads = threads});
+    return build(distance, domainAround(mesh), {.targetError = request.targetError, .threads = threads}, progress);
+  });
+  if (request.cache) save(field, file);
+  return field;
+}
+
 }  // namespace
 
 BodyKind::BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, double margin)
@@ -54,14 +72,18 @@ BodyKind::BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, 
       mass(physics::massProperties(mesh)),
       shape(collider, surface, mass, margin) {}
 
-BodyKind& Scene::addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples,
-                         double margin) {
-  Field field = sceneField(console, mesh, request);
+BodyKind& Scene::addKind(TriangleMesh mesh, std::size_t samples, double margin) {
+  Field field = sceneField(console_, mesh, request_);
   return kinds_.emplace_back(std::move(mesh), std::move(field), samples, margin);
 }
 
 void Scene::addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material) {
   world_.add(kind.shape, 0, worldFromMesh * kind.mass.meshFromInertia, material);
+}
+
+void Scene::addLevelGround(double height, double friction) {
+  shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), height));
+  world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = friction});
 }
 
 void Scene::admit() {
@@ -92,41 +114,22 @@ std::size_t Scene::moving() const {
   return count;
 }
 
-TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size) {
-  TriangleMesh mesh = importSurface(console, name).mesh;
+TriangleMesh Scene::meshOf(const std::string& name, double size) const {
+  TriangleMesh mesh = importSurface(console_, name).mesh;
   try {
     physics::massProperties(mesh);
   } catch (const Error& error) {
     throw Error(name + ": " + error.what());
   }
   if (!inspect(mesh).closed())
-    warn(console, name + " is not closed: near its holes bodies may pass through it, or be pushed inside");
-  const bool turns = fileIsYUp && !isShape(name);
-  if (turns)
+    warn(console_, name + " is not closed: near its holes bodies may pass through it, or be pushed inside");
+  if (request_.filesAreYUp && !isShape(name))
     for (Vector3& x : mesh.vertices) x = Vector3(x.x(), -x.z(), x.y());
   if (size == 0) return mesh;
   const Box box = boundingBox(mesh);
   const double scale = size / box.sizes().maxCoeff();
   for (Vector3& x : mesh.vertices) x = scale * (x - box.center());
   return mesh;
-}
-
-Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRequest& request) {
-  const std::uint64_t print = fingerprint(mesh);
-  std::filesystem::path file;
-  if (request.cache) {
-    file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
-    std::error_code unknown;
-    if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request.targetError);
-    checkWritable(file);  // fails before the long construction
-  }
-  const int threads = tbb::this_task_arena::max_concurrency();
-  Field field = withProgress(console, [&](const Progress& progress) {
-    const ExactDistance distance(mesh, {.threads = threads});
-    return build(distance, domainAround(mesh), {.targetError = request.targetError, .threads = threads}, progress);
-  });
-  if (request.cache) save(field, file);
-  return field;
 }
 
 TriangleMesh poleMesh(double radius, double height) {

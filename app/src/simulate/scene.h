@@ -31,8 +31,10 @@ struct BodyKind {
 
 class Scene {
  public:
-  explicit Scene(const SceneRequest& request, double slop = 0)
-      : world_({.step = request.step, .solverIterations = request.iterations, .slop = slop}) {}
+  Scene(const Console& console, const SceneRequest& request, double slop = 0)
+      : world_({.step = request.step, .solverIterations = request.iterations, .slop = slop}),
+        request_(request),
+        console_(console) {}
   virtual ~Scene() = default;
 
   physics::World& world() { return world_; }
@@ -50,21 +52,25 @@ class Scene {
   };
   const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, by ascending time
   const std::deque<BodyKind>& kinds() const { return kinds_; }
-  /// Height below which a body counts as lost, world units.
-  double floor() const { return floor_; }
-  std::size_t lost() const;                              ///< number of bodies, soft or rigid, with a part below `floor`
-  std::size_t moving() const;                            ///< number of rigid bodies in the world that are not static
+  std::size_t lost() const;    ///< number of bodies, soft or rigid, with a part below `floor_`
+  std::size_t moving() const;  ///< number of rigid bodies in the world that are not static
   std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
   /// Length that penetration depths are compared with: a marble's radius, or the size of a body.
   double bodySize() const { return bodySize_; }
 
  protected:
-  /// Adds a kind of body with the mesh's field, which `sceneField` makes. `samples` is the number of surface samples
-  /// and `margin` the collision margin in world units.
-  BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples,
-                    double margin);
+  /// The mesh of a file or shape with z up. It is centred at the origin and scaled to a longest side of `size`, unless
+  /// that is 0. Warns of a mesh that is not closed. Throws `Error` naming a mesh that cannot be read or has no volume.
+  TriangleMesh meshOf(const std::string& name, double size) const;
+  /// Adds a kind of body with the mesh's field, which is loaded from the cache's folder, or else built by the threads
+  /// of the caller's TBB arena and saved there. `samples` is the number of surface samples and `margin` the collision
+  /// margin in world units. Throws `Error` for a folder that cannot be used, and for a file in it that is another
+  /// field.
+  BodyKind& addKind(TriangleMesh mesh, std::size_t samples, double margin);
   /// Adds a static body.
   void addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
+  /// Adds a static plane at a height.
+  void addLevelGround(double height, double friction);
   /// Schedules a body. Calls must come in ascending order of time.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 
@@ -73,20 +79,16 @@ class Scene {
   std::deque<std::unique_ptr<btCollisionShape>> shapes_;
   physics::World world_;
   std::deque<Drop> drops_;
-  double floor_ = 0;
+  double floor_ = 0;  ///< height below which a body counts as lost, world units
   double bodySize_ = 1;
+  SceneRequest request_;
+
+ private:
+  Console console_;  ///< the streams that it refers to are used only while the scene is made
 };
 
 /// Makes the scene of that name. Throws `Error` naming a mesh or field that cannot be made.
 std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request);
-
-/// The mesh of a file or shape with z up. It is centred at the origin and scaled to a longest side of `size`, unless
-/// that is 0. Warns of a mesh that is not closed. Throws `Error` naming a mesh that cannot be read or has no volume.
-TriangleMesh sceneMesh(const Console& console, const std::string& name, bool fileIsYUp, double size);
-
-/// The field of a mesh. It is loaded from the cache's folder, or else built by the threads of the caller's TBB arena
-/// and saved there. Throws `Error` for a folder that cannot be used, and for a file in it that is another field.
-Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRequest& request);
 
 /// A cylinder of 24 sides around the z axis, centred at the origin.
 TriangleMesh poleMesh(double radius, double height);

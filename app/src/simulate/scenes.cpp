@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -29,6 +28,9 @@ class Random {
   explicit Random(std::uint64_t start) : engine_(start) {}
 
   double within(double lo, double hi) { return lo + (hi - lo) * double(engine_() >> 11) * 0x1p-53; }
+
+  /// A point of a cube around the origin.
+  Vector3 jitter(double most) { return Vector3(within(-most, most), within(-most, most), within(-most, most)); }
 
   /// A uniformly distributed rotation (Shoemake 1992).
   Eigen::Quaterniond rotation() {
@@ -70,10 +72,11 @@ void requireFitting(const TriangleMesh& ground, const std::string& name, double 
 /// Marbles that fall onto ground that is open upwards.
 class MarbleScene : public Scene {
  public:
-  MarbleScene(const Console& console, const SceneRequest& request, double radius) : Scene(request, radius / 300) {
-    TriangleMesh mesh = sceneMesh(console, request.ground, request.filesAreYUp, 0);
+  MarbleScene(const Console& console, const SceneRequest& request, double radius)
+      : Scene(console, request, radius / 300) {
+    TriangleMesh mesh = meshOf(request.ground, 0);
     requireFitting(mesh, request.ground, radius);
-    addStatic(addKind(console, request, std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());
+    addStatic(addKind(std::move(mesh), request.samples, radius / 10), Eigen::Isometry3d::Identity());
     shapes_.push_back(std::make_unique<btSphereShape>(radius));
     bodySize_ = radius;
     floor_ = ground().domain().min().z() - 10 * radius;
@@ -109,92 +112,77 @@ class MarbleScene : public Scene {
 };
 
 /// Every 0.2 s a layer of marbles falls into the bowl.
-std::unique_ptr<Scene> bowl(const Console& console, const SceneRequest& request) {
-  struct Bowl final : MarbleScene {
-    Bowl(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.03) {
-      const Box box = ground().domain();
-      const double extent = 0.3 * box.sizes().head<2>().minCoeff(), distance = 2.6 * bodySize_;
-      const double height = box.max().z() + 2 * bodySize_;
-      Random random(from.seed);
-      std::size_t left = from.bodies;
-      for (int layer = 0; left > 0; ++layer)
-        for (double y = -extent; y <= extent && left > 0; y += distance)
-          for (double x = -extent; x <= extent && left > 0; x += distance) {
-            if (std::hypot(x, y) > extent) continue;
-            const Vector3 jitter(random.within(-1, 1), random.within(-1, 1), random.within(-1, 1));
-            dropMarble(
-                0.2 * layer,
-                Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) + 0.2 * bodySize_ * jitter,
-                pileMaterial());
-            --left;
-          }
-    }
-  };
-  return std::make_unique<Bowl>(console, request);
-}
+struct BowlScene final : MarbleScene {
+  BowlScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.03) {
+    const Box box = ground().domain();
+    const double extent = 0.3 * box.sizes().head<2>().minCoeff(), distance = 2.6 * bodySize_;
+    const double height = box.max().z() + 2 * bodySize_;
+    Random random(request.seed);
+    std::size_t left = request.bodies;
+    for (int layer = 0; left > 0; ++layer)
+      for (double y = -extent; y <= extent && left > 0; y += distance)
+        for (double x = -extent; x <= extent && left > 0; x += distance) {
+          if (std::hypot(x, y) > extent) continue;
+          dropMarble(0.2 * layer,
+                     Vector3(x, y, height) + Vector3(box.center().x(), box.center().y(), 0) +
+                         0.2 * bodySize_ * random.jitter(1),
+                     pileMaterial());
+          --left;
+        }
+  }
+};
 
-std::unique_ptr<Scene> helix(const Console& console, const SceneRequest& request) {
-  struct Helix final : MarbleScene {
-    Helix(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.035) {
-      // The groove of three turns crosses y = 0 at this x, away from the edge of the bowl.
-      for (std::size_t n = 0; n < from.bodies; ++n)
-        dropMarble(2.0 * double(n), restingPosition(ground(), from.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
-    }
-  };
-  return std::make_unique<Helix>(console, request);
-}
+struct HelixScene final : MarbleScene {
+  HelixScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.035) {
+    // The groove of three turns crosses y = 0 at this x, away from the edge of the bowl.
+    for (std::size_t n = 0; n < request.bodies; ++n)
+      dropMarble(2.0 * double(n), restingPosition(ground(), request.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
+  }
+};
 
 /// A marble rolls down the run and then into a triangle of standing bodies, as in bowling.
-std::unique_ptr<Scene> run(const Console& console, const SceneRequest& request) {
-  struct Run final : MarbleScene {
-    Run(const Console& to, const SceneRequest& from) : MarbleScene(to, from, 0.045) {
-      const double table = boundingBox(kinds_.front().mesh).min().z() - 0.02;
-      floor_ = table - 1;
-      shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), table));
-      world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.5});
-      dropMarble(0, restingPosition(ground(), from.ground, 0.92, -0.05, bodySize_), rollingMaterial());
-      constexpr double kPin = 0.2;
-      std::vector<BodyKind*> pins;
-      for (const std::string& name : from.meshes)
-        pins.push_back(&addKind(to, from, sceneMesh(to, name, from.filesAreYUp, kPin), from.samples, 0.01 * kPin));
-      std::size_t left = from.bodies;
-      for (int row = 0; left > 0; ++row)
-        for (int i = 0; i <= row && left > 0; ++i, --left) {
-          BodyKind& pin = *pins[(from.bodies - left) % pins.size()];
-          const double stands = table - boundingBox(pin.mesh).min().z();
-          drop({0,
-                &pin.shape,
-                200 * pin.mass.volume,
-                shift({0.92 + 1.2 * kPin * (i - 0.5 * row), -0.6 - kPin * row, stands}) * pin.mass.meshFromInertia,
-                {.friction = 0.5}});
-        }
-    }
-  };
-  return std::make_unique<Run>(console, request);
-}
+struct RunScene final : MarbleScene {
+  RunScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.045) {
+    const double table = boundingBox(kinds_.front().mesh).min().z() - 0.02;
+    floor_ = table - 1;
+    addLevelGround(table, 0.5);
+    dropMarble(0, restingPosition(ground(), request.ground, 0.92, -0.05, bodySize_), rollingMaterial());
+    constexpr double kPin = 0.2;
+    std::vector<BodyKind*> pins;
+    for (const std::string& name : request.meshes)
+      pins.push_back(&addKind(meshOf(name, kPin), request.samples, 0.01 * kPin));
+    std::size_t left = request.bodies;
+    for (int row = 0; left > 0; ++row)
+      for (int i = 0; i <= row && left > 0; ++i, --left) {
+        BodyKind& pin = *pins[(request.bodies - left) % pins.size()];
+        const double stands = table - boundingBox(pin.mesh).min().z();
+        drop({0,
+              &pin.shape,
+              200 * pin.mass.volume,
+              shift({0.92 + 1.2 * kPin * (i - 0.5 * row), -0.6 - kPin * row, stands}) * pin.mass.meshFromInertia,
+              {.friction = 0.5}});
+      }
+  }
+};
 
 /// Bodies of the request's meshes, which fall onto poles, a slope or a table.
 class PileScene : public Scene {
  public:
-  explicit PileScene(const SceneRequest& request) : Scene(request), random_(request.seed) { floor_ = -1; }
+  PileScene(const Console& console, const SceneRequest& request) : Scene(console, request), random_(request.seed) {
+    floor_ = -1;
+  }
 
  protected:
-  BodyKind& addKind(const Console& console, const SceneRequest& request, TriangleMesh mesh, std::size_t samples) {
+  BodyKind& addKind(TriangleMesh mesh, std::size_t samples) {
     const double size = boundingBox(mesh).sizes().minCoeff();
-    return Scene::addKind(console, request, std::move(mesh), samples, std::min(0.005, 0.02 * size));
+    return Scene::addKind(std::move(mesh), samples, std::min(0.005, 0.02 * size));
   }
 
-  std::vector<BodyKind*> bodyKinds(const Console& console, const SceneRequest& request, double size) {
+  std::vector<BodyKind*> bodyKinds(double size) {
     bodySize_ = size;
     std::vector<BodyKind*> made;
-    for (const std::string& name : request.meshes)
-      made.push_back(&addKind(console, request, sceneMesh(console, name, request.filesAreYUp, size), request.samples));
+    for (const std::string& name : request_.meshes) made.push_back(&addKind(meshOf(name, size), request_.samples));
     return made;
-  }
-
-  void addGround() {
-    shapes_.push_back(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0));
-    world_.add(*shapes_.back(), 0, Eigen::Isometry3d::Identity(), {.friction = 0.6});
   }
 
   /// Schedules a body at a position, with a random orientation.
@@ -210,28 +198,24 @@ class PileScene : public Scene {
   Random random_;
 };
 
-std::unique_ptr<Scene> poles(const Console& console, const SceneRequest& request) {
-  struct Poles final : PileScene {
-    Poles(const Console& to, const SceneRequest& from) : PileScene(from) {
-      constexpr int kSide = 8;
-      constexpr double kDistance = 1.3, kHeight = 4, kWave = 1.2;
-      const auto kinds = bodyKinds(to, from, 1);
-      BodyKind& pole = addKind(to, from, poleMesh(0.12, kHeight), 2000);
-      addGround();
-      const auto position = [](int i) { return kDistance * (i - 0.5 * (kSide - 1)); };
-      for (int x = 0; x < kSide; ++x)
-        for (int y = 0; y < kSide; ++y) addStatic(pole, shift({position(x), position(y), kHeight / 2}));
-      for (std::size_t n = 0; n < from.bodies; ++n) {
-        const int x = int(n % kSide), y = int(n / kSide % kSide);
-        const std::size_t wave = n / (kSide * kSide);
-        const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), random_.within(-0.1, 0.1));
-        dropBody(*kinds[n % kinds.size()], kWave * double(wave),
-                 Vector3(position(x), position(y), kHeight + 2.5) + jitter);
-      }
+struct PolesScene final : PileScene {
+  PolesScene(const Console& console, const SceneRequest& request) : PileScene(console, request) {
+    constexpr int kSide = 8;
+    constexpr double kDistance = 1.3, kHeight = 4, kWave = 1.2;
+    const auto kinds = bodyKinds(1);
+    BodyKind& pole = addKind(poleMesh(0.12, kHeight), 2000);
+    addLevelGround(0, 0.6);
+    const auto position = [](int i) { return kDistance * (i - 0.5 * (kSide - 1)); };
+    for (int x = 0; x < kSide; ++x)
+      for (int y = 0; y < kSide; ++y) addStatic(pole, shift({position(x), position(y), kHeight / 2}));
+    for (std::size_t n = 0; n < request.bodies; ++n) {
+      const int x = int(n % kSide), y = int(n / kSide % kSide);
+      const std::size_t wave = n / (kSide * kSide);
+      dropBody(*kinds[n % kinds.size()], kWave * double(wave),
+               Vector3(position(x), position(y), kHeight + 2.5) + random_.jitter(0.1));
     }
-  };
-  return std::make_unique<Poles>(console, request);
-}
+  }
+};
 
 /// Makes Bullet solve contacts last. In its own order the links pull nodes into the bodies that they rest on.
 void solveContactsLast(btSoftBody& body) {
@@ -264,76 +248,76 @@ std::unique_ptr<btSoftBody> softTorus(btSoftBodyWorldInfo& info, const Vector3& 
   return body;
 }
 
-std::unique_ptr<Scene> slope(const Console& console, const SceneRequest& request) {
-  struct Slope final : PileScene {
-    Slope(const Console& to, const SceneRequest& from) : PileScene(from) {
-      constexpr double kLength = 8, kWidth = 4.4, kThick = 0.4, kSize = 0.6, kRail = 0.7;
-      const auto kinds = bodyKinds(to, from, kSize);
-      BodyKind& slab = addKind(to, from, slabMesh({kLength, kWidth, kThick}), 4000);
-      BodyKind& table = addKind(to, from, slabMesh({kLength, 2 * kWidth, kThick}), 4000);
-      BodyKind& rail = addKind(to, from, slabMesh({kLength, kThick, kRail}), 1000);
-      BodyKind& pole = addKind(to, from, poleMesh(0.12, 0.8), 1000);
-      floor_ = -4;
-      const Material smooth{.friction = 0.3};
-      const Eigen::Isometry3d ramp =
-          shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.55, Vector3::UnitY()));  // descends towards +x
-      addStatic(slab, ramp, smooth);
-      for (const double side : {-0.5, 0.5})
-        addStatic(rail, ramp * shift({0, side * (kWidth + kThick), (kRail - kThick) / 2}), smooth);
-      addStatic(table, shift({0.75 * kLength, 0, -0.3}));
-      for (int row = 0; row < 3; ++row)
-        for (int i = 0; i < 2 + row % 2; ++i)
-          addStatic(pole, ramp * shift({-1.0 + 1.6 * row, 1.4 * (i - 0.5 * (1 + row % 2)), 0.4 + kThick / 2}), smooth);
-      for (std::size_t n = 0; n < from.bodies; ++n) {
-        const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), 0);
-        const Vector3 at = ramp * Vector3(-3.2, 1.0 * (double(n % 3) - 1), 0.9) + jitter;
-        if (n % 4 == 3)
-          world_.add(softTorus(world_.softBodyInfo(), at + Vector3(0.8, 0, 0.4 + 0.3 * double(n / 4)), kSize));
-        else
-          dropBody(*kinds[n % kinds.size()], 0.5 * double(n / 3), at);
-      }
+struct SlopeScene final : PileScene {
+  SlopeScene(const Console& console, const SceneRequest& request) : PileScene(console, request) {
+    constexpr double kLength = 8, kWidth = 4.4, kThick = 0.4, kSize = 0.6, kRail = 0.7;
+    const auto kinds = bodyKinds(kSize);
+    BodyKind& slab = addKind(slabMesh({kLength, kWidth, kThick}), 4000);
+    BodyKind& table = addKind(slabMesh({kLength, 2 * kWidth, kThick}), 4000);
+    BodyKind& rail = addKind(slabMesh({kLength, kThick, kRail}), 1000);
+    BodyKind& pole = addKind(poleMesh(0.12, 0.8), 1000);
+    floor_ = -4;
+    const Material smooth{.friction = 0.3};
+    const Eigen::Isometry3d ramp =
+        shift({0, 0, 2}) * Eigen::Isometry3d(Eigen::AngleAxisd(0.55, Vector3::UnitY()));  // descends towards +x
+    addStatic(slab, ramp, smooth);
+    for (const double side : {-0.5, 0.5})
+      addStatic(rail, ramp * shift({0, side * (kWidth + kThick), (kRail - kThick) / 2}), smooth);
+    addStatic(table, shift({0.75 * kLength, 0, -0.3}));
+    for (int row = 0; row < 3; ++row)
+      for (int i = 0; i < 2 + row % 2; ++i)
+        addStatic(pole, ramp * shift({-1.0 + 1.6 * row, 1.4 * (i - 0.5 * (1 + row % 2)), 0.4 + kThick / 2}), smooth);
+    for (std::size_t n = 0; n < request.bodies; ++n) {
+      const Vector3 jitter(random_.within(-0.1, 0.1), random_.within(-0.1, 0.1), 0);
+      const Vector3 at = ramp * Vector3(-3.2, 1.0 * (double(n % 3) - 1), 0.9) + jitter;
+      if (n % 4 == 3)
+        world_.add(softTorus(world_.softBodyInfo(), at + Vector3(0.8, 0, 0.4 + 0.3 * double(n / 4)), kSize));
+      else
+        dropBody(*kinds[n % kinds.size()], 0.5 * double(n / 3), at);
     }
-  };
-  return std::make_unique<Slope>(console, request);
-}
+  }
+};
 
-std::unique_ptr<Scene> cloth(const Console& console, const SceneRequest& request) {
-  struct Cloth final : PileScene {
-    Cloth(const Console& to, const SceneRequest& from) : PileScene(from) {
-      constexpr double kMargin = 0.01, kSide = 1.6, kBytesANode = 2000;
-      requireMemory("a cloth of " + grouped(from.nodes) + " nodes", kBytesANode * double(from.nodes),
-                    "take fewer nodes");
-      const TriangleMesh mesh = sceneMesh(to, from.ground, from.filesAreYUp, 1);
-      const double stands = -boundingBox(mesh).min().z();
-      const double top = boundingBox(mesh).sizes().z();
-      BodyKind& body = addKind(to, from, mesh, from.samples);
-      BodyKind& table = addKind(to, from, slabMesh({3, 3, 0.2}), 1000);
-      const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through the cloth
-      addStatic(body, shift({0, 0, stands}), rough);
-      addStatic(table, shift({0, 0, -0.1}), rough);
-      const int side = std::max(2, int(std::ceil(std::sqrt(double(from.nodes)))));
-      const auto corner = [&](double x, double y) { return btVector3(x * kSide / 2, y * kSide / 2, top + 0.05); };
-      std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(
-          world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
-      solveContactsLast(*sheet);
-      sheet->m_cfg.piterations = 8;
-      sheet->m_cfg.kDF = 1;
-      sheet->m_cfg.kDP = 0.05;
-      sheet->getCollisionShape()->setMargin(kMargin);
-      sheet->setTotalMass(1, false);
-      bodySize_ = kMargin;
-      world_.add(std::move(sheet));
-    }
-  };
-  return std::make_unique<Cloth>(console, request);
+struct ClothScene final : PileScene {
+  ClothScene(const Console& console, const SceneRequest& request) : PileScene(console, request) {
+    constexpr double kMargin = 0.01, kSide = 1.6, kBytesANode = 2000;
+    requireMemory("a cloth of " + grouped(request.nodes) + " nodes", kBytesANode * double(request.nodes),
+                  "take fewer nodes");
+    const TriangleMesh mesh = meshOf(request.ground, 1);
+    const double stands = -boundingBox(mesh).min().z();
+    const double top = boundingBox(mesh).sizes().z();
+    BodyKind& body = addKind(mesh, request.samples);
+    BodyKind& table = addKind(slabMesh({3, 3, 0.2}), 1000);
+    const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through the cloth
+    addStatic(body, shift({0, 0, stands}), rough);
+    addStatic(table, shift({0, 0, -0.1}), rough);
+    const int side = std::max(2, int(std::ceil(std::sqrt(double(request.nodes)))));
+    const auto corner = [&](double x, double y) { return btVector3(x * kSide / 2, y * kSide / 2, top + 0.05); };
+    std::unique_ptr<btSoftBody> sheet(btSoftBodyHelpers::CreatePatch(
+        world_.softBodyInfo(), corner(-1, -1), corner(1, -1), corner(-1, 1), corner(1, 1), side, side, 0, true));
+    solveContactsLast(*sheet);
+    sheet->m_cfg.piterations = 8;
+    sheet->m_cfg.kDF = 1;
+    sheet->m_cfg.kDP = 0.05;
+    sheet->getCollisionShape()->setMargin(kMargin);
+    sheet->setTotalMass(1, false);
+    bodySize_ = kMargin;
+    world_.add(std::move(sheet));
+  }
+};
+
+template <typename Kind>
+std::unique_ptr<Scene> madeAs(const Console& console, const SceneRequest& request) {
+  return std::make_unique<Kind>(console, request);
 }
 
 }  // namespace
 
 std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request) {
   using Maker = std::unique_ptr<Scene> (*)(const Console&, const SceneRequest&);
-  static const std::map<std::string, Maker> makers = {{"bowl", bowl},   {"helix", helix}, {"run", run},
-                                                      {"poles", poles}, {"slope", slope}, {"cloth", cloth}};
+  static const std::map<std::string, Maker> makers = {{"bowl", madeAs<BowlScene>},   {"helix", madeAs<HelixScene>},
+                                                      {"run", madeAs<RunScene>},     {"poles", madeAs<PolesScene>},
+                                                      {"slope", madeAs<SlopeScene>}, {"cloth", madeAs<ClothScene>}};
   return makers.at(name)(console, request);
 }
 

@@ -1,7 +1,6 @@
 #include "simulate/simulate_command.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
@@ -190,12 +189,8 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
 Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
   Film film(arguments.text("output"));
   const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
-  Json rows = Json::array();
-  render::Image last;
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
-    last = std::move(shot.drawn.image);
-    film.add(last);
-    rows.push_back({{"file", ""}, {"seconds", shot.seconds}, {"contacts", shot.contacts}});
+    film.add(shot.drawn.image, {{"seconds", shot.seconds}, {"contacts", shot.contacts}});
     session.setLastRenderer(shot.renderer);
   });
   const SimulationFigures figures = simulateAs(session.console(), arguments, request, &camera);
@@ -203,8 +198,7 @@ Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest
     film.encode(framesPerSecond(arguments), progress);
     return true;
   });
-  const Json about = film.about(last, session.lastRenderer(), std::move(rows));
-  film.publish(about);
+  const Json about = film.publish(session.lastRenderer());
   return {figures, about, Film::line(about)};
 }
 

@@ -5,7 +5,6 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -45,42 +44,27 @@ void addStep(const physics::StepFigures& step, double size, bool lastSecond, Sim
   if (lastSecond) figures.deepestAtEnd = std::max(figures.deepestAtEnd, step.dispatch.deepest);
 }
 
-/// Takes the pictures that are due. Does nothing without a camera.
-class Photographer {
- public:
-  Photographer(const Scene& scene, const std::string& name, const SimulationCamera* camera, double rate)
-      : camera_(camera) {
-    if (camera == nullptr) return;
-    studio_.emplace(scene, name, camera->look, camera->backend);
-    if (camera->framesPerSecond > 0) stepsPerFrame_ = rate / camera->framesPerSecond;
-  }
-
-  /// Takes the picture after that many steps, if one is due.
-  void after(std::uint64_t steps, bool last) {
-    if (!studio_ || (stepsPerFrame_ > 0 ? double(steps) < std::round(stepsPerFrame_ * double(frames_)) : !last)) return;
-    camera_->take(studio_->shot());
-    ++frames_;
-  }
-
- private:
-  const SimulationCamera* camera_;
-  std::optional<Studio> studio_;
-  double stepsPerFrame_ = 0;  ///< steps between frames; 0 for one picture after the last step
-  std::uint64_t frames_ = 0;  ///< number of pictures taken
-};
-
 SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps, double rate,
                       const SimulationCamera* camera, const Progress& progress) {
   SimulationFigures figures;
-  Photographer photographer(scene, name, camera, rate);
+  const double framesPerSecond = camera != nullptr ? camera->framesPerSecond : 0;
+  std::optional<Studio> studio;
+  if (camera != nullptr) studio.emplace(scene, name, camera->look, camera->backend);
+  double nextPicture = framesPerSecond > 0 ? 0 : double(steps);  // the step before which it is taken
+  std::uint64_t pictures = 0;
+  const auto takePicture = [&](std::uint64_t step) {
+    if (!studio || double(step) < nextPicture) return;
+    camera->take(studio->shot());
+    nextPicture = std::round(rate / framesPerSecond * double(++pictures));
+  };
   for (std::uint64_t step = 0; step < steps; ++step) {
     progress.update("simulating", double(step) / double(steps));
     scene.admit();
-    photographer.after(step, false);
+    takePicture(step);
     scene.world().step();
     addStep(scene.world().figures(), scene.bodySize(), double(steps - step) <= rate, figures);
   }
-  photographer.after(steps, true);
+  takePicture(steps);
   figures.steps = steps;
   figures.simulated = scene.world().seconds();
   figures.bodies = scene.moving();

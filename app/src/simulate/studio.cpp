@@ -12,7 +12,6 @@
 
 #include "hpsdf/shapes.h"
 #include "pictures/picture_arguments.h"
-#include "session/backend.h"
 #include "simulate/coarse_mesh.h"
 #include "text/text.h"
 

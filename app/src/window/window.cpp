@@ -10,7 +10,6 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
-#include <memory>
 
 #include "console/error_text.h"
 #include "console/interrupt.h"
@@ -167,10 +166,7 @@ class Window {
       glfwWaitEventsTimeout(explorer_.isStale() ? kRestSeconds : kPollSeconds);
       const bool happened = takeEvents();
       if (ended()) break;
-      if (happened)
-        draw(true);
-      else if (explorer_.isStale())
-        draw(false);
+      if (happened || explorer_.isStale()) draw(happened);
     }
   }
 

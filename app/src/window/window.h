@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "language/registry.h"
 #include "session/backend.h"
 #include "session/session.h"
 
@@ -21,5 +22,8 @@ struct WindowOptions {
 /// Shows the window until the person closes it or presses Ctrl-C. Returns the number of recorded lines. Throws `Error`
 /// without a display, before the field is made, and in a program that was built without GLFW.
 std::size_t showWindow(Session& session, const WindowOptions& options);
+
+/// Adds the command `view`, which does so.
+void addWindowCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -1,5 +1,3 @@
-#include "window/window_command.h"
-
 #include <fmt/format.h>
 
 #include "construction/surface.h"

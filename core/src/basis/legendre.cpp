@@ -7,23 +7,6 @@
 
 namespace hpsdf::basis {
 
-LegendreRows legendreOnPart(double shift, double scale, int degree) {
-  LegendreRows row;
-  row[0][0] = 1;
-  for (int i = 0; i < degree; ++i) {
-    std::array<double, kMaxDegree + 2> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
-    std::fill_n(product.begin(), i + 2, 0.0);
-    for (int a = 0; a <= i; ++a) {
-      product[a] += shift * row[i][a];
-      product[a + 1] += scale * row[i][a] * (a + 1) / (2 * a + 1);
-      if (a > 0) product[a - 1] += scale * row[i][a] * a / (2 * a + 1);
-    }
-    for (int a = 0; a <= i + 1; ++a)
-      row[i + 1][a] = ((2 * i + 1) * product[a] - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
-  }
-  return row;
-}
-
 QuadratureRule gaussLegendre(int n) {
   QuadratureRule rule;
   rule.points.resize(n);

@@ -19,10 +19,6 @@ constexpr auto kLegendreRatio = [] {
 
 #include "basis/legendre-inl.h"
 
-/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
-using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
-LegendreRows legendreOnPart(double shift, double scale, int degree);
-
 /// Points and weights of a quadrature rule on [-1, 1].
 struct QuadratureRule {
   std::vector<double> points;

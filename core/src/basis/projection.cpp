@@ -137,7 +137,7 @@ int indexOf(int i, int j, int k, int degree) {
 /// Joins the projections of two halves of a box along an axis into the projection of the box.
 std::vector<double> joinedAlong(int axis, const std::vector<double>& below, const std::vector<double>& above,
                                 int degree) {
-  static const std::array<LegendreRows, 2> shares = halfShares();
+  static const std::array<detail::LegendreRows, 2> shares = halfShares();
   std::vector<double> whole(below.size(), 0.0);
   forEachCoefficient(degree, [&](int i, int j, int k, int index) {
     std::array<int, 3> at{i, j, k};
@@ -186,10 +186,10 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
   return result;
 }
 
-std::array<LegendreRows, 2> halfShares() {
+std::array<detail::LegendreRows, 2> halfShares() {
   // On the upper half L_i((t+1)/2) = Σ_a r_ia L_a(t), so that the share is r_ia ‖L_a‖² / ‖L_i‖² / 2.
-  const LegendreRows r = legendreOnPart(0.5, 0.5, kMaxDegree + 1);
-  std::array<LegendreRows, 2> shares;
+  const detail::LegendreRows r = detail::legendreOfPart(0.5, 0.5, kMaxDegree + 1);
+  std::array<detail::LegendreRows, 2> shares;
   for (int i = 0; i <= kMaxDegree + 1; ++i)
     for (int a = 0; a <= i; ++a) {
       shares[1][i][a] = r[i][a] * (2 * i + 1) / (2 * a + 1) / 2;

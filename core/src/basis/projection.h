@@ -12,6 +12,7 @@
 
 #include "basis/cubature.h"
 #include "basis/legendre.h"
+#include "hpsdf/detail/legendre_part.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf::basis {
@@ -81,7 +82,7 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
 
 /// The matrices that join the projections of an interval's lower [0] and upper [1] half into the projection of the
 /// whole interval: element (i, a) is the contribution of a half's coefficient a ≤ i to coefficient i of the whole.
-std::array<LegendreRows, 2> halfShares();
+std::array<detail::LegendreRows, 2> halfShares();
 
 /// The cell's projection from those of its eight children (number x + 2y + 4z), all of one degree. The result equals
 /// the projection of all the children's samples.

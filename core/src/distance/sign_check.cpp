@@ -3,11 +3,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
 #include "sign/solid_angle.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
 
 namespace hpsdf {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -9,9 +10,30 @@
 #include <vector>
 
 #include "field_algorithms.h"
-#include "sphere_pair.h"
 
 namespace hpsdf::physics {
+
+/// Bullet's algorithm for two spheres, with a contact that keeps its impulse. Bullet's own discards it in each step, so
+/// that the solver starts from zero and a pile of spheres never comes to rest.
+class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
+ public:
+  SpherePairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* first,
+                      const btCollisionObjectWrapper* second)
+      : btSphereSphereCollisionAlgorithm(nullptr, info, first, second) {}
+
+  void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
+                        const btDispatcherInfo& info, btManifoldResult* result) override {
+    manifolds_.resize(0);
+    getAllContactManifolds(manifolds_);
+    btPersistentManifold& manifold = *manifolds_[0];  // with at most one contact
+    const btScalar impulse = manifold.getNumContacts() > 0 ? manifold.getContactPoint(0).m_appliedImpulse : 0;
+    btSphereSphereCollisionAlgorithm::processCollision(first, second, info, result);
+    if (manifold.getNumContacts() > 0) manifold.getContactPoint(0).m_appliedImpulse = impulse;
+  }
+
+ private:
+  btManifoldArray manifolds_;  ///< temporary; a member so that its memory is reused
+};
 
 struct FieldDispatcher::Algorithms {
   /// A pair whose contacts are found before Bullet asks for them.

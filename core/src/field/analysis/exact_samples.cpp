@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "field/cells/cell_fit.h"
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
 
 namespace hpsdf {
 namespace {

@@ -5,10 +5,10 @@
 
 #include "field/query/blend.h"
 #include "field/query/evaluate.h"
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
 
 namespace hpsdf {
 namespace {

@@ -14,13 +14,12 @@
 #include "field/cells/cell_fit.h"
 #include "field/query/evaluate.h"
 #include "field/query/leaves.h"
+#include "hpsdf/detail/legendre_part.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
 namespace {
-
-using Rows = basis::LegendreRows;
 
 // A bound of accumulated rounding errors, relative to the size of the numbers involved.
 constexpr double kRounding = 1e-12;
@@ -41,27 +40,16 @@ std::size_t cubeIndex(int i, int j, int k, int degree) {
   return (std::size_t(i) * (degree + 1) + j) * (degree + 1) + k;
 }
 
-/// Transforms a polynomial's coefficients to a part's coordinates, one axis after another. They are a cube of
-/// (degree + 1)³ numbers, which are 0 above the total degree.
-std::vector<double> partCoefficients(std::vector<double> c, int degree, const std::array<const Rows*, 3>& rows) {
-  const int n = degree + 1;
-  const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
-  for (int axis = 0; axis < 3; ++axis)
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; j + k < n; ++k) {
-        double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
-        for (int a = 0; a + j + k < n; ++a) {  // upwards, since the sums need the former coefficients above a
-          double sum = 0;
-          for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * (*rows[axis])[i][a];
-          line[a * stride[axis]] = sum;
-        }
-      }
+/// Transforms a polynomial's coefficients to a part's coordinates, one axis after another.
+std::vector<double> partCoefficients(std::vector<double> c, int degree,
+                                     const std::array<const LegendreRows*, 3>& rows) {
+  for (int axis = 0; axis < 3; ++axis) restrictToPart(c, degree, axis, *rows[axis]);
   return c;
 }
 
 /// Transformations to the lower and the upper half of an axis.
 struct Halves {
-  Rows below = basis::legendreOnPart(-0.5, 0.5, kMaxDegree), above = basis::legendreOnPart(0.5, 0.5, kMaxDegree);
+  LegendreRows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
 /// Adds a product of Legendre polynomials, for which |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
@@ -86,7 +74,7 @@ void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
 
 /// The polynomial over one eighth of a leaf (number x + 2y + 4z).
 Part partOf(const std::vector<double>& cube, int degree, const Box& box, int number, const Halves& halves) {
-  std::array<const Rows*, 3> rows;
+  std::array<const LegendreRows*, 3> rows;
   Part part;
   for (int axis = 0; axis < 3; ++axis) {
     const bool upper = number >> axis & 1;
@@ -253,7 +241,7 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
                                 const query::OctreeNode& large) {
   const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
   const int levels = small.depth - large.depth;
-  std::array<Rows, 3> smallRows, largeRows;
+  std::array<LegendreRows, 3> smallRows, largeRows;
   Vector3 half;
   for (int axis = 0; axis < 3; ++axis) {  // lengths are in edges of the small cell
     const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
@@ -265,7 +253,7 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
     const double to = std::min(high + field.blend, static_cast<double>(wall - smallAt));
     half[axis] = (to - from) / 2;
     const auto rows = [&](double start, double edge) {
-      return basis::legendreOnPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
+      return legendreOfPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
     };
     smallRows[axis] = rows(0, 1);
     largeRows[axis] = rows(static_cast<double>(largeAt - smallAt), static_cast<double>(width));

@@ -28,7 +28,7 @@ constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 class QuarterRestriction {
  public:
   QuarterRestriction() {
-    const std::array<basis::LegendreRows, 2> shares = basis::halfShares();
+    const std::array<detail::LegendreRows, 2> shares = basis::halfShares();
     for (int half = 0; half < 2; ++half)
       for (int i = 0; i <= kMaxDegree; ++i)
         for (int a = 0; a <= i; ++a)

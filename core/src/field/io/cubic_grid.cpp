@@ -9,11 +9,13 @@
 #include <span>
 #include <vector>
 
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "util/random_points.h"
+#include "hpsdf/detail/random_points.h"
 #include "util/refuse.h"
+#include "util/sums.h"
 
 namespace hpsdf {
 namespace {

@@ -45,6 +45,8 @@ struct QueryCost {
   QueryCost& operator+=(const QueryCost& other);
 };
 
+class PairContacts;
+
 /// Runs queries one after another. It reuses its memory, so that a query allocates only if it has more contacts than
 /// all before.
 class ContactQuery {
@@ -58,6 +60,12 @@ class ContactQuery {
   const QueryCost& cost() const { return cost_; }
 
  private:
+  friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
+
+  void clear();
+  /// Appends the contacts of a valid pair, and adds their cost.
+  void append(const BodyPair& pair, const ContactOptions& options);
+
   std::vector<Contact> contacts_;
   QueryCost cost_;
 };
@@ -73,15 +81,9 @@ class PairContacts {
  private:
   friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
-  /// The results of pairs that one task handles.
-  struct Block {
-    std::vector<Contact> contacts;
-    QueryCost cost;
-  };
-
   std::size_t pairs_ = 0;
-  std::vector<Block> blocks_;
-  std::vector<std::size_t> ends_;  ///< index in contacts_ after each pair's last contact
+  std::vector<ContactQuery> blocks_;  ///< results of pairs that one task handles
+  std::vector<std::size_t> ends_;     ///< index in contacts_ after each pair's last contact
   std::vector<Contact> contacts_;
   QueryCost cost_;
 };

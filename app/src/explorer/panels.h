@@ -1,16 +1,15 @@
 #pragma once
-// The panels share these controls, which ask for commands, and functions that draw into the current column.
+// The parts of the explorer's panels, and the controls and drawing functions that they share.
 
 #include <fmt/format.h>
 #include <imgui.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "explorer/ui.h"
+#include "explorer/explorer.h"
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::app {
@@ -55,14 +54,31 @@ struct Controls {
     if (const auto chosen = ui.checkbox(path, label, value)) commands.push_back(fmt::format("{}{}", command, *chosen));
   }
 
-  /// A list of names, from which a person chooses one. Shows the first where `current` is none of them.
   void choice(const std::string& path, const char* label, const std::vector<std::string>& names,
               const std::string& current, const std::string& command) const {
-    const auto found = std::ranges::find(names, current);
-    const int index = found == names.end() ? 0 : static_cast<int>(found - names.begin());
-    if (const auto chosen = ui.combo(path, label, names, index))
-      commands.push_back(command + names[std::size_t(*chosen)]);
+    if (const auto chosen = ui.combo(path, label, names, current)) commands.push_back(command + *chosen);
+  }
+
+  /// A text field, whose text becomes one word of the command: "none" where it is empty and `orNone` is true.
+  void field(const std::string& path, const char* label, const std::string& value, const std::string& command,
+             bool orNone = false) const {
+    if (const auto text = ui.field(path, label, value))
+      commands.push_back(command + (orNone ? wordOrNone(*text) : scriptWord(*text)));
   }
 };
+
+/// Draws the controls of the camera or the plane, of the cells and of the colours.
+void drawViewPanel(const Controls& controls, Explorer& explorer);
+/// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
+void drawBuildPanel(const Controls& controls, Explorer& explorer);
+
+/// Draws the key to the colours of the present picture.
+void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture);
+/// Draws the shares of the domain's volume by degree and by depth.
+void drawHistograms(Ui& ui, Explorer& explorer);
+/// Draws figures of the whole field.
+void drawStatistics(Ui& ui, Explorer& explorer);
+/// Draws one page of the list of interfaces with the greatest jumps, and the buttons that turn the page.
+void drawWorst(const Controls& controls, Explorer& explorer);
 
 }  // namespace hpsdf::app

@@ -1,0 +1,49 @@
+#pragma once
+// Polynomials restricted to a part of their cell.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf::detail {
+
+/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
+using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
+
+inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
+  LegendreRows row;
+  row[0][0] = 1;
+  for (int i = 0; i < degree; ++i) {
+    std::array<double, kMaxDegree + 2> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
+    std::fill_n(product.begin(), i + 2, 0.0);
+    for (int a = 0; a <= i; ++a) {
+      product[a] += shift * row[i][a];
+      product[a + 1] += scale * row[i][a] * (a + 1) / (2 * a + 1);
+      if (a > 0) product[a - 1] += scale * row[i][a] * a / (2 * a + 1);
+    }
+    for (int a = 0; a <= i + 1; ++a)
+      row[i + 1][a] = ((2 * i + 1) * product[a] - (a < i ? i * row[i - 1][a] : 0)) / (i + 1);
+  }
+  return row;
+}
+
+/// Restricts a polynomial to a part of one axis, which the rows describe. Its coefficients are a cube of (degree + 1)³
+/// numbers, z fastest, which are 0 above the total degree.
+inline void restrictToPart(std::vector<double>& c, int degree, int axis, const LegendreRows& rows) {
+  const int n = degree + 1;
+  const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
+  for (int j = 0; j < n; ++j)
+    for (int k = 0; j + k < n; ++k) {
+      double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
+      for (int a = 0; a + j + k < n; ++a) {  // upwards, since the sums need the former coefficients above a
+        double sum = 0;
+        for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * rows[i][a];
+        line[a * stride[axis]] = sum;
+      }
+    }
+}
+
+}  // namespace hpsdf::detail
