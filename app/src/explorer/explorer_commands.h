@@ -18,7 +18,7 @@ void addUiCommand(Registry& registry);
 /// whole change back; a change that throws leaves the state alone.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
-/// The commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.
-std::vector<Command> explorerPictureCommands();
+/// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.
+void addExplorerPictureCommands(Registry& registry);
 
 }  // namespace hpsdf::app

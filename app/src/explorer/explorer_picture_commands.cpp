@@ -4,7 +4,6 @@
 
 #include "explorer/explorer.h"
 #include "explorer/explorer_commands.h"
-#include "language/append_parameters.h"
 #include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {

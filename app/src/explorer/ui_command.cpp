@@ -2,6 +2,7 @@
 
 #include "explorer/explorer.h"
 #include "explorer/explorer_commands.h"
+#include "hpsdf/detail/nearest_name.h"
 #include "text/text.h"
 
 namespace hpsdf::app {

@@ -76,19 +76,18 @@ std::string Film::line(const Json& about) {
 Json Film::publish(const std::string& renderer) {
   const Json about = {
       {"output", output_.string()}, {"width", width_}, {"height", height_}, {"renderer", renderer}, {"frames", rows_}};
-  if (folder_)
-    publishFolder(about);
-  else
-    copyFile(work_.path() / kMovie, output_);
-  return about;
-}
-
-void Film::publishFolder(const Json& about) {
+  const auto copy = [&](const std::string& name, const fs::path& to) {
+    writeTextFile(to, readWholeFile((work_.path() / name).string()));
+  };
+  if (!folder_) {
+    copy(kMovie, output_);
+    return about;
+  }
   folder_->keep();
   folder_->startAnew(kAbout, isFrameName);
-  for (std::size_t frame = 0; frame < frames(); ++frame)
-    copyFile(work_.path() / frameName(frame), output_ / frameName(frame));
+  for (std::size_t frame = 0; frame < frames(); ++frame) copy(frameName(frame), output_ / frameName(frame));
   writeTextFile(output_ / kAbout, jsonText(about));
+  return about;
 }
 
 }  // namespace hpsdf::app

@@ -13,7 +13,6 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/verify.h"
-#include "language/append_parameters.h"
 #include "language/script.h"
 #include "session/session.h"
 #include "study/study_command.h"

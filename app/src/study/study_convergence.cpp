@@ -18,7 +18,6 @@
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
-#include "language/append_parameters.h"
 #include "language/script.h"
 #include "session/field_summary.h"
 #include "session/session.h"

@@ -16,7 +16,6 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
-#include "language/append_parameters.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"

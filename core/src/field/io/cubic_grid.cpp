@@ -13,9 +13,7 @@
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
-#include "hpsdf/detail/random_points.h"
 #include "util/refuse.h"
-#include "util/sums.h"
 
 namespace hpsdf {
 namespace {
