@@ -3,7 +3,7 @@
 
 layout(binding = 0) uniform usamplerBuffer nodes;        // see FieldUpload
 layout(binding = 1) uniform samplerBuffer coefficients;  // see FieldUpload
-layout(binding = 5) uniform samplerBuffer coefficientQuads;  // four coefficients a texel
+layout(binding = 5) uniform samplerBuffer coefficientQuads;  // four coefficients per texel
 layout(location = 0) uniform uvec3 grid;
 
 const uint kNoCell = 0xffffffffu;
@@ -40,10 +40,11 @@ Node fetchNode(uint index) {
 struct BlendZone {
   bool inside;                                        // whether other leaves may have a weight at the point
   float valueDifference, gradientDifference, extent;  // see BlendZoneBounds
-  float width;                                        // of the blend zones along the faces, in edges of the leaf
+  float width;                                        // width of the blend zones along the faces, in edges of the leaf
 };
 
-// The field at a point, and the least and greatest value there of the polynomials of the leaves with a weight.
+// The value of the field at a point, and the least and the greatest value there of the polynomials of all leaves
+// that have a weight at the point.
 struct FieldRange {
   float value, lowest, highest;
 };

@@ -12,8 +12,9 @@ const int kDeepest = 20;  // greatest depth of a leaf
 // Returns true if a point of a leaf, in local coordinates, lies in a blend zone.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
-// The cells of depth `level` whose boxes come within `near` (up to 0.5) of their edges of a point: one or two along each
-// axis, from `first` to `first` + `more`. The point is given by the cell of depth `depth` that contains it.
+// The cells of depth `level` that are at most `near` (up to 0.5) of their edges away from a point: one or two
+// along each axis, from `first` to `first` + `more`. The point is given by the cell of depth `depth` that contains
+// it.
 void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float near, out ivec3 first,
                     out ivec3 more) {
   ivec3 cell;
@@ -34,13 +35,15 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
   more = clamp(cell + ivec3(greaterThan(inCell, vec3(1.0 - near))), ivec3(0), last) - first;
 }
 
-// For the side of the leaf nearer to a point, along each axis: the depth of the smallest leaf that touches it.
+// For each axis: the depth of the smallest leaf that touches this leaf's side that is nearer to a point; kWall at
+// a wall.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
   return ivec3(uvec3(extents) >> shift & kWall);
 }
 
-// The distance of a point from that side, positive inside, in parts of the leaf's blend extent across it.
+// For each axis: the distance of a point from the nearer side of the leaf, positive inside, in parts of the leaf's
+// blend extent across this side.
 vec3 rampPosition(uint extents, int depth, vec3 local) {
   ivec3 neighbour = smallestNeighbour(extents, local);
   vec3 t = (1.0 - abs(local)) * ldexp(vec3(0.5), neighbour - depth) / blend;
@@ -65,11 +68,12 @@ vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
 ivec3 candidateOffset(int n, ivec3 more) { return ivec3(n, n >> more.x, n >> (more.x + more.y)) & more; }
 int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.z; }
 
-// The weighted sum of the leaves' polynomials at a point. Each is summed by its difference to the first one, for the sake
-// of single precision. Vectors hold a gradient, in the local coordinates of the point's own leaf, and a value.
+// The weighted sum of the leaves' polynomials at a point. For the sake of single precision, the differences of the
+// polynomials from the first one are summed. Vectors hold a gradient, in the local coordinates of the point's own
+// leaf, and a value.
 struct LeafSum {
   vec4 first, sum, weights;
-  float lowest, highest;  // over the leaves whose weights extend to within `margin` of their extents of the point
+  float lowest, highest;  // over the leaves whose weights reach the point if widened by `margin` extents
 };
 
 // Adds the leaf of cell index other.xyz and depth other.w to the sum.
@@ -101,8 +105,9 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
 
-// Finds the node of the candidate cell `cell` at the first level: a node of that size, or a larger leaf, `up` levels
-// above it, which counts only for the first candidate inside. Returns whether the node counts.
+// Finds the node of the candidate cell `cell` at the first level: a node of the cell's size, or a larger leaf `up`
+// levels above. A larger leaf counts only for the first candidate that lies in it. Returns whether the node
+// counts.
 bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int up) {
   up = level;
   node = fetchNode(baseCellIndex(uvec3(cell >> level)));
@@ -124,10 +129,10 @@ bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell,
   return true;
 }
 
-// Sums the leaves with a weight at a point of a leaf. The search goes down level by level, with the nodes near the point
-// on each level as candidates; whole numbers and the fraction within the own leaf tell which nodes are near, so that
-// single precision is enough. Leaves are evaluated in one place in the code, and the leaves found are not kept in an
-// array: drivers would unroll loops over it, and compile the result for seconds.
+// Sums the leaves with a weight at a point of a leaf. The search goes down level by level; the candidates on each
+// level are the nodes near the point. Whole numbers and the fraction within the own leaf tell which nodes are
+// near, so that single precision is enough. Leaves are evaluated in one place in the code, and the leaves found
+// are not kept in an array: drivers would unroll loops over the array and take seconds to compile the result.
 LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margin, bool withGradient) {
   LeafSum total = LeafSum(vec4(0.0), vec4(0.0), vec4(0.0), 1e30, -1e30);
   vec3 fraction = 0.5 * local + 0.5;
@@ -165,7 +170,8 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
   return total;
 }
 
-// The value of the field, and the range of all leaves with a weight within `margin` of their extents of the point.
+// The value of the field at a point, and the range of the polynomials of all leaves whose weights reach the point
+// if they are widened by `margin` times their extents.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);

@@ -9,13 +9,14 @@ layout(location = 6) uniform dvec3 up;
 layout(location = 7) uniform dvec3 scale;  // grid coordinates per world unit
 layout(location = 8) uniform dvec2 pixelStep;
 layout(location = 9) uniform float offset;
-layout(location = 10) uniform float diagonal;  // of the domain, world units
+layout(location = 10) uniform float diagonal;  // diagonal of the domain, world units
 layout(location = 15) uniform dvec3 shownLo;   // corners of the visible part of the domain, grid coordinates
 layout(location = 16) uniform dvec3 shownHi;
 layout(location = 17) uniform bool parallel;  // whether rays are parallel
 
-// The state of a pixel. Integers: kind, t and side as bits of floats, last leaf. Floats: for a bracket its ends a and b and
-// a first guess of the root; for a pixel under way the last height and the longest step to try.
+// The state of a pixel. Its integers are kind, t and side as bits of floats, and the last leaf. Its floats are,
+// for a bracket, its ends a and b and a first guess of the root; for a pixel under way, the last height and the
+// longest step to try.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 

@@ -1,4 +1,4 @@
-// Second pass of a surface: from the bracket of the first crossing to the hit itself, with positions along the ray in
+// Second pass of a surface: finds the hit in the bracket of the first crossing, with positions along the ray in
 // double precision. A pixel whose march has not ended counts as a miss.
 
 layout(location = 11) uniform int mostRefinements;
@@ -7,10 +7,10 @@ layout(location = 11) uniform int mostRefinements;
 layout(location = 0) out uvec4 cellLevelsValueDistance;
 layout(location = 1) out vec4 normal;
 
-const float kTurned = 1e-4;     // in radians, approximately: change of the gradient over the last step that is tolerated
+const float kTurned = 1e-4;     // angle in radians, roughly, by which the gradient may change in the last step
 const float kInfinity = 1e30;
-const float kConverged = 1e-8;  // in domain diagonals: change of the root that ends its refinement; as in trace.cpp
-const float kCrack = 4e-6;      // in domain diagonals at slope 1: least jump that is a crack; as in trace.h
+const float kConverged = 1e-8;  // change of the root that ends its refinement, in domain diagonals; as in trace.cpp
+const float kCrack = 4e-6;      // least jump that is a crack, in domain diagonals at slope 1; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
   dvec3 inBase = ray.origin - dvec3(cell.base) + t * ray.direction;
@@ -66,7 +66,7 @@ void main() {
   float t = uintBitsToFloat(integers.y);
   float side = uintBitsToFloat(integers.z);
 
-  // Find the leaf in which the march ended, by the same point.
+  // Find the leaf in which the march ended, from the point that the march computed.
   Ray ray = pixelRay();
   CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);

@@ -11,7 +11,7 @@ layout(location = 12) uniform bool resume;       // continue the pixels under wa
 layout(location = 19) uniform int blendedSteps;  // the steps that one evaluation in a blend zone counts for
 layout(location = 14) uniform float startSide;   // see SurfaceBlocks::side
 
-layout(binding = 4) uniform samplerBuffer linearParts;  // of leaves: slopes in local x, y, z, value in the middle
+layout(binding = 4) uniform samplerBuffer linearParts;  // leaves: slopes in local x, y, z, and value in the middle
 
 flat in float start;  // see Block::start
 
@@ -19,15 +19,15 @@ layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
 // The same as in trace.cpp.
-const float kNudge = 1e-6;     // in domain diagonals: distance by which steps end behind a face; also the shortest step
-const float kPastFace = 4e-7;  // in parts of the grid: greatest distance behind a face at which rays enter the next node
-const float kGrain = 0.25;     // in parts of a blend zone's extent: step where no bound excludes a zero
+const float kNudge = 1e-6;     // distance by which steps end behind a face, in domain diagonals; also the shortest step
+const float kPastFace = 4e-7;  // greatest distance behind a face at which rays enter a node, in parts of the grid
+const float kGrain = 0.25;     // step where no bound excludes a zero, in parts of a blend zone's extent
 
 const float kInfinity = 1e30;
 
 struct MarchRay {
   vec3 origin, direction;
-  vec3 inverse;  // of the direction's magnitudes; infinite for an axis along which the ray does not move
+  vec3 inverse;  // 1 / |direction| for each axis; infinite for an axis along which the ray does not move
   float length;
   float nudge;  // kNudge in world units
 };
@@ -58,8 +58,8 @@ struct LeafPoint {
   float steepestOfAll;    // least slope of the polynomial of any leaf with a weight
 };
 
-// World length from the point to the exit of the ray from the node's box, or from the box whose faces are `margin` node
-// edges further inside. It ends slightly behind the face: see trace.cpp.
+// World length from the point to where the ray leaves the node's box, or a box whose faces are `margin` node edges
+// further inside. It ends slightly behind the face: see trace.cpp.
 float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(ray.direction, vec3(0.0))) - margin;
   vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * ray.inverse, vec3(kInfinity),
@@ -124,7 +124,7 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
     leaf.lowest = leaf.middle - leaf.at.node.valueDeviation - leaf.zone.valueDifference;
     leaf.highest = leaf.middle + leaf.at.node.valueDeviation + leaf.zone.valueDifference;
   }
-  // Give it the sign of the height.
+  // Turn the signs if the ray starts where f is below the offset, since heights are positive at the start.
   if (march.side == 0.0) march.side = leaf.lowest > 0.0 ? 1.0 : leaf.highest < 0.0 ? -1.0 : 0.0;
   if (march.side < 0.0) {
     float negated = -leaf.lowest;
@@ -139,8 +139,8 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
   return leaf;
 }
 
-// Moves t to the exit of a node without a crossing. Returns whether the bounds leave a crossing in the node possible; a
-// node on the other side of the surface is a hit on its face.
+// Moves t to the exit of a node in which the ray cannot cross the surface. Returns whether a crossing in the node
+// remains possible. A node that lies on the other side of the surface is a hit on its face.
 bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   bool above = (leaf.lowest > 0.0 && leaf.lowest + leaf.slope * leaf.toLeave > 0.0) ||
                (leaf.known && march.lastHeight - leaf.zone.valueDifference +
@@ -159,7 +159,8 @@ bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   return true;
 }
 
-// Takes the value at t as the first height in a leaf. Returns whether the blended field has to decide on the side.
+// Takes the value at t as the first height in a leaf. Returns whether the blended field must decide on which side
+// the ray starts.
 bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   bool undecided = leaf.zone.inside && march.side == 0.0 && abs(value) <= lower;
   if (march.side == 0.0 && !undecided) march.side = value >= 0.0 ? 1.0 : -1.0;
@@ -170,9 +171,9 @@ bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   return undecided;
 }
 
-// Moves t by a step to the height `ahead` where that is proven to cross nothing, brackets a crossing, or shortens the
-// step. The height sags below its chord by at most curve * length^2 / 8, and is monotone where it falls by more than
-// curve * length^2 / 2.
+// Handles a step to a point with the height `ahead`: moves t there if the ray provably crosses nothing before it,
+// brackets a crossing, or shortens the step. Over a step the height sags below its chord by at most curve *
+// length^2 / 8, and it is monotone if it falls by more than curve * length^2 / 2.
 void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float lower, float curve, bool certain,
              inout March march) {
   float clear = march.lastHeight - lower;
@@ -198,7 +199,7 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   float curve = leaf.at.node.secondDerivative * dot(leaf.localDirection, leaf.localDirection);
   float steepest = leaf.slope - leaf.slopeDeviation;
   float shallowest = leaf.slope + leaf.slopeDeviation;
-  float toExit = leaf.toLeave;  // from the part of the leaf in which the polynomial is the field
+  float toExit = leaf.toLeave;  // to the end of the part in which the polynomial is the field
   if (kBlended && !leaf.zone.inside) toExit = lengthToExit(leaf.at, ray, leaf.zone.width);
   bool falling = !leaf.zone.inside && shallowest < 0.0;  // throughout the leaf, so that there is one root at most
   if (march.side != 0.0 && falling && leaf.lowest > 0.0) {
@@ -266,7 +267,8 @@ void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
     march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
     if (!(march.t <= ray.length)) march.kind = kMiss;
   }
-  // No leaf with a weight within one extent of the point falls to zero over the next step.
+  // Choose the next step such that, over it, no polynomial of a leaf with a weight within one extent of the point
+  // falls to zero.
   float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
   float extent = leaf.zone.extent / length(leaf.localDirection);
   march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;

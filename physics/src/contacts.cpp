@@ -148,7 +148,7 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
   requireValid(options);
   for (std::size_t i = 0; i < pairs.size(); ++i) requireValid(pairs[i], i);
   const std::size_t blocks = (pairs.size() + kBlock - 1) / kBlock;
-  if (out.blocks_.size() < blocks) out.blocks_.resize(blocks);  // never shrinks, in order to keep the memory
+  if (out.blocks_.size() < blocks) out.blocks_.resize(blocks);  // never shrinks, so that its memory is reused
 
   // Query the blocks in parallel.
   out.pairs_ = pairs.size();

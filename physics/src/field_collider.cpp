@@ -12,8 +12,8 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // units of a bound in a cell's shortest edge: 16 bits suffice for 2048 cells
-constexpr double kTolerance = 0.05;  // error of the bounds of polynomials, as a share of that edge
+constexpr double kUnits = 32;        // units per shortest cell edge: 16 bits suffice for 2048 edges
+constexpr double kTolerance = 0.05;  // error of the polynomials' bounds, in shortest cell edges
 constexpr double kRounding = 1e-12;  // relative error of sums by rounding
 
 /// A polynomial in the local coordinates [−1, 1]³ of a box.
@@ -38,7 +38,8 @@ struct Piece {
   /// Restricts the polynomial to a part of one axis, which the rows describe.
   void restrict(int axis, const detail::LegendreRows& rows) { detail::restrictToPart(c, degree, axis, rows); }
 
-  /// Leaves out as many of the highest degrees as have a sum of at most `tolerance`.
+  /// Leaves out the terms of the highest degrees, as long as the magnitudes of all coefficients left out sum up to
+  /// at most `tolerance`.
   void trim(double tolerance) {
     int kept = degree;
     double sum = 0, leftOut = 0;
@@ -79,7 +80,8 @@ class LowerBounds {
   }
 
  private:
-  /// A leaf's polynomial over the box in which it has a weight. A blended field is a weighted mean of polynomials.
+  /// A leaf's polynomial over the box in which the leaf has a weight: a blended field is a weighted mean of such
+  /// polynomials.
   Piece pieceOf(const Cell& leaf) const {
     const FieldData& data = field_.data();
     const GridFrame& frame = field_.lookupGrid().frame;
@@ -129,7 +131,7 @@ class LowerBounds {
     bound(std::move(piece));
   }
 
-  /// Lowers the bounds of all cells that the piece overlaps to its linear part less `nonlinear`.
+  /// Lowers the bounds of all cells that the piece overlaps to the piece's linear part minus `nonlinear`.
   void fill(const Piece& piece, double nonlinear) {
     // Find the least value of each axis's linear term over each cell.
     std::array<std::int64_t, 3> first, count;
@@ -188,9 +190,9 @@ std::vector<double> leastAround(std::vector<double> values, const std::array<std
   return values;
 }
 
-/// The greatest ratio of the length of a path by steps to neighbouring cells and the distance of its ends. Among paths
-/// by steps along axis a, along a and b, and along all three, the length is a linear function of the end point; the
-/// ratio is the length of its gradient.
+/// The greatest ratio between the length of a path by steps to neighbouring cells and the distance of its ends.
+/// For paths by steps along axis a, along both a and b, and along all three axes, the length is a linear function
+/// of the end point, and the ratio is at most the length of its gradient.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -202,9 +204,9 @@ double worstDetour(const Vector3& cell) {
   return worst;
 }
 
-/// Chamfer distance transform (Borgefors 1986): replaces each value by the least sum of a cell's value and the length
-/// of the shortest path to that cell. Steps are shortened so that no path is longer than the distance of its ends. One
-/// pass forwards and one backwards find the shortest paths.
+/// Chamfer distance transform (Borgefors 1986): replaces each value by the least sum of the value of a cell and
+/// the length of the shortest path to this cell. Steps are shortened so that no path is longer than the distance
+/// of its ends. One pass forwards and one backwards find the shortest paths.
 void distanceTransform(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
   struct Step {
     CellIndex by;
@@ -269,8 +271,8 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
   wall_ = leastAtSides(within, size_);
   for (double& bound : within) bound = std::max(bound, 0.0);
 
-  // The distance between two cells is at least that between the centres of one and of the nearest neighbour of the
-  // other: take the least of each neighbourhood before the distances between centres.
+  // The distance between points of two cells is at least that between the centre of one cell and the nearest centre
+  // in the 3 × 3 × 3 neighbourhood of the other. Therefore first take the least value of each neighbourhood.
   std::vector<double> around = leastAround(within, size_);
   distanceTransform(around, size_, cell);
   if (wall_ > 0) wall_ = leastAtSides(around, size_);
@@ -302,9 +304,10 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// The bound around q holds around x: |q − q_y| ≤ |x − y| for every y and its closest point q_y. The second bound,
-// `wall_` + |x − q|, holds outside, because y is at most |x − y| nearer to the domain than x; it holds inside, because
-// a path to y crosses a side, around which `wall_` is a bound unless it is negative, and then the bound is not used.
+// `around` at q also holds at x, because |q − q_y| ≤ |x − y| for every y and its closest point q_y in the domain.
+// The second bound is `wall_` + |x − q|. For y outside it holds, because y is at most |x − y| nearer to the domain
+// than x. For y inside it holds, because the path from x to y crosses a side, around which a `wall_` of 0 or more
+// is a bound; with a negative `wall_` the second bound is less than |x − q| and concerns no y inside.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

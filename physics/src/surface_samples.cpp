@@ -141,7 +141,7 @@ class Neighbours {
 /// (Yuksel 2015, with the weights that are proposed there).
 std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surface& surface, std::size_t count) {
   const double radius =
-      std::sqrt(surface.area() / (2 * std::numbers::sqrt3 * double(count)));  // of the densest packing of disks
+      std::sqrt(surface.area() / (2 * std::numbers::sqrt3 * double(count)));  // radius of disks in the densest packing
   const double least = 0.65 * radius * (1 - std::pow(double(count) / double(candidates.size()), 1.5));
   const Neighbours neighbours(candidates, 2 * radius);
   const auto weightBetween = [&](std::size_t a, std::size_t b, double distance) {

@@ -43,7 +43,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kOwnFolder = ".batch";  // subfolder of the output for locks and records of finished fields
-constexpr auto kPollInterval = std::chrono::milliseconds(100);  // while other processes build the last meshes
+constexpr auto kPollInterval = std::chrono::milliseconds(100);  // between checks while other processes build meshes
 
 /// The result of a mesh. All but `failed` mean that its field exists.
 enum class Status : std::uint8_t {
@@ -58,8 +58,8 @@ std::string statusName(Status status) {
   return kNames[std::size_t(status)];
 }
 
-/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so that its
-/// mesh is hashed. The result is "" where the file cannot be read.
+/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so for
+/// glTF the mesh that was read is hashed instead. The result is "" where the file cannot be read.
 std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
@@ -88,7 +88,8 @@ std::string checksumOf(const fs::path& field) {
   return file ? text : std::string();
 }
 
-/// Lists the options that the caller wrote. An option that repeats its default still matters beside --paper.
+/// Lists the options that the caller wrote. An option counts even if it repeats its default, because it then
+/// overrides --paper.
 Json givenNames(const Arguments& arguments) {
   Json names = Json::array();
   for (const Parameter& parameter : buildParameters())
@@ -115,8 +116,9 @@ Error cannotWrite(const fs::path& file) {
 /// locks on it.
 class FileLocks {
  public:
-  /// Creates the file where it does not exist. Throws `Error` where it cannot be written. A process must have one
-  /// object a file: record locks belong to the process, and closing the file anywhere in it releases all of them.
+  /// Creates the file where it does not exist. Throws `Error` where it cannot be written. A process must create only
+  /// one object for each file: record locks belong to the whole process, which loses all of them when it closes the
+  /// file once.
   explicit FileLocks(fs::path file)
       : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
     if (descriptor_ < 0) throw cannotWrite(file_);
@@ -143,7 +145,7 @@ class FileLocks {
     struct flock range = {};
     range.l_type = type;
     range.l_whence = SEEK_SET;
-    range.l_start = static_cast<off_t>(number >> 2);  // file servers differ in their largest offsets
+    range.l_start = static_cast<off_t>(number >> 2);  // smaller offsets, which all file servers support
     range.l_len = 1;
     for (;;) {
       if (fcntl(descriptor_, F_SETLK, &range) == 0) return true;
@@ -155,9 +157,9 @@ class FileLocks {
   int descriptor_;
 };
 
-/// An empty file that exists while a process builds a field. It remains where the process dies.
+/// An empty file that exists while a process builds a field. If the process dies, the file remains.
 struct BuildMark {
-  /// Throws `Error` where the file cannot be written, because the death of the process would leave no trace then.
+  /// Throws `Error` where the file cannot be written: without it, a process that dies would leave no trace.
   explicit BuildMark(fs::path path) : file(std::move(path)) {
     if (!std::ofstream(file)) throw cannotWrite(file);
   }
@@ -248,7 +250,7 @@ class Batch {
       std::optional<CurrentField> field = finished(mesh);
       Made made = field ? Made{again ? Status::elsewhere : Status::skipped, std::move(field)} : built(mesh);
       std::error_code ignored;
-      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // one of other options would stop a later construction
+      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // with other options it would stop a later construction
       return made;
     } catch (const Cancelled&) {
       throw;
@@ -258,7 +260,7 @@ class Batch {
     }
   }
 
-  /// Returns the existing field where its record shows that a construction would give the same.
+  /// Returns the existing field if its record shows that a new construction would give the same field.
   std::optional<CurrentField> finished(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh), record = recordOf(mesh);
     if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
@@ -293,8 +295,9 @@ class Batch {
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // Where locks were lost, another process may have removed our unfinished files as those of a dead one. It may
-      // have finished the mesh; if not, it removes nothing more, and a second attempt succeeds.
+      // If the locks were lost, another process may have taken this one for dead and removed its unfinished files. That
+      // process may have finished the mesh. If it has not, it removes nothing more, and a second attempt to write
+      // succeeds.
       if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }
@@ -307,8 +310,8 @@ class Batch {
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
   }
 
-  /// Returns the record of the field that is in the folder, as the present options would produce it. The record is kept
-  /// beside the field and compared as a whole; the field's checksum ties both together.
+  /// Returns the record that the present options would produce for the field in the folder. The record is kept
+  /// beside the field and compared as a whole; it contains the field's checksum, which ties it to the field.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
     return jsonText({{"program", versionText()},
                      {"mesh", mesh.surface},

@@ -14,7 +14,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255, and further text follows the name
+constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255 for the name and the text after it
 
 /// Returns "torus_major_0.7" for builtin:torus,major=0.7 and "bunny" for scans/bunny.obj.
 std::string readableName(std::string surface) {

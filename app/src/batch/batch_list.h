@@ -14,9 +14,10 @@ struct BatchMesh {
   std::string name;          ///< base name of its files: a readable part and the number
 };
 
-/// Parses a list that names one mesh a line. Blanks around a name, empty lines, lines that begin with # and repetitions
-/// are ignored. File names depend on the line alone, so that they stay when the list grows, and differ where lines do.
-/// Throws `Error` for a line with a zero byte, as `find -print0` and UTF-16 produce them: its names would be lost.
+/// Parses a list that names one mesh per line. Blanks around a name, empty lines, lines that begin with # and
+/// repetitions are ignored. The file names of a mesh depend on its line alone, so that they stay the same when the
+/// list grows, and they differ between different lines. Throws `Error` for a line with a zero byte, as in the
+/// output of `find -print0` and in UTF-16, because the names in it would be lost.
 std::vector<BatchMesh> parseBatchList(std::string_view text);
 
 }  // namespace hpsdf::app

@@ -11,7 +11,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Two whole numbers. The check is needed because nlohmann's JSON converts any number.
+/// Reads two whole numbers. They are checked because nlohmann's JSON would silently convert other numbers.
 std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
   if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))

@@ -1,5 +1,5 @@
 #pragma once
-// The facts about a baseline, which a small JSON file with the baseline's name holds. docs/check.md is the manual.
+// The facts about a baseline. They are stored in a small JSON file beside it. docs/check.md is the manual.
 
 #include <array>
 #include <filesystem>

@@ -34,7 +34,7 @@ struct WorstDifference {
   std::string difference;
 };
 
-/// A picture, or raw values, and its baseline; or a script that failed, or that wrote nothing.
+/// A picture or a file of raw values, with its baseline; or a script that failed or wrote nothing.
 struct CheckedItem {
   std::string script = {};
   std::string picture = {};  ///< file name; "" for a script
@@ -53,9 +53,9 @@ struct CheckedItem {
   std::filesystem::path difference = {};  ///< picture of the differences; "" without one
   std::vector<WorstDifference> worst = {};
 
-  /// "gallery/degree.png", or a script's name.
+  /// The name of the item: "gallery/degree.png", or the script's name.
   std::string name() const { return picture.empty() ? script : script + "/" + picture; }
-  /// "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)".
+  /// The picture's name: "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)".
   std::string pictureText() const;
   /// The script followed by `pictureText`, or the script's name.
   std::string title() const { return picture.empty() ? script : script + "/" + pictureText(); }

@@ -21,10 +21,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// By which a check and the `accept` after it know the same folder.
+/// Identifies a folder, so that `accept` finds the results of the last check of the same folder.
 std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folder).string(); }
 
-// check
+// The command `check`
 
 Json itemJson(const CheckedItem& item) {
   return {{"script", item.script},
@@ -100,7 +100,7 @@ void runCheck(Session& session, const Arguments& arguments) {
   throw Failed(summary);
 }
 
-// accept
+// The command `accept`
 
 Json lastResults(const fs::path& folder, const fs::path& from) {
   const std::string file = (from / kCheckResults).string();
@@ -171,7 +171,7 @@ void runAccept(Session& session, const Arguments& arguments) {
   const fs::path folder = arguments.text("folder");
   const fs::path from = arguments.text("from");
   const Json results = lastResults(folder, from);
-  std::vector<Json> taken;  // all names are known before the first is written
+  std::vector<Json> taken;  // all names are checked before the first file is written
   for (const std::string& name : arguments.texts("names")) taken.push_back(resultNamed(name, results, from));
   Json accepted = Json::array();
   for (const Json& item : taken) accepted.push_back(acceptOne(item, folder, from, arguments));

@@ -31,7 +31,7 @@ i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; bo
           vertical-align: -.15em; }
 )";
 
-/// The script that gives each slider the pictures above it, so that the page embeds every picture only once.
+/// A script that makes each slider show the pictures above it, so that the page embeds every picture only once.
 constexpr std::string_view kScript = R"(<script>
 for (const slider of document.querySelectorAll('.slider')) {
   const [under, over] = slider.querySelectorAll('img');

@@ -38,7 +38,8 @@ std::optional<Vector3> parsePoint(std::string_view text) {
   return next == end ? std::optional(point) : std::nullopt;
 }
 
-/// True for a line of column names: it begins with a letter or a quote, and is not a point such as "nan nan nan".
+/// True for a line of column names, which begins with a letter or a quote and is not a point such as "nan nan
+/// nan".
 bool isHeader(std::string_view text) {
   return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
 }
@@ -55,7 +56,7 @@ class Query {
       std::string_view text = line;
       if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
       take(trimmed(text), number);
-      if (in.rdbuf()->in_avail() <= 0) flush();  // another program may wait for this answer
+      if (in.rdbuf()->in_avail() <= 0) flush();  // sends earlier answers: another program may wait for them
     }
     if (in.bad()) throw Error(name_ + ": cannot be read");
     flush();

@@ -1,6 +1,6 @@
 #pragma once
-// Answers points with distances and gradients, all as text. It works in batches, so that millions of points need little
-// memory.
+// Evaluates a field at points that are given as text, and writes distances and gradients as text. It works in
+// batches, so that millions of points need little memory.
 
 #include <cstdint>
 #include <functional>

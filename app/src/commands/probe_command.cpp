@@ -51,7 +51,7 @@ std::vector<double> exactValues(Session& session, const Arguments& arguments, co
   return values;
 }
 
-/// Writes one row a sample. Columns of unknown values are empty.
+/// Writes one row for each sample. Columns of unknown values are empty.
 void writeTable(const Line& line, std::span<const double> exact, const std::string& file) {
   OutputFile out(file);
   out.write("t,s,x,y,z,cell,degree,depth,value,exact,error,gx,gy,gz,slope_along\n");

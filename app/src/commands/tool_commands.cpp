@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// Counts a running script, and sets --json for the commands that it runs.
+/// Counts one more running script during its lifetime, and sets --json for the commands that the script runs.
 class ScriptScope {
  public:
   ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {

@@ -29,7 +29,7 @@ struct Console {
   WorkListener* listener = nullptr;
   /// Program that reads mesh files in a process of its own (mesh_process.h); empty: this process reads them.
   std::filesystem::path meshReader = {};
-  std::string work = {};  ///< prefix of progress messages that names the current one of many pieces of work
+  std::string work = {};  ///< prefix of progress messages: names the current piece of work among several
 };
 
 /// Writes one line to `err`. Control characters, which names from other people's files may contain, become blanks.

@@ -10,8 +10,8 @@ namespace hpsdf::app {
 constexpr int kExitFailed = 1;        ///< an expectation or a comparison failed
 constexpr int kExitPartlyFailed = 3;  ///< some meshes of a batch failed
 
-/// Thrown where the input was correct but the result is negative: a comparison failed, or some meshes of a batch did.
-/// The exit status is `status` rather than 2, that of bad input.
+/// Thrown where the input was correct but the result is negative: a comparison failed, or some meshes of a batch
+/// did. The program then exits with `status`, and not with 2 as for bad input.
 class Failed : public Error {
  public:
   explicit Failed(const std::string& message, int status = kExitFailed) : Error(message), status_(status) {}

@@ -10,9 +10,9 @@ namespace hpsdf::app {
 /// Erases the line of progress on a terminal, before a message is written.
 constexpr std::string_view kEraseLine = "\r\x1b[K";
 
-/// Shows the progress of an operation that is not over at once. A terminal shows one line, which is redrawn and erased
-/// at the end; a log gets one line at first, one at each further quarter of the work and one after ten seconds without
-/// any.
+/// Shows the progress of an operation that is not over at once. A terminal shows one line, which is redrawn and
+/// finally erased. A log gets one line at first, one after each quarter of the work, and one whenever ten seconds
+/// have passed without a line.
 class ProgressLine {
  public:
   using Clock = std::chrono::steady_clock;

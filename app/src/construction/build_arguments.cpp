@@ -11,7 +11,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::uint64_t kDefaultMemory = 100'000'000;  // of the construction, where nothing limits its size
+constexpr std::uint64_t kDefaultMemory = 100'000'000;  // bytes; the limit of a construction without size limit
 
 ParameterKind kindOf(const BuildSetting& setting) {
   using enum BuildSetting::Type;
@@ -94,7 +94,7 @@ Parameter threadsParameter(const std::string& result) {
 }
 
 Parameter pointsParameter(std::string help, std::string count, double minimum) {
-  constexpr double kMost = 1e8;  // about 100 bytes each
+  constexpr double kMost = 1e8;  // one point takes about 100 bytes
   return {"points", wholeNumber().within(minimum, kMost).byDefault(std::move(count)), std::move(help)};
 }
 
@@ -181,7 +181,7 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
       throw Error(fmt::format("domain {}: expected lower corner x0,y0,z0 below upper corner x1,y1,z1", shape));
     return domain;
   }
-  // This is exactly the paper's cube: it does not follow the rounding of the mesh's normalization.
+  // This is exactly the paper's cube. A cube around the normalized mesh would contain the mesh's rounding errors.
   if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
   return domainAround(surface, DomainShape::cube, margin);
 }

@@ -53,7 +53,7 @@ std::filesystem::path checkpointOf(const std::filesystem::path& output) { return
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&]() -> BuildInput {
-    // Find mistakes of the arguments before long work.
+    // Find mistakes in the arguments before the long work starts.
     BuildOptions options = buildOptions(arguments);
     const DistanceOptions insideOptions = distanceOptions(arguments);
     refuseInsideTestOfAnalytic(surface, arguments);
@@ -64,7 +64,8 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     checkBuild(domain, options);
     warnOfCutSurface(console, box, domain);
 
-    // Make its exact distance. A limit of memory that nobody gave holds for the octree alone.
+    // Make the surface's exact distance. The default memory limit holds for the octree alone, so the memory of the
+    // distance is added to it.
     const auto start = std::chrono::steady_clock::now();
     auto exact = distanceTo(console, surface, prepared, insideOptions);
     if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();

@@ -13,7 +13,7 @@
 
 namespace hpsdf::app {
 
-/// A distance with all that a construction needs.
+/// A distance function with everything else that a construction needs.
 struct BuildInput {
   std::shared_ptr<const DistanceFunction> exact;
   std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
@@ -27,21 +27,21 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
 
 struct BuiltField {
   Field field;
-  std::shared_ptr<const DistanceFunction> exact;  ///< the distance that it was made from
+  std::shared_ptr<const DistanceFunction> exact;  ///< the distance from which the field was made
   std::optional<MeshReport> mesh;                 ///< nothing for an analytic shape
-  double seconds = 0;                             ///< of the construction, with its distance
+  double seconds = 0;                             ///< time of construction and distance
 };
 
-/// Makes the input and constructs the field, with progress and warnings on the console's `err`. With a file for the
-/// state (`checkpointParameters` among the arguments) it continues from what is there. Throws `Error` naming `surface`,
-/// `Cancelled` after Ctrl-C.
+/// Makes the input and constructs the field, with progress and warnings on the console's `err`. If the file
+/// `checkpoint` is given, the construction continues from the state in it, and `checkpointParameters` must be
+/// among the arguments. Throws `Error` naming `surface`, and `Cancelled` after Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 
-/// The file in which the construction of the file `output` keeps its state.
+/// The file in which the construction of the field file `output` keeps its state.
 std::filesystem::path checkpointOf(const std::filesystem::path& output);
 
-/// Warns that bounds do not hold beside a mesh's holes, if it has some.
+/// Warns that bounds do not hold near the mesh's holes, if the mesh has holes.
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh);
 
 }  // namespace hpsdf::app

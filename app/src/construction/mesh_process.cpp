@@ -41,9 +41,9 @@ constexpr const char* kCommand = "__read-mesh";  // hidden command; FILE SECONDS
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
 constexpr auto kTick = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
-constexpr double kSilentSeconds = 2;                   // a busy machine starts a process slowly
+constexpr double kSilentSeconds = 2;                   // no progress is shown earlier: processes may start slowly
 
-// An idle machine reads 20 MB a second and takes 4 to 9 bytes of memory for one of the file (docs/meshes.md).
+// An idle machine reads 20 MB/s and needs 4 to 9 bytes of memory for each byte of the file (docs/meshes.md).
 constexpr double kSeconds = 60;
 constexpr double kBytesASecond = 2e6;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
@@ -179,12 +179,13 @@ void toStandardOutput(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = write(STDOUT_FILENO, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) _exit(1);  // the other process has ended
+    if (count <= 0) _exit(1);  // the receiving process has ended
     bytes = bytes.subspan(std::size_t(count));
   }
 }
 
-/// Ends the process at once: assimp would catch bad_alloc and report damage, or continue without the memory.
+/// Ends the process at once. If bad_alloc were thrown instead, assimp would catch it and report damage, or
+/// continue.
 void onMemoryOut() {
   writeOutOfMemory(toStandardOutput);
   _exit(0);
@@ -201,10 +202,10 @@ void limit(decltype(RLIMIT_CORE) resource, double most) {
 void confine(double seconds, [[maybe_unused]] double bytes) {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  prctl(PR_SET_DUMPABLE, 0);  // the limit of core files does not hold for cores that are piped to a program
+  prctl(PR_SET_DUMPABLE, 0);  // the limit below does not apply to cores that are piped to a program
 #endif
   limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_CPU, std::ceil(seconds) + 1);  // ends the process if its parent died
+  limit(RLIMIT_CPU, std::ceil(seconds) + 1);  // ends the process even if its parent has died
 #ifndef HPSDF_SANITIZED                       // a sanitizer reserves terabytes of address space
   limit(RLIMIT_DATA, bytes);
 #endif
@@ -225,7 +226,7 @@ ReadingLimits readingLimits(const fs::path& file) {
 }
 
 fs::path ownProgram() {
-  constexpr const char* kLink = "/proc/self/exe";  // it is valid even when the file has been replaced
+  constexpr const char* kLink = "/proc/self/exe";  // remains valid if the program's file is replaced
   return access(kLink, X_OK) == 0 ? fs::path(kLink) : fs::path();
 }
 

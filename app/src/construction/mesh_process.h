@@ -1,6 +1,6 @@
 #pragma once
-// Mesh files are read in a separate process, which is this program with another command: a file that crashes assimp, or
-// keeps it busy for too long, becomes an error of one line.
+// Mesh files are read in a separate process, which runs this program with another command. A file that crashes
+// assimp, or keeps it busy for too long, then causes only an error message of one line.
 
 #include <cstdint>
 #include <filesystem>
@@ -15,11 +15,12 @@ namespace hpsdf::app {
 /// Time and memory that reading a file may take.
 struct ReadingLimits {
   double seconds = 0;       ///< wall-clock time
-  std::uint64_t bytes = 0;  ///< of memory
+  std::uint64_t bytes = 0;  ///< bytes of memory
 };
 
-/// The limits for a file: by its size (docs/meshes.md), unless the environment variables HPSDF_IMPORT_SECONDS and
-/// HPSDF_IMPORT_BYTES set others. Throws `Error` where these are no numbers above 0.
+/// The limits for a file. They follow from its size (docs/meshes.md), unless the environment variables
+/// HPSDF_IMPORT_SECONDS and HPSDF_IMPORT_BYTES set others. Throws `Error` where a variable is not a number above
+/// 0.
 ReadingLimits readingLimits(const std::filesystem::path& file);
 
 /// The file of the running program; empty where the system does not tell it.

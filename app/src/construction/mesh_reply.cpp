@@ -33,7 +33,7 @@ constexpr std::size_t MeshReport::*kCounts[] = {&MeshReport::components,        
 /// one program on one machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
-  std::uint64_t checksum = 0;  ///< of all bytes after it
+  std::uint64_t checksum = 0;  ///< checksum of all bytes after it
   std::uint64_t kind = 0;
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
@@ -55,7 +55,7 @@ std::uint64_t checksumOf(std::uint64_t before, std::span<const std::byte> bytes)
   return XXH3_64bits_withSeed(bytes.data(), bytes.size(), before);
 }
 
-/// Sums up piece by piece, so that the pieces need not be copied into one array.
+/// Computes the checksum piece by piece, so that the pieces need not be copied into one array.
 std::uint64_t checksumOf(const Header& header, std::span<const std::byte> vertices,
                          std::span<const std::byte> triangles, std::span<const std::byte> text) {
   std::uint64_t sum = checksumOf(0, std::as_bytes(std::span(&header, 1)).subspan(kUnsummedBytes));

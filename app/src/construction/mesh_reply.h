@@ -1,6 +1,6 @@
 #pragma once
-// The reply of the process that reads a mesh file, as bytes; docs/meshes.md explains why it is a separate process. Its
-// reader trusts none of them, since the file may have corrupted that process.
+// The reply of the process that reads a mesh file, as bytes; docs/meshes.md explains why it is a separate process.
+// The reader of a reply trusts none of its bytes, since the file may have corrupted the process that wrote them.
 
 #include <cstddef>
 #include <cstdint>
@@ -30,8 +30,8 @@ class DamagedReply : public Error {
 /// Length of the header with which every reply begins.
 extern const std::size_t kReplyHeaderBytes;
 
-/// Length of the whole reply, by its first `kReplyHeaderBytes` bytes or more. Throws `DamagedReply` when there are
-/// fewer, or when they are no header.
+/// The length of the whole reply, read from at least the first `kReplyHeaderBytes` bytes of it. Throws
+/// `DamagedReply` for fewer bytes, and for bytes that are not a header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
 /// Parses a whole reply. It allocates memory only for elements that are there, and checks a mesh's indices,

@@ -35,10 +35,10 @@ Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
 
 /// ∇Φ of a mesh; zero where it is unknown.
 Vector3 exactNormal(const ExactDistance& exact, const Vector3& x, double signedDistance) {
-  const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // nearer, rounding decides the direction
+  const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // rounding dominates shorter offsets
   const Vector3 offset = x - exact.closestPoint(x).point;
   const double distance = offset.norm(), thickness = exact.source().thickness;
-  // A surface that closes a hole is nearer than the faces, and its normal is unknown.
+  // Beside a hole the nearest surface is the one that closes the hole, whose normal is unknown.
   const bool isBesideHole = std::abs(std::abs(signedDistance + thickness / 2) - distance) > least;
   if (distance < least || isBesideHole) return Vector3::Zero();
   return offset / (thickness == 0 && signedDistance < 0 ? -distance : distance);

@@ -12,8 +12,8 @@
 
 namespace hpsdf::app {
 
-/// A surface to measure a field against, in the units of the field. Its mesh is, for an analytic shape, that of the
-/// built-in one, from which it hardly differs.
+/// A surface against which a field is measured, in the units of the field. The mesh of an analytic shape is that
+/// of the built-in shape of the same name, which hardly differs from it.
 struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
   std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< see `VerifiedSurface`
@@ -25,13 +25,13 @@ struct ReferenceSurface {
 /// A mesh file or a shape in the units of a field that was made from `source`. Throws `Error` naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
 
-/// The exact distance of a mesh file or a shape in the units of a field that was made from `source`. Warns when the
-/// surface is another one. Throws `Error` naming `surface`.
+/// The exact distance of a mesh file or a shape in the units of a field that was made from `source`. Warns if the
+/// field was made from another surface. Throws `Error` naming `surface`.
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source);
 
-/// The defects of a mesh file or a built-in shape in the units of a field that was made from `source`. Warns when the
-/// surface is another one. Throws `Error` naming `surface`.
+/// The defects of a mesh file or a built-in shape in the units of a field that was made from `source`. Warns if
+/// the field was made from another surface. Throws `Error` naming `surface`.
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
 
 }  // namespace hpsdf::app

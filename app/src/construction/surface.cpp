@@ -17,8 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Bytes a face while a mesh's exact distance is made; for its outer hull, besides the intersected pieces, of which
-/// there are 250,000 at most.
+/// Bytes of memory per face while a mesh's exact distance is made. The outer hull needs kBytesPerHullFace, and
+/// additional memory for the pieces of intersected faces, of which there are at most 250,000.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
@@ -32,11 +32,11 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
     distance(original, out);
     for (double& value : out) value *= to.scale;
   };
-  return DistanceFunction(std::move(evaluate), source);  // moved, since it would keep a reference to an lvalue
+  return DistanceFunction(std::move(evaluate), source);  // without the move it would refer to a local variable
 }
 
 void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
-  constexpr double kNegligible = 1e-6;  // of the mesh's size: neither scans nor fields are more exact
+  constexpr double kNegligible = 1e-6;  // share of the mesh's size; scans and fields are less exact
   const Box box = boundingBox(mesh);
   const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
   if (!(spacing > kNegligible * size)) return;
@@ -60,8 +60,9 @@ struct SharedDistance {
   std::size_t bytes() const { return exact->bytes(); }
 };
 
-/// Tells the inside test that was chosen unless the mesh is closed and simple, for which everybody expects it. The
-/// choice is in the units of the normalized mesh, the report in those of the file.
+/// Reports the inside test that was chosen, unless the mesh is closed and simple, so that the choice is as
+/// expected. The position in `choice` is in the units of the normalized mesh, that in `report` in the units of the
+/// file.
 void tellInsideTest(const Console& console, const std::string& surface, const MeshReport& report,
                     InsideTestChoice choice, const Normalization& normalization) {
   if (choice.position) choice.position = *choice.position / normalization.scale + normalization.center;

@@ -13,23 +13,23 @@
 
 namespace hpsdf::app {
 
-/// Begins the names of shapes: as meshes, and in closed form.
+/// The beginnings of the names of shapes: kBuiltin for shapes as meshes, kAnalytic for shapes in closed form.
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
 
-/// Tells a shape's name, builtin:… or analytic:…, from a file's.
+/// Returns true for the name of a shape, builtin:… or analytic:…, and false for the name of a file.
 bool isShape(std::string_view surface);
 
-/// Reads a mesh file or makes a built-in shape; all commands come to meshes by this function. Files are read by the
-/// console's `meshReader`. Warns where the reader's floats lose digits of the coordinates. Throws `Error`, also for an
-/// analytic shape, and `Cancelled` after Ctrl-C.
+/// Reads a mesh file or makes a built-in shape; all commands obtain their meshes by this function. Files are read
+/// by the console's `meshReader`. Warns where coordinates lose digits because the reader keeps them as float.
+/// Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// A surface in the units of the field: a mesh, or a distance in closed form.
 struct PreparedSurface {
-  std::optional<DistanceFunction> analytic;  ///< of an analytic shape; else there is a mesh
+  std::optional<DistanceFunction> analytic;  ///< only for an analytic shape; others have a mesh
   TriangleMesh mesh;
-  std::optional<MeshReport> report;  ///< on the mesh before normalization
+  std::optional<MeshReport> report;  ///< of the mesh before normalization
   Normalization normalization;
 
   Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
@@ -38,18 +38,18 @@ struct PreparedSurface {
 /// Loads a surface and, if asked, normalizes it. Throws `Error`, and `Cancelled` after Ctrl-C.
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes);
 
-/// Throws `Error` where the exact distance of such a mesh does not fit in memory.
+/// Throws `Error` where the exact distance of the mesh does not fit in memory.
 void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);
 
 /// The exact distance of a mesh. Throws `Error`, also where it does not fit in memory, and `Cancelled` after Ctrl-C.
 std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
                                                 const DistanceOptions& options = {});
 
-/// The exact distance as the distance of a mesh that was normalized.
+/// A distance function that evaluates `exact`, with the normalization of the mesh recorded in its source.
 std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
                                                           const Normalization& normalization);
 
-/// The distance of a prepared surface. Tells how inside is told from outside where that is not evident.
+/// The distance of a prepared surface. Reports how inside is told from outside where that is not evident.
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 

@@ -23,8 +23,8 @@ double rounded(double value, double step) { return std::round(value / step) * st
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
 
-/// The words of a line without their values. Of two lines of the same kind the second alone has the effect of both.
-/// Empty for a line whose effect depends on the state before.
+/// The words of a line of script without their values. If two lines have the same kind, the second line alone has
+/// the effect of both. Empty for a line whose effect depends on the state before it.
 std::string kindOf(const std::string& line) {
   constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
                                    "arrows", "color",  "panel",   "worst", "settings"};
@@ -108,7 +108,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const Field& field = current.field;
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
-  // A field without target ended by something else: then the error that it reached is the target.
+  // A field without target error was ended by another limit. The error that it reached then serves as the target.
   if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
@@ -167,7 +167,7 @@ void Explorer::run(const std::string& line) {
   message.clear();
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
-  lastKind_.clear();  // a line that fails is not replaced by the next
+  lastKind_.clear();  // so that the next line does not replace a line that failed
   running_ = true;
   try {
     runScript(session_, parseScript(session_.registry(), "panel", line, {}));
@@ -192,7 +192,7 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
 /// Draws the panels until they show the present state: scroll positions, for instance, depend on the previous frame.
 void Explorer::settlePanels() {
   for (int i = 0; i < 3; ++i) {
-    std::vector<std::string> ignored;  // the panels ask to scroll back where a column became shorter
+    std::vector<std::string> ignored;  // commands to scroll back where a column became shorter
     drawPanels(nullptr, ignored);
   }
 }
@@ -240,7 +240,8 @@ const std::map<std::string, Widget>& Explorer::widgets() {
   return ui_.widgets();
 }
 
-/// The zoom of the slice, or the camera's distance, after the wheel was turned by notches away from the person.
+/// The command that zooms the slice, or moves the camera, after the wheel was turned by `notches` away from the
+/// person.
 std::string Explorer::wheelCommand(double notches) const {
   if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, notches));
   const render::OrbitCamera& c = view_.camera;
@@ -248,7 +249,7 @@ std::string Explorer::wheelCommand(double notches) const {
                      c.distance * std::pow(1.15, -notches));
 }
 
-/// The view after the mouse was dragged by dx and dy pixels.
+/// The command that changes the view after the mouse was dragged by dx and dy pixels.
 std::string Explorer::dragCommand(double dx, double dy) const {
   const UiRect canvas = layoutOf(view_).canvas;
   const double width = canvas.width(), height = canvas.height();
@@ -263,8 +264,8 @@ std::string Explorer::dragCommand(double dx, double dy) const {
   if (*dragged_ == 0)
     return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesPerPixel * dx, 0.1),
                        std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
-  // Another button than the left one moves the target with the mouse. `scale` is half the picture's extent in the plane
-  // of the target, in world units.
+  // Any button except the left one moves the target with the mouse. `scale` is half the picture's extent in the
+  // plane of the target, in world units.
   const auto camera = render::cameraOf(c, field.domain(), int(width), int(height));
   const double scale =
       c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
@@ -347,7 +348,7 @@ void Explorer::drawPicture(int shrink) {
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
   if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
-  // Both pictures change, or none: an error above keeps the pair that drawnFor_ describes.
+  // Either both pictures change or neither: after an error above, drawnFor_ still describes the old pair.
   picture_ = std::move(picture);
   beside_ = std::move(beside);
   shown_ = {picture_->image};

@@ -39,20 +39,23 @@ class Explorer final : public SessionExtension {
   bool canUndo() const { return !undone_.empty(); }
   bool canRedo() const { return !redone_.empty(); }
 
-  /// The settings of the next construction: texts by the names of `build`'s parameters, with `mesh` for the surface.
+  /// The settings of the next construction as texts, by the names of `build`'s parameters; `mesh` stands for the
+  /// surface.
   const std::map<std::string, std::string>& settings() const { return settings_; }
   void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
-  /// Builds the field again with these settings, and ends after `maxSteps` refinement steps where that is given. Throws
-  /// `Error` when neither the settings nor the field name a surface.
+  /// Builds the field again with `settings()`, and ends after `maxSteps` refinement steps where that is given.
+  /// Throws `Error` when neither the settings nor the field name a surface.
   void rebuild(std::optional<int> maxSteps);
   /// The number of refinement steps of the complete construction, if known; the current field may have fewer.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// Handles one event of mouse or keyboard: draws the panels, then runs the commands that their widgets ask for, and
-  /// throws what those throw. During long work the only effect of an event is to cancel the work.
+  /// Handles one event of mouse or keyboard: draws the panels, then runs the commands that their widgets ask for,
+  /// and passes on the exceptions of these commands. During long work the only effect of an event is to cancel the
+  /// work.
   void input(const Input& event);
-  /// Ends what a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards a text
-  /// that is being typed. The pointer keeps its position. Errors of the commands that this ends are ignored.
+  /// Ends everything that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and
+  /// discards a text that is being typed. The pointer keeps its position. Errors of the commands that run because of
+  /// this are ignored.
   void releaseInput();
 
   /// The widgets of the present frame, by their paths.
@@ -68,15 +71,15 @@ class Explorer final : public SessionExtension {
 
   /// Runs one line of script, as widgets do.
   void run(const std::string& line);
-  /// Called after each line that `run` ran. `replaces` is true when the line has the effect of the previous line and
-  /// itself, so that a recording may drop the previous line: during one drag of a slider, for instance.
+  /// Called after each line that `run` has run. `replaces` is true if the line alone has the same effect as the
+  /// previous line followed by it, as during one drag of a slider. A recording may then drop the previous line.
   std::function<void(const std::string& line, bool replaces)> onCommand;
   /// True while `run` runs a line.
   bool running() const { return running_; }
 
   void fieldChanged() override;
 
-  /// Long work that is running. The panels show it and take no input but its cancellation.
+  /// Long work that is running. The panels show it, and only the button that cancels it takes input.
   struct Work {
     std::string task;
     double fraction = 0;  ///< done, 0 to 1
@@ -133,7 +136,7 @@ class Explorer final : public SessionExtension {
   bool replaces_ = false;  ///< the running line replaces the previous one, see onCommand
 
   std::optional<std::uint64_t> allSteps_;
-  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: a construction that ends early
+  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: ends early, after a given number of steps
   Rebuilding rebuilding_ = Rebuilding::no;
 
   std::optional<FieldStatistics> figures_;
@@ -145,7 +148,7 @@ class Explorer final : public SessionExtension {
   std::vector<render::Image> shown_;     ///< images of picture_ and beside_
   std::string drawnFor_;
   int shrunk_ = 1;
-  std::size_t fields_ = 0;  ///< number of fields so far, which tells one from the next
+  std::size_t fields_ = 0;  ///< number of fields so far; distinguishes each field from the next
 
   std::optional<int> dragged_;           ///< mouse button that was pressed over the picture and is held
   std::array<double, 2> dragFrom_ = {};  ///< pointer when the button was pressed, pixels

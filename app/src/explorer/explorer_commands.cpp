@@ -132,7 +132,7 @@ void runShot(Session& session, const Arguments& arguments) {
   const render::Image frame = explorer.frame();
   savePng(frame, file);
   render::Drawn picture = *explorer.picture();
-  const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` knows only the current field's half
+  const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` knows only the half of the current field
   picture.image = frame;
   picture.corner = {int(canvas.x0), int(canvas.y0)};
   session.setPicture(std::move(picture));

@@ -8,14 +8,14 @@
 
 namespace hpsdf::app {
 
-/// Adds all commands of the explorer but `ui`: show, camera, plane, color, panel, ….
+/// Adds all commands of the explorer except `ui`: show, camera, plane, color, panel, ….
 void addExplorerCommands(Registry& registry);
 
 /// Adds `ui`, by which a script uses mouse and keyboard on the explorer.
 void addUiCommand(Registry& registry);
 
-/// The action of a command that changes a copy of the explorer's state, which then becomes the state. `undo` takes the
-/// whole change back; a change that throws leaves the state alone.
+/// Returns the action of a command: it changes a copy of the explorer's state, which then replaces the state.
+/// `undo` reverts the whole change. If the change throws, the state stays as it was.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
 /// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.

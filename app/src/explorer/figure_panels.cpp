@@ -137,7 +137,7 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
 }
 
 void drawWorst(const Controls& controls, Explorer& explorer) {
-  if (!explorer.session().knowsJumps()) return;  // the jumps are still being measured
+  if (!explorer.session().knowsJumps()) return;  // do not wait for jumps that are still being measured
   const ViewState& view = explorer.view();
   const Jumps& jumps = explorer.session().jumps();
   controls.choice("worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",

@@ -69,7 +69,7 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Bo
   controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
 }
 
-/// Draws the limits of the colour scale; `automatic` are those of the present picture.
+/// Draws the limits of the colour scale. `automatic` holds the limits of the present picture.
 void drawColorRange(const Controls& controls, const Coloring& colors,
                     const std::optional<std::array<double, 2>>& automatic) {
   const auto pin = [&](const std::string& range) {

@@ -111,7 +111,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.IniFilename = nullptr;
   io.LogFilename = nullptr;
   io.ConfigInputTextCursorBlink = false;
-  io.MouseDoubleClickTime = 0;  // a script's fast clicks must not become double clicks
+  io.MouseDoubleClickTime = 0;  // fast clicks of a script must not become double clicks
   io.MouseDrawCursor = false;
   for (const NamedKey& known : kKeys) io.KeyMap[known.code] = static_cast<int>(known.key);
   io.ClipboardUserData = &state_->clipboard;
@@ -166,7 +166,7 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     widgets();
   } catch (...) {
     state_->disabled = false;
-    ImGui::ErrorCheckEndFrameRecover(nullptr);  // closes open windows and groups, which would contain the next frame
+    ImGui::ErrorCheckEndFrameRecover(nullptr);  // closes open windows and groups, or the next frame would be in them
     end();
     throw;
   }

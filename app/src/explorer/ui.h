@@ -27,13 +27,13 @@ std::optional<Key> keyNamed(std::string_view name);
 /// One event of mouse or keyboard.
 struct Input {
   enum class Kind : std::uint8_t { move, press, release, wheel, type, key } kind = Kind::move;
-  std::array<double, 2> at = {};  ///< new position for move, pixels from the upper left
+  std::array<double, 2> at = {};  ///< for move: new position, pixels from the upper left
   int button = 0;                 ///< for press and release: 0 left, 1 right, 2 middle
-  double turn = 0;                ///< for wheel: notches, positive away from the person
-  std::string text = {};          ///< for type, UTF-8
-  Key key = Key::enter;           ///< for key, which is pressed and released
-  bool control = false;           ///< Ctrl is held; for press, release, wheel and key
-  bool shift = false;             ///< Shift is held; for the same events
+  double turn = 0;                ///< for wheel: notches, positive if turned away from the person
+  std::string text = {};          ///< for type: UTF-8
+  Key key = Key::enter;           ///< for key: it is pressed and released
+  bool control = false;           ///< for press, release, wheel and key: Ctrl is held
+  bool shift = false;             ///< for the same events: Shift is held
 };
 
 /// A rectangle of a frame in pixels: x in [x0, x1), y in [y0, y1).
@@ -106,7 +106,7 @@ class Ui {
   /// While frozen, `enable` cannot enable widgets.
   void freeze(bool frozen);
 
-  /// Gives a path to a rectangle that no widget draws, such as the picture.
+  /// Adds a widget for a rectangle that no widget draws, such as the picture, so that it has a path.
   void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:

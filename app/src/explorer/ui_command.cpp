@@ -21,8 +21,8 @@ std::optional<Point> parsePoint(const std::string& text) {
   return Point{*x, *y};
 }
 
-/// The pixel that `target` names: X,Y, or the middle of a widget. Throws `Error` for a widget that takes no input, and
-/// where `types` is true for one that takes no text.
+/// The pixel that `target` names: X,Y, or the middle of a widget. Throws `Error` for a widget that takes no input
+/// and, if `types` is true, for a widget that takes no text.
 Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
   if (const auto pixel = parsePoint(target)) return *pixel;
   const auto& widgets = explorer.widgets();
@@ -52,7 +52,7 @@ void runUi(Session& session, const Arguments& arguments) {
   const std::string value = arguments.textOr("value", "");
   const int button = arguments.text("button") == "right" ? 1 : 0;
   try {
-    explorer.frame();  // the readout and the colour panel depend on the picture
+    explorer.frame();  // the readout and the colour panel need the picture
   } catch (const Error&) {
     // The widgets work without a picture, and may be needed to make it drawable. `shot` reports the error.
   }
@@ -83,7 +83,7 @@ void runUi(Session& session, const Arguments& arguments) {
     release();
   }
   if (action != "type") return;
-  // The Ctrl+click has turned a slider into a text field with its number selected, which the typed text replaces.
+  // The Ctrl+click has turned the slider into a text field and selected its number, which the typed text replaces.
   explorer.input({.kind = Input::Kind::type, .text = value});
   explorer.input({.kind = Input::Kind::key, .key = Key::enter});
 }

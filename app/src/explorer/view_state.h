@@ -17,12 +17,12 @@ enum class Panel : std::uint8_t { bar, view, build, legend, histograms, statisti
 constexpr std::array kPanelNames = {"bar", "view", "build", "legend", "histograms", "statistics", "worst", "readout"};
 constexpr std::size_t kPanels = kPanelNames.size();
 
-/// The quantity that colours show, and their scale.
+/// The quantity that the colours show, and its scale.
 struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
   std::string other = {};  ///< file of the field to compare with, for `ColorBy::difference`
-  std::string mesh = {};   ///< surface that the field was made from, for `ColorBy::error`; empty: the field knows it
+  std::string mesh = {};   ///< surface that the field was made from, for `ColorBy::error`; empty if the field names it
 };
 
 struct ViewState {
@@ -48,14 +48,14 @@ struct ViewState {
 
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
-  JumpKind worstBy = JumpKind::value;  ///< jump that sorts the list of interfaces
-  int worstPage = 0;                   ///< page of that list, from 0
+  JumpKind worstBy = JumpKind::value;  ///< kind of jump by which the list of interfaces is sorted
+  int worstPage = 0;                   ///< page of the list of interfaces, from 0
 
   std::array<bool, kPanels> open = {true, true, true, true, true, true, true, true};
   std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels
   int width = 1280;                       ///< size of the whole frame, pixels
   int height = 720;
-  int samples = 1;  ///< per pixel, along each axis
+  int samples = 1;  ///< samples per pixel along each axis
   Backend backend;
 
   bool isOpen(Panel panel) const { return open[static_cast<std::size_t>(panel)]; }
@@ -72,7 +72,7 @@ std::string levelText(const std::vector<int>& levels);
 /// Lines of script, each ending in a newline, that set every part of the state.
 std::string scriptOf(const ViewState& view);
 
-/// Compares the script lines of two states, which hold every part of them.
+/// Compares two states by their scripts, which set every part of a state.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
 /// The renderer as an argument of `show`: "cpu=true" or "gl=software", for instance.

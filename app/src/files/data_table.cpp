@@ -60,7 +60,7 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   double scale = 0;
   stream >> kind >> table.columns >> table.rows >> scale;
   const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
-  // A larger number of rows or columns than bytes is wrong, and the product below might overflow.
+  // A number of rows or columns beyond the number of bytes is wrong, and might make the product below overflow.
   const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
   const std::size_t count = table.columns * table.rows;
   if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||

@@ -11,7 +11,7 @@ namespace hpsdf::app {
 struct DataTable {
   std::string header = {};  ///< first line of a .csv that holds names of columns; "" without one
   std::size_t columns = 0;
-  std::size_t rows = 0;  ///< number of rows; those of a .pfm run from bottom to top, as in the file
+  std::size_t rows = 0;  ///< number of rows; in a .pfm file the first row is the lowest
   std::vector<double> values = {};
 };
 
@@ -37,7 +37,7 @@ struct DataComparison {
   std::vector<DataDifference> worst = {};  ///< largest differences in descending order, at most `kWorstData`
 };
 
-/// Default bound of a difference: two or three low bits of a float near 1.
+/// Default bound of a difference: the value of the two or three lowest bits of a float near 1.
 constexpr double kDataBound = 1e-6;
 constexpr std::size_t kWorstData = 10;
 

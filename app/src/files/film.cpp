@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAbout = "frames.json";  // marks a folder as one of frames
+constexpr const char* kAbout = "frames.json";  // file that marks a folder of frames
 constexpr const char* kMovie = "film.mp4";
 
 bool isFrameName(std::string_view name) {

@@ -14,7 +14,7 @@
 namespace hpsdf::app {
 
 /// A sequence of pictures, written to a folder as frame-0000.png, frame-0001.png … or encoded as an MP4 by ffmpeg.
-/// Before `publish` the output is not touched, so that an older film stays intact.
+/// The output is not touched before `publish`, so that an older film stays intact until then.
 class Film {
  public:
   /// `output` is an MP4 where it ends in .mp4, else a folder. Throws `Error` where it cannot be written, where the

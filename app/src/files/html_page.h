@@ -29,7 +29,7 @@ struct ReportPage {
 
 std::string reportHtml(const ReportPage& page);
 
-/// Return the beginning and the end of a page. `moreStyle` is CSS that is added to that of reports.
+/// The beginning and the end of a page. `moreStyle` is CSS that is added to the CSS of reports.
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
 

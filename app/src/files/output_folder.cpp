@@ -43,7 +43,7 @@ void OutputFolder::commit() {
   keep();
 }
 
-/// Folders that are not empty stay.
+/// Removes the created folders that are empty.
 void OutputFolder::removeCreated() {
   std::error_code ignored;
   for (const fs::path& part : created_) fs::remove(part, ignored);

@@ -23,8 +23,9 @@ class OutputFolder {
 
   void keep() { created_.clear(); }
 
-  /// Writes a file under a temporary name. `commit` renames all such files and keeps the folder; without it they are
-  /// removed, and older files of these names stay. Both throw `Error` as `OutputFile` does.
+  /// Writes a file under a temporary name. `commit` gives all such files their names and keeps the folder. Without
+  /// `commit` the files are removed, and older files of the same names stay. Both functions throw `Error` as
+  /// `OutputFile` does.
   void write(const std::string& name, std::string_view bytes);
   void commit();
 
@@ -34,8 +35,8 @@ class OutputFolder {
   /// recognized.
   void requireOwn(const std::string& marker) const;
 
-  /// Writes an empty marker, so that a folder of incomplete results is recognized too, and removes the earlier results:
-  /// files whose names `isResult` accepts. Call `requireOwn` before.
+  /// Writes an empty marker, so that a folder of incomplete results is recognized too, and removes the results of
+  /// earlier runs, which are the files whose names `isResult` accepts. Call `requireOwn` first.
   void startAnew(const std::string& marker, const std::function<bool(const std::string&)>& isResult) const;
 
  private:

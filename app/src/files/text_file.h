@@ -23,7 +23,8 @@ std::string readText(std::istream& in, const std::string& name);
 /// might have no end.
 std::string readTextFile(const std::string& file);
 
-/// Reads a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` does otherwise.
+/// Reads a file of any length, such as a picture or a table. Throws `Error` as `readTextFile` does, except for the
+/// length.
 std::string readWholeFile(const std::string& file);
 
 /// Writes a file under a temporary name and renames it. Throws `Error` naming the file, and leaves nothing behind then.

@@ -15,7 +15,7 @@ namespace {
 
 struct Source {
   std::string_view name;
-  std::string_view arguments;  ///< as a user writes them
+  std::string_view arguments;  ///< accepted arguments, as a user writes them
   std::size_t count;
 };
 constexpr Source kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};

@@ -7,10 +7,10 @@
 
 namespace hpsdf::app {
 
-/// SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER]
+/// An expectation, written as SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER].
 struct Expectation {
   std::string source;             ///< stats, jumps, pick, at
-  std::vector<double> arguments;  ///< numbers in parentheses
+  std::vector<double> arguments;  ///< the numbers in parentheses after the source
   std::vector<std::string> path;  ///< keys of objects and indices of arrays
   std::string comparison;         ///< == != < <= > >=
   double wanted = 0;
@@ -19,7 +19,8 @@ struct Expectation {
   bool holds(double found) const;
 };
 
-/// Throws `Error` for text that is not an expectation, with the nearest known source where the source is unknown.
+/// Throws `Error` for text that is not an expectation. If its source is unknown, the message names the nearest
+/// known one.
 Expectation parseExpectation(std::string_view text);
 
 }  // namespace hpsdf::app

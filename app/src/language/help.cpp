@@ -124,7 +124,8 @@ std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
   return groups;
 }
 
-/// The place of the page docs/commands.md that describes a shared option.
+/// Where the page docs/commands.md describes an option: with its command, with `build`, or with the shared
+/// options.
 enum class DescribedAt : std::uint8_t { here, build, sharedOptions };
 
 bool isSameOption(const Parameter& a, const Parameter& b) { return a.name == b.name && a.help == b.help; }

@@ -24,7 +24,8 @@ enum class ParameterType : std::uint8_t {
   size,  ///< WIDTHxHEIGHT
 };
 
-/// When a parameter is required. A script works on the current field, the command line starts without one.
+/// When a parameter is required. A script can use the current field instead, but the command line starts without a
+/// field.
 enum class Need : std::uint8_t { optional, onCommandLine, always };
 
 /// Headings of parameters that several commands have. Help texts show the general ones last.

@@ -230,7 +230,7 @@ class ArgumentReader {
     if (parameter.isPositional) names += "," + parameter.name;
     CLI::Option* option = parser.add_option(names);
     if (parameter.isRepeatable) option->expected(1, CLI::detail::expected_max_vector_size);
-    // Each occurrence takes one value: `-e A B` must leave B to the positional words.
+    // Each occurrence takes one value: in `-e A B` the word B remains a positional word.
     option->allow_extra_args(parameter.isRepeatable && parameter.isPositional);
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
@@ -266,7 +266,7 @@ class ArgumentReader {
   }
 
   void refuseUnknown(const std::vector<std::string>& extras) const {
-    // The value of an unknown option is left over as a positional word too: report the option itself.
+    // The value of an unknown option remains as a positional word too, so the error must name the option itself.
     const auto option = std::ranges::find_if(extras, [](const std::string& word) { return word.starts_with('-'); });
     if (option != extras.end()) {
       const std::string written = option->substr(0, option->find('='));
@@ -284,7 +284,8 @@ class ArgumentReader {
     return found == words_.end() ? 0 : static_cast<std::size_t>(found - words_.begin());
   }
 
-  /// Returns the index of the last word that sets this parameter, to which a complaint about its value points.
+  /// Returns the index of the last word that sets this parameter. An error message about its value points to this
+  /// word.
   std::size_t wordOf(const Parameter& parameter, std::string_view value) const {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;

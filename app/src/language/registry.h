@@ -66,7 +66,7 @@ struct Command {
   bool commandLineOnly = false;
   bool takesVariables = false;    ///< positional `name=value` words are values, not options
   bool definesVariables = false;  ///< the parameter `assignments` defines variables for the rest of the script
-  bool includesScript = false;    ///< the lines of the script that the parameter `script` names replace the command
+  bool includesScript = false;    ///< the command is replaced by the lines of the script that `script` names
 };
 
 class Registry {

@@ -16,8 +16,8 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::size_t kDeepestInclude = 16;  // the same limit as for scripts that run each other
-// A few lines can require any amount of memory, by variables that contain variables and by files that include others
-// twice. The limits below end such scripts.
+// A few lines can require any amount of memory, by variables that contain variables and by files that include
+// another file twice. The limits below stop such scripts.
 constexpr std::size_t kMostCalls = 100'000;
 constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // sum over all replacements of $name
 

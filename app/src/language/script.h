@@ -1,5 +1,5 @@
 #pragma once
-// Scripts hold one command a line, `verb value key=value …`; docs/scripts.md is the manual.
+// Scripts hold one command per line, `verb value key=value …`; docs/scripts.md is the manual.
 
 #include <cstddef>
 #include <filesystem>

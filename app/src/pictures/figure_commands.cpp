@@ -25,8 +25,9 @@ Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int
           {"slope", gradient.norm()}};
 }
 
-/// The figures of the field at a pixel of the last picture; null where the pixel shows no part of the field. `withAll`
-/// adds those that take long to compute: the exact distance, if it is known, and the jumps at the cell's nearest face.
+/// The figures of the field at a pixel of the last picture; null where the pixel shows no part of the field.
+/// `withAll` adds the figures that take long to compute: the exact distance, if it is known, and the jumps at the
+/// cell's nearest face.
 Json pickJson(Session& session, int x, int y, bool withAll) {
   const Field& field = session.current().field;
   const auto pick = render::pickAt(field, session.picture(), x, y);

@@ -56,7 +56,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
       progress.update("drawing frames", double(frame) / frames);
       picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
       const render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
-      picture.scale = drawn.scale;  // colours keep the meaning that they have in the first frame
+      picture.scale = drawn.scale;  // the colours keep their meaning in all frames
       any |= drawn.seen;
       film.add(drawn.image, {{"azimuth", picture.camera.azimuthDegrees}});
     }
@@ -67,7 +67,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
   publish(session, arguments, film);
 }
 
-/// The commands that --of takes: `slice` and `render` without the parameters field and output.
+/// The commands that the option --of accepts: `slice` and `render` without the parameters field and output.
 Registry drawingCommands(const Registry& registry) {
   Registry result;
   for (const char* name : {"slice", "render"}) {
@@ -78,7 +78,7 @@ Registry drawingCommands(const Registry& registry) {
   return result;
 }
 
-/// The command that --of holds. Throws `Error` "of:line:column: …".
+/// The command in the option --of. Throws `Error` "of:line:column: …".
 Call drawingCall(const Registry& commands, const Arguments& arguments) {
   std::vector<Call> calls = parseScript(commands, "of", arguments.text("of"), {});
   if (calls.size() != 1) throw Error("of: expected one command, slice or render");

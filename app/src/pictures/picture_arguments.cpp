@@ -135,7 +135,7 @@ std::string_view colorName(ColorBy color) {
   return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
 }
 
-/// The registry accepts only the names above, so that one is always found.
+/// Always finds a colour, because the registry accepts only the names above.
 ColorBy colorNamed(std::string_view name) {
   return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
 }

@@ -31,7 +31,7 @@ std::string viewName(const render::OrbitCamera& camera);
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);
 
-/// The levels of a list such as "2,4-6", each from 0 to `most`; empty for "". Throws `Error` naming the parameter.
+/// The levels in a list such as "2,4-6", each from 0 to `most`; none for "". Throws `Error` naming the parameter.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 
 /// The point that a parameter of three numbers holds, which must have been given.

@@ -41,8 +41,8 @@ std::vector<float> rawValues(const Field& field, const render::SliceView& view, 
   return values;
 }
 
-/// Portable float map: one channel, little-endian (the negative scale says so), rows bottom to top; NaN outside the
-/// domain.
+/// Writes a portable float map: one channel, little-endian (which the negative scale states), rows from bottom to
+/// top, and NaN outside the domain.
 void writePfm(const render::ViewBuffers& buffers, std::span<const float> values, OutputFile& out) {
   static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
   out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
@@ -51,7 +51,8 @@ void writePfm(const render::ViewBuffers& buffers, std::span<const float> values,
     out.write(std::as_bytes(values.subspan(y * width, width)));
 }
 
-/// A row a pixel inside the domain: its point in world units, the value there, degree and depth of its cell.
+/// Writes one row for each pixel inside the domain: the pixel's point in world units, the value, and the cell's
+/// degree and depth.
 void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers, OutputFile& out) {
   out.write("x,y,z,value,degree,depth\n");
   for (int y = 0; y < buffers.height; ++y) {

@@ -16,7 +16,7 @@ struct Readout {
   double value;                  ///< field at the point, in double precision
   std::optional<double> exact;   ///< exact distance, if it is known
   Jump valueJump, gradientJump;  ///< jumps across the cell's nearest face
-  double toFace;                 ///< distance to that face, world units
+  double toFace;                 ///< distance to the cell's nearest face, world units
 };
 
 Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick);

@@ -41,8 +41,8 @@ std::string buildCommandLine(const std::string& surface, const std::string& file
   return line;
 }
 
-/// Mean time of one frame of the surface's buffers, in seconds. After one frame to warm up, it draws eight frames, or
-/// as many as fit into two seconds.
+/// Mean time of one frame of the surface's buffers, in seconds. It is measured over eight frames, or as many as
+/// fit into two seconds, after one frame to warm up.
 double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
   using Clock = std::chrono::steady_clock;
   constexpr int kFrames = 8;

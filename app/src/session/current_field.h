@@ -8,7 +8,7 @@
 
 namespace hpsdf::app {
 
-/// The field on which commands work.
+/// The field that commands read and change.
 struct CurrentField {
   Field field;
   std::string name;                              ///< name of the file or mesh that it came from

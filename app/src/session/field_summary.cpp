@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kBarCells = 40;
 
-/// Prints one row a level with its share of the volume, its number of leaves and a bar proportional to the share.
+/// Prints one row for each level: its share of the volume, its number of leaves, and a bar proportional to the
+/// share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
@@ -46,7 +47,7 @@ Json boundsJson(const Field& field) {
   return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
 }
 
-/// A setting as a number, a word or true and false; null where it asks for nothing.
+/// The value of a setting as a number, a word, true or false; null for a setting that has no value.
 Json settingJson(const BuildSetting& setting, const BuildOptions& options) {
   const std::vector<double> numbers = setting.get(options);
   if (numbers.empty()) return {};
@@ -56,7 +57,7 @@ Json settingJson(const BuildSetting& setting, const BuildOptions& options) {
   return settingText(setting, options);
 }
 
-/// The settings that a field keeps, with underscores in their names.
+/// Adds the settings that a field stores, with underscores in their names.
 void addSettings(Json& json, const BuildOptions& settings) {
   for (const BuildSetting& setting : buildSettings()) {
     if (setting.storedAt == 0) continue;
@@ -120,7 +121,7 @@ std::string fieldLine(const Field& field) {
                      field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
 }
 
-/// The settings that a field keeps, but its target error: words or numbers.
+/// The settings that a field stores, except its target error: those whose values are words, or those with numbers.
 std::string settingsText(const BuildOptions& settings, bool ofWords) {
   std::vector<std::string> parts;
   for (const BuildSetting& setting : buildSettings()) {

@@ -23,7 +23,7 @@ Json boundsJson(const Field& field);
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);
 
-/// Names the units of the estimated RMS error, in parentheses: mesh units or normalized ones.
+/// The unit of the estimated RMS error, in parentheses: mesh units or normalized units.
 std::string unitText(const Field& field);
 
 /// Describes the size of a field: "54,935 leaves, 460,210 coefficients (float), 2.3 MB".

@@ -13,8 +13,8 @@ namespace hpsdf::app {
 /// Returns the parameter `mesh` of commands that compare a field with its surface.
 Parameter surfaceParameter();
 
-/// Returns the mesh file or shape from which a field was made. Throws `Error` where that is unknown; the message asks
-/// for `asked`.
+/// Returns the mesh file or shape from which a field was made. Throws `Error` where that is unknown; the message
+/// then asks for the argument `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
 /// Returns the surface that the argument `mesh` names, else that of `surfaceOf`.

@@ -58,9 +58,9 @@ class Session {
   const Jumps& jumps();
   bool knowsJumps() const { return jumps_.has_value(); }
 
-  /// Returns the exact distance to `surface`. Where that is empty, it is the distance to the shape that the field names
-  /// or to the mesh from which it was built in this session, else to the surface of the previous call. The result is
-  /// kept. Throws `Error` where no surface is known or it cannot be read.
+  /// Returns the exact distance to `surface`. If `surface` is empty, the surface is the one from which the field was
+  /// made, if that is a shape or the field was built in this session, and otherwise the surface of the previous
+  /// call. The result is kept. Throws `Error` where no surface is known or it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
   /// True where `exact` can be called with an empty surface.
   bool knowsExact() const;
@@ -69,7 +69,7 @@ class Session {
   /// Returns the last picture of the current field. Throws `Error` where none was drawn.
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
-  /// Records the renderer of a picture that was not drawn by `renderer`.
+  /// Records the description of the renderer of a picture that was not drawn by `renderer`.
   void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
   /// Returns the extension, which the first call creates. All calls must ask for the same type.
@@ -90,7 +90,7 @@ class Session {
     Backend backend = {};
   };
   Other& other(const std::string& file);
-  /// Forgets second fields whose files were modified, and returns whether there were any. A field whose file was
+  /// Forgets the second fields whose files were modified, and returns whether there were any. A field whose file was
   /// deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);

@@ -51,7 +51,7 @@ Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRe
     file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
     std::error_code unknown;
     if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request.targetError);
-    checkWritable(file);  // fails before the long construction
+    checkWritable(file);  // fails now, not after the long construction
   }
   const int threads = tbb::this_task_arena::max_concurrency();
   Field field = withProgress(console, [&](const Progress& progress) {

@@ -20,7 +20,7 @@ struct SceneRequest {
   bool filesAreYUp = true;               ///< mesh files have y up; shapes always have z up
   double targetError = 1e-6;             ///< target error τ of the fields
   std::optional<std::filesystem::path> cache = {};  ///< folder in which fields are kept between runs
-  std::uint64_t seed = 1;                           ///< of the random positions and orientations
+  std::uint64_t seed = 1;                           ///< seed of the random positions and orientations
   double step = 1.0 / 240;                          ///< seconds of simulated time
   int iterations = 20;                              ///< iterations of the constraint solver in each step
 };
@@ -33,7 +33,7 @@ struct SceneKind {
   std::array<double, 2> view;  ///< default azimuth and elevation of the camera, degrees
 };
 
-/// All scenes.
+/// The kinds of all scenes.
 std::span<const SceneKind> scenes();
 
 }  // namespace hpsdf::app

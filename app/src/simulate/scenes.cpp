@@ -69,7 +69,7 @@ void requireFitting(const TriangleMesh& ground, const std::string& name, double 
                     name, width, boundingBox(ground).sizes().z(), radius, kLeast * radius, kMost * radius));
 }
 
-/// Marbles that fall onto ground that is open upwards.
+/// Marbles that fall onto ground that is open at the top.
 class MarbleScene : public Scene {
  public:
   MarbleScene(const Console& console, const SceneRequest& request, double radius)
@@ -85,7 +85,7 @@ class MarbleScene : public Scene {
  protected:
   const Field& ground() const { return kinds_.front().field; }
 
-  /// The material of marbles in a pile: damped, and at rest below a speed.
+  /// The material of marbles in a pile: motion is damped, and a marble below a certain speed comes to rest.
   Material pileMaterial() const {
     return {.friction = 0.4,
             .rollingFriction = 0.02 * bodySize_,
@@ -111,7 +111,7 @@ class MarbleScene : public Scene {
   }
 };
 
-/// Every 0.2 s a layer of marbles falls into the bowl.
+/// A bowl into which a layer of marbles falls every 0.2 s.
 struct BowlScene final : MarbleScene {
   BowlScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.03) {
     const Box box = ground().domain();
@@ -134,7 +134,7 @@ struct BowlScene final : MarbleScene {
 
 struct HelixScene final : MarbleScene {
   HelixScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.035) {
-    // The groove of three turns crosses y = 0 at this x, away from the edge of the bowl.
+    // At this x the groove of three turns crosses the line y = 0, away from the edge of the bowl.
     for (std::size_t n = 0; n < request.bodies; ++n)
       dropMarble(2.0 * double(n), restingPosition(ground(), request.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
   }
@@ -217,7 +217,8 @@ struct PolesScene final : PileScene {
   }
 };
 
-/// Makes Bullet solve contacts last. In its own order the links pull nodes into the bodies that they rest on.
+/// Makes Bullet solve contacts last. In Bullet's own order the links pull nodes into the bodies on which the nodes
+/// rest.
 void solveContactsLast(btSoftBody& body) {
   btAlignedObjectArray<btSoftBody::ePSolver::_>& sequence = body.m_cfg.m_psequence;
   sequence.resize(0);
@@ -288,7 +289,7 @@ struct ClothScene final : PileScene {
     const double top = boundingBox(mesh).sizes().z();
     BodyKind& body = addKind(mesh, request.samples);
     BodyKind& table = addKind(slabMesh({3, 3, 0.2}), 1000);
-    const Material rough{.friction = 1};  // a node that slid off a sharp tip would let the tip through the cloth
+    const Material rough{.friction = 1};  // friction keeps nodes on sharp tips, which else would pierce the cloth
     addStatic(body, shift({0, 0, stands}), rough);
     addStatic(table, shift({0, 0, -0.1}), rough);
     const int side = std::max(2, int(std::ceil(std::sqrt(double(request.nodes)))));

@@ -13,7 +13,7 @@ struct SimulationShot {
   const Field& field;  ///< field of the traced surface, in whose coordinates the picture is; valid during `take`
   const std::string& renderer;  ///< description of the renderer
   double seconds;               ///< simulated time
-  std::size_t contacts;         ///< surface samples that lie in another body
+  std::size_t contacts;         ///< number of surface samples that lie in another body
 };
 
 }  // namespace hpsdf::app

@@ -14,7 +14,7 @@
 
 namespace hpsdf::app {
 
-/// Statistics of a number that every step has.
+/// Statistics of a number that is counted in every step.
 struct CountPerStep {
   double sum = 0;
   std::size_t most = 0, last = 0;
@@ -26,15 +26,15 @@ struct CountPerStep {
   }
 };
 
-/// Figures of a whole simulation. Contacts are samples, spheres and nodes of soft bodies that lie in a field.
+/// Figures of a whole simulation. Contacts are samples, spheres, and nodes of soft bodies that lie in a field.
 struct SimulationFigures {
   std::size_t bodies = 0, nodes = 0;  ///< number of moving bodies and of nodes of soft bodies
   std::size_t waiting = 0;            ///< bodies that were never added
   std::size_t lost = 0;               ///< bodies below the floor at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< simulated time, seconds
-  /// Wall-clock time in seconds: of the preparation, of all steps, of their field queries, of the solver, and of the
-  /// queries of the slowest step.
+  /// Wall-clock times in seconds: of the preparation, of all steps, of all field queries, of the solver, and of the
+  /// field queries in the slowest step.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
   CountPerStep penetrating, touching;  ///< contacts in fields, and contacts that the solver treats
   double size = 0;  ///< length that depths are compared with: a marble's radius, a body's size or a cloth's margin

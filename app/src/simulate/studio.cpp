@@ -19,7 +19,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr render::Color kLevelGround = {224, 226, 230};
-constexpr double kLevelGroundSide = 8;  // diagonals of the scene's other bodies
+constexpr double kLevelGroundSide = 8;  // in diagonals of the scene's other bodies
 
 const physics::FieldShape* fieldShape(const btCollisionShape& shape) {
   return dynamic_cast<const physics::FieldShape*>(&shape);
@@ -29,7 +29,8 @@ const BodyKind& kindOf(const Scene& scene, const physics::FieldShape& shape) {
   return *std::ranges::find(scene.kinds(), &shape, [](const BodyKind& kind) { return &kind.shape; });
 }
 
-/// Calls visit(shape, worldFromBody) for the rigid bodies in the world, and for those to be added at their start.
+/// Calls visit(shape, worldFromBody) for the rigid bodies in the world and, at their initial positions, for those
+/// to be added.
 template <typename Visit>
 void forEachRigid(const Scene& scene, const Visit& visit) {
   const physics::World& world = scene.world();
@@ -75,9 +76,9 @@ TriangleMesh levelGround(double side) {
   return mesh;
 }
 
-/// Points of a shape in the body's frame. The whole body is in view if they are. Level ground has none.
+/// Points of a shape, in the body's frame: if they are in view, the whole body is. Level ground has no points.
 std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape) {
-  constexpr double kDetail = 1.0 / 16;  // in longest sides, fine enough for an outline
+  constexpr double kDetail = 1.0 / 16;  // in longest sides of the mesh; fine enough for an outline
   std::vector<Vector3> points;
   if (const auto* field = fieldShape(shape)) {
     const TriangleMesh& mesh = kindOf(scene, *field).mesh;
@@ -90,7 +91,7 @@ std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape
   return points;
 }
 
-/// Adds the corners of the box projected onto level ground, with a border, because bodies spread when they land there.
+/// Adds the box's corners projected onto level ground, with a border, because bodies spread when they land on it.
 void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<Vector3>& points) {
   constexpr double kSpread = 1.25;
   for (int corner = 0; corner < 8; ++corner) {
@@ -134,7 +135,7 @@ void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Bo
   const bool parallel = look.camera.projection == render::Projection::orthographic;
   render::SurfacePicture wide = look;
   wide.camera.distance = 1;
-  wide.camera.projection = render::Projection::perspective;  // whose half extent at distance 1 is the unit of s
+  wide.camera.projection = render::Projection::perspective;  // defines the unit of s
   const render::Camera camera = cameraOf(wide, domain);
   const Vector3 middle = look.camera.target.value_or(boxAround(points).center());
   Vector3 target = middle;

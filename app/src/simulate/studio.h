@@ -15,9 +15,9 @@
 
 namespace hpsdf::app {
 
-/// Draws the present state of a scene. The surface of one field is traced, that of the first static body that is only
-/// translated, and the pictures are in its coordinates. All other bodies are drawn as meshes without detail below a
-/// pixel.
+/// Draws the present state of a scene. One field's surface is traced: that of the first static body whose
+/// transform is a pure translation. The pictures are in the coordinates of this field. All other bodies are drawn
+/// as meshes, without detail below the size of a pixel.
 class Studio {
  public:
   /// `look` as in `SimulationCamera`. The camera is aimed once, at all bodies of the scene and those that are still to
@@ -52,7 +52,7 @@ class Studio {
   Ground ground_;
   std::map<const btCollisionShape*, Model> models_;  ///< meshes of the rigid bodies' shapes
   std::uint32_t firstSoft_ = 0;                      ///< mesh of the first soft body; the other soft bodies follow
-  std::size_t rigid_;  ///< rigid bodies that will move; soft bodies have the colours after theirs
+  std::size_t rigid_;  ///< number of rigid bodies that will move; the colours of soft bodies follow theirs
   std::unique_ptr<render::Renderer> renderer_;
   std::unique_ptr<render::BodyRenderer> bodyRenderer_;
   std::string description_;

@@ -13,7 +13,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// All kinds; what a new one adds to the verb is said here alone.
+/// The list of all kinds of studies: a new kind is added to the command here alone.
 const std::vector<Study>& studies() {
   static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy()};
   return list;
@@ -42,7 +42,8 @@ const Study& studyOf(const Arguments& arguments) {
   return *std::ranges::find(studies(), arguments.text("kind"), &Study::name);
 }
 
-/// The parameters of all kinds, each once. One whose default depends on the kind is left without: see `buildArguments`.
+/// The parameters of all kinds, each once. A parameter whose default depends on the kind has no default here: see
+/// `buildArguments`.
 std::vector<Parameter> kindParameters() {
   std::vector<Parameter> all;
   for (const Study& study : studies())

@@ -27,7 +27,8 @@ Study convergenceStudy();
 Study tableStudy();
 Study continuityStudy();
 
-/// The parameters of `build` except those named. Each but a flag may be given once for all meshes, or once for each.
+/// The parameters of `build` except those named. Each, except flags, may be given once for all meshes or once for
+/// each.
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);
 
 /// The parameters of the points at which errors are measured: their number and the seed of their positions.
@@ -37,8 +38,8 @@ std::vector<Parameter> samplingParameters();
 ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
                           const Box& domain, int threads, double near = 0);
 
-/// The arguments of `build` for the mesh of that index. A parameter that is given once for each mesh has its value at
-/// the same index. Throws `Error` for a parameter that is given another number of times.
+/// The arguments of `build` for the mesh of that index. A parameter that is given once for each mesh has the value
+/// at the same index. Throws `Error` for a parameter that is given any other number of times.
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh);
 
 /// A different file name for each mesh. Throws `Error` where `buildArguments` would do so for one of them, so that

@@ -39,7 +39,7 @@ struct LargeEnough {};
 /// add different numbers of coefficients, so that more fields are inspected than become stages.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
-      double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // the smallest step
+      double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients of one step
   std::vector<std::uint64_t> steps = {0};
   for (double wanted = 1; wanted <= most; wanted *= growth)
     if (const auto whole = static_cast<std::uint64_t>(std::llround(wanted)); whole > steps.back())
@@ -100,8 +100,8 @@ double commonRms(const Json& curves) {
   return common;
 }
 
-/// The number of coefficients at which a curve has a measured RMS error, interpolated linearly in logarithms. Nothing
-/// if the curve does not reach the error, or starts below it.
+/// The number of coefficients at which a curve has a measured RMS error, interpolated linearly in logarithms.
+/// Empty if the curve does not reach the error, or starts below it.
 std::optional<double> coefficientsAt(const Json& stages, double rms) {
   for (std::size_t n = 0; n < stages.size(); ++n) {
     const double rmsAfter = numberIn(stages[n], "measured_rms"), after = numberIn(stages[n], "coefficients");

@@ -57,7 +57,7 @@ struct TableRow {
   std::string name;  ///< name for files
   Field field;
   FieldStatistics figures;
-  double seconds;                                              ///< of the construction
+  double seconds;                                              ///< time of the construction
   ErrorFigures error;                                          ///< measured, in the field's units
   std::array<LevelPicture, std::size(kLevels)> pictures = {};  ///< one for each of `kLevels`
 

@@ -37,7 +37,7 @@ std::string countOf(std::size_t count, std::string_view one, std::string_view ma
 }
 
 std::string shortNumber(double number) {
-  if (!std::isfinite(number)) return fmt::format("{}", number);  // fields from other sources may hold them
+  if (!std::isfinite(number)) return fmt::format("{}", number);  // fields of other programs may hold infinities or NaN
   const double size = std::abs(number);
   if (number == 0 || (size >= 0.01 && size < 1e5)) return fmt::format("{:.3g}", number);
   std::string mantissa = fmt::format("{:.2e}", number);

@@ -12,7 +12,8 @@
 
 namespace hpsdf::app {
 
-/// True for the digits and for the letters of ASCII and _; unlike the functions of <cctype>, in every locale.
+/// isDigit is true for the ASCII digits, isLetter for the ASCII letters and _. Unlike the functions of <cctype>,
+/// they do not depend on the locale.
 constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
@@ -34,7 +35,7 @@ std::string vectorText(const Vector3& v);
 /// Writes a point of `box` with extra digits where the box is small compared with its distance from the origin.
 std::string vectorText(const Vector3& v, const Box& box);
 
-/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with the digits of the function above.
+/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with digits as in `vectorText` for a box.
 std::string boxText(const Box& box);
 
 /// Derives a name for files and commands from a mesh file or a shape: "bunny" for bunny.obj, "torus" for

@@ -13,8 +13,8 @@
 
 namespace hpsdf::app {
 
-/// Listens to the session's long work during its lifetime. While the thread that made it is working, it calls `refresh`
-/// every 50 ms or so, which must pass input events to `Explorer::input` and show a frame.
+/// Listens to the session's long work during its lifetime. While work runs in the thread that made this object, it
+/// calls `refresh` about every 50 ms, which must pass input events to `Explorer::input` and show a frame.
 class LiveWork : public WorkListener {
  public:
   LiveWork(Explorer& explorer, std::function<void()> refresh);

@@ -133,14 +133,14 @@ std::optional<Key> keyOf(int key, int scancode) {
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// An error message without the script position that the line of a widget is given.
+/// An error message without its position: the script that holds a widget's line is unknown to users.
 std::string withoutPosition(std::string message) {
   for (const std::string_view script : {"panel:1:", "rebuild:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
   return message;
 }
 
-/// The first of hpsdf-0001.png, hpsdf-0002.png, … that is no file yet.
+/// The first of the names hpsdf-0001.png, hpsdf-0002.png, … that no file has yet.
 std::string freeShotName() {
   for (int number = 1;; ++number) {
     std::string name = fmt::format("hpsdf-{:04}.png", number);
@@ -297,7 +297,7 @@ class Window {
     }
   }
 
-  /// Draws a frame; undoes changes of the view until it can be drawn.
+  /// Draws a frame. Undoes changes of the view until the picture can be drawn.
   render::Image frame(int shrink) {
     for (;;) {
       try {
@@ -380,7 +380,7 @@ std::size_t showWindow(Session& session, const WindowOptions& options) {
     const render::Image last = window.finish();
     if (options.shot) savePng(last, *options.shot);
   } catch (const Cancelled&) {
-    // The window was closed during a measurement for the first frame, which therefore does not exist.
+    // The window was closed during a measurement for the first frame, so that there is no frame.
   } catch (...) {
     write();
     throw;

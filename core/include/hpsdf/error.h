@@ -9,7 +9,7 @@
 
 namespace hpsdf {
 
-/// The kind of thing that an `Error` is about, so that callers need not search its message.
+/// What an `Error` is about, so that callers need not parse its message.
 enum class ErrorKind : std::uint8_t {
   general,  ///< none of the kinds below
   option,   ///< an option, or a parameter of a shape, has a value that is not accepted
@@ -24,8 +24,8 @@ class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 
-  /// The message is "SUBJECT: PROBLEM", or "PROBLEM" where the subject is empty. The subject is the file, option or
-  /// shape that the error is about, as the caller wrote it: compare it to see whether a message names what it should.
+  /// The message is "SUBJECT: PROBLEM", or "PROBLEM" if the subject is empty. The subject is the file, option or
+  /// shape that the error is about, as the caller wrote it, so that callers can recognise it in the message.
   Error(ErrorKind kind, const std::string& subject, const std::string& problem)
       : std::runtime_error(subject.empty() ? problem : subject + ": " + problem), subject_(subject), kind_(kind) {}
 
@@ -51,7 +51,7 @@ struct Progress {
   /// Receives what is being done and the estimated fraction done, 0 to 1. One thread calls it at a time.
   std::function<void(std::string_view task, double fraction)> report;
 
-  /// The operation asks this often and from any thread; once it answers true the operation throws `Cancelled`.
+  /// The operation calls this often and from any thread. Once it returns true, the operation throws `Cancelled`.
   std::function<bool()> cancelled;
 
   /// Operations call this between steps.

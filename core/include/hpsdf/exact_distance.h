@@ -72,8 +72,8 @@ class ExactDistance {
   /// Batched: fastest when neighbours in `points` are neighbours in space. The spans have equal length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
-  /// Returns the nearest point of the triangles, for an outer hull of its triangles, with the signed distance of
-  /// `operator()`. Beside a closed hole and for a shell, that is not the distance to the point.
+  /// Returns the nearest point of the triangles, or of the outer hull's triangles for that test, with the signed
+  /// distance of `operator()`. Near a closed hole and for a shell, this distance is not that to the returned point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
   const InsideTestChoice& insideTestChoice() const;

@@ -20,7 +20,7 @@ struct Jump {
   double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
 };
 
-/// The face of the smaller of two neighbouring leaves, which the larger one shares.
+/// The face between two neighbouring leaves. It is a whole face of the smaller one.
 struct Interface {
   std::array<std::uint32_t, 2> cells;  ///< `Cell::id` on the lower and on the upper side
   std::array<std::uint8_t, 2> degrees;
@@ -38,7 +38,7 @@ struct Interface {
 
 /// All of a field's interfaces.
 struct Jumps {
-  std::vector<Interface> interfaces;  ///< in the octree's order of the smaller or, among equals, the lower leaf
+  std::vector<Interface> interfaces;  ///< in the octree's order of the smaller leaf or, of two equal ones, the lower
   std::size_t hanging = 0;            ///< number of interfaces between leaves of different size
   double area = 0;                    ///< total area in units²
   Jump value;                         ///< jumps of f over all interfaces

@@ -11,8 +11,8 @@ namespace hpsdf {
 /// Prepares a mesh for distances:
 /// - welds vertices of equal position,
 /// - drops degenerate and duplicate triangles and unused vertices. A degenerate triangle that connects its neighbours
-///   is replaced by an edge flip, because dropping it would open the mesh. Of a shared wall both triangles stay, so
-///   that each body is closed; of a surface that is modelled with both sides one stays,
+///   is replaced by an edge flip, because dropping it would open the mesh. A shared wall keeps both of its triangles,
+///   so that each body is closed; a surface that is modelled with both sides keeps one,
 /// - reverses the whole mesh when its signed volume is negative, and never single components, because the triangles of
 ///   a cavity face inward on purpose.
 ///
@@ -50,7 +50,8 @@ TriangleMesh loadMesh(const std::string& fileOrShape);
 /// appears whole or not at all. Throws `Error` (file) for another extension, and as `OutputFile` does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
 
-/// Throws the `Error` of `saveMesh` for the file's name, as far as it is known beforehand. Call it before long work.
+/// Throws the `Error` that `saveMesh` would throw for this file name, as far as it is known beforehand. Call it
+/// before long work.
 void checkMeshWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

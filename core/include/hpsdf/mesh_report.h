@@ -44,8 +44,8 @@ struct MeshReport {
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Topology and measures of a mesh as it is; the counts of what cleaning removes stay 0. Throws `Error` (mesh) for
-/// indices out of range.
+/// Returns the counts and measures of a mesh as it is; the counts of what cleaning removes are 0. Throws `Error`
+/// (mesh) for indices out of range.
 MeshReport inspect(const TriangleMesh& mesh);
 
 /// A mesh after import, and the report on it.
@@ -89,7 +89,7 @@ struct MeshDefects {
   bool allCrossings = true;  ///< false when the search for crossings stopped at its limit
   /// Crossings of two triangles of one component, at which the surface folds into itself. Shared walls are not counted.
   std::size_t crossingsWithinComponents = 0;
-  /// Triangles can be reversed such that no edge of two triangles is inconsistent; false for a Möbius strip.
+  /// True if reversing triangles can make every edge of two triangles consistent; false for a Möbius strip.
   bool orientable = true;
 
   std::size_t count(DefectKind kind) const { return counts[static_cast<std::size_t>(kind)]; }

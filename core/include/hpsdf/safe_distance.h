@@ -27,8 +27,8 @@ Field withBounds(const Field& field, const DistanceFunction& distance, int threa
 std::optional<CellBound> boundAt(const Field& field, const Vector3& x);
 
 /// Returns a distance from x within which the surface certainly does not lie: |f| less the bound of the error, and at
-/// least 0. For x outside the domain, it is that of the domain's closest point less the distance to this point. Throws
-/// `Error` if the field has no bounds.
+/// least 0. For x outside the domain, it is the safe distance of the domain's closest point less the distance to that
+/// point. Throws `Error` if the field has no bounds.
 double safeDistance(const Field& field, const Vector3& x);
 
 /// The result of tracing a ray by safe distances.

@@ -75,16 +75,16 @@ struct WorstPoint {
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points
-  double near = 0;                    ///< distance of near points; 0: a hundredth of the surface's longest side
+  double near = 0;                    ///< greatest distance of near points; 0: 1 % of the surface's longest side
   double band = 0;                    ///< greatest |Φ| of samples; 0: samples of the whole domain
   double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near points
-  std::size_t worst = 10;             ///< number of worst points, each of another cell
+  std::size_t worst = 10;             ///< number of worst points, each in a different cell
   std::size_t anglePoints = 100'000;  ///< number of samples at which the directions of gradients are compared
   int threads = 0;                    ///< greatest number of threads; 0: all that the machine offers
 };
 
 struct Verification {
-  double near = 0;                     ///< distance of near points that was used
+  double near = 0;                     ///< the `VerifyOptions::near` that was used
   SampleFigures uniform;               ///< figures over points that are uniform in the domain or the band
   SampleFigures nearSurface;           ///< figures over points near the surface
   std::optional<BoundFigures> bounds;  ///< figures over all points; empty if the field has no bounds
@@ -95,7 +95,7 @@ struct Verification {
 struct VerifiedSurface {
   const DistanceFunction& distance;                       ///< Φ
   std::function<Vector3(const Vector3&, double)> normal;  ///< returns ∇Φ from x and Φ(x); zero where it is unknown
-  const TriangleMesh& mesh;                               ///< surface of the near points, in the field's units
+  const TriangleMesh& mesh;                               ///< surface near which points are drawn, in the field's units
 };
 
 /// Measures |f − Φ| at samples. The result does not depend on `threads` (0: all that the machine offers).

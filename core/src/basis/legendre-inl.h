@@ -3,7 +3,8 @@
 // code include it there again.
 
 /// values[i] = L_i(t) for i = 0..degree, by the three-term recurrence (Koschier et al. 2016, eq. 4) in the form
-/// L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1), whose only division is tabulated: it would take most of the time.
+/// L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1). The ratios i/(i+1) are tabulated, because divisions would take most
+/// of the time.
 template <typename Number>
 inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* values) {
   values[0] = Number(1);

@@ -9,7 +9,7 @@
 
 namespace hpsdf::basis {
 
-/// The ratios i/(i+1) of the recurrence, up to the highest degree that a quadrature rule needs.
+/// Number of tabulated ratios i/(i+1) of the recurrence: enough for the highest degree that a quadrature rule needs.
 constexpr int kMostLegendre = 256;
 constexpr auto kLegendreRatio = [] {
   std::array<double, kMostLegendre> ratio{};

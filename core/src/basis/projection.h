@@ -77,7 +77,7 @@ std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int
 /// the degree keeps the lower coefficients (Koschier et al. 2016, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
 
-/// The coefficients of total degree `to` at most, out of those of `degree`.
+/// Returns the coefficients of total degree at most `to`, out of those of `degree`.
 std::vector<double> truncated(std::span<const double> coefficients, int degree, int to);
 
 /// The matrices that join the projections of an interval's lower [0] and upper [1] half into the projection of the

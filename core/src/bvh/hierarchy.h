@@ -92,7 +92,7 @@ class Hierarchy {
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// The triangle with a reference: number `triangleRef % kWidth` of block `triangleRef / kWidth`.
+  /// Returns the triangle with this reference: number `triangleRef % kWidth` of block `triangleRef / kWidth`.
   const TriangleFrame& frameAt(std::uint32_t triangleRef) const { return frames_[slotAt(triangleRef)]; }
 
   std::span<const Node> nodes() const { return nodes_; }
@@ -110,7 +110,7 @@ class Hierarchy {
 
   std::size_t bytes() const;
 
-  /// Local coordinates of x: those of nodes and blocks.
+  /// Converts x to the local coordinates in which nodes and blocks are stored.
   Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
   double scale() const { return scale_; }
 

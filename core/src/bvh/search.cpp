@@ -70,8 +70,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   const auto fromB = p - length, rightAlong = apexAlong - length;
   const auto right = unit(hn::MulAdd(fromB, rightAlong, q * apexAcross) * field(Block::inverseRight));
   const auto rightP = hn::NegMulAdd(right, rightAlong, fromB), rightQ = hn::NegMulAdd(right, apexAcross, q);
-  // Rounding may put a point beyond a sharp corner on the inner side of both edges there. A point whose projection also
-  // falls within the base is inside up to rounding.
+  // By rounding, a point beyond a sharp corner may seem to lie on the inner side of both edges there. If its
+  // projection also falls within the base, it is inside up to rounding.
   const auto inside = hn::And(hn::And(q > zero, base == zero),
                               hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
   const auto side = hn::Min(hn::MulAdd(base, base, q * q), hn::Min(hn::MulAdd(leftP, leftP, leftQ * leftQ),
@@ -83,7 +83,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   return {squared - rounding, squared + rounding};
 }
 
-/// (√upper + δ)²: a triangle or box with a greater lower bound is farther than a triangle with this upper bound.
+/// Returns (√upper + δ)²: a triangle or box with a greater lower bound is farther away than a triangle with this
+/// upper bound.
 template <class D>
 HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   const auto distance = hn::Sqrt(upper) + hn::Set(d, delta);
@@ -207,7 +208,7 @@ class Stack {
   bool empty() const { return top_ == 0; }
   const Entry& pop() { return entries_[--top_]; }
 
-  /// Space for four entries above the top. The caller fills it and keeps the first `count` of them by `grow(count)`.
+  /// Returns space for four entries above the top. The caller fills it, and keeps its first entries by `grow(count)`.
   Entry* room() { return entries_.data() + top_; }
   void grow(int count) { top_ += count; }
 

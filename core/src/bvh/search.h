@@ -15,11 +15,12 @@ namespace hpsdf::bvh {
 /// local coordinates and squared.
 template <int Lanes>
 struct Search {
-  static constexpr int kCapacity = 96;  ///< most candidates that wait for `settle`
+  static constexpr int kCapacity = 96;  ///< greatest number of candidates that wait for `settle`
 
   Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
-  /// Visits the block of a triangle that is probably near before all others: a tight bound from the start.
+  /// Adds the block of a triangle that is probably near to those visited first, which gives a tight bound from the
+  /// start.
   void addSeed(std::uint32_t triangleRef);
 
   /// The nearest triangle of the point in a lane, once `run` has finished.

@@ -17,7 +17,7 @@ constexpr float kNarrowest = 1e-30f;  ///< smallest extent of centers that bins 
 /// each further level at least halves a range of at most 2^32 triangles.
 constexpr int kMaxLevel = 32;
 
-constexpr std::uint32_t kSamples = 1024;                              ///< triangles of a range that choose the split
+constexpr std::uint32_t kSamples = 1024;                              ///< triangles by which a range's split is chosen
 constexpr float kEmptyCost = std::numeric_limits<float>::infinity();  ///< cost of a part without triangles
 constexpr std::uint32_t kParallel = 4096;  ///< triangles above which the children are built in parallel
 

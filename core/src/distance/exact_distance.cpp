@@ -44,10 +44,11 @@ using sign::Pseudonormals;
 using sign::WindingSign;
 
 constexpr int kLattice = 16;  // points along each axis
-/// Distance, for coordinates of order 1, of two triangles to which the distances from a point may round to the same.
+/// Triangles nearer to each other than this, in coordinates of order 1, may have the same rounded distance from a
+/// point.
 constexpr double kTooNear = 0x1p-44;
-/// Least length of a pseudonormal. At an edge it is the angle between the two faces. The dot product that decides the
-/// sign beside such an edge is half the square of the angle, which has to be far above rounding errors.
+/// Least length of a pseudonormal. At a sharp edge this length is the angle between the two faces. The dot product
+/// that decides the sign near the edge is half the square of the angle, which has to be far above rounding errors.
 constexpr double kSharp = 1e-6;
 
 /// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the box, which may be
@@ -65,7 +66,8 @@ bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   return any;
 }
 
-/// Returns the slot of the largest triangle of each component that is connected by edges of two consistent triangles.
+/// Returns the slot of the largest triangle of each component. Two triangles are connected if only they share an edge
+/// and are consistently oriented there.
 std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
                                                const std::vector<mesh::DirectedEdge>& sides) {
   const auto frames = hierarchy.frames();
@@ -74,7 +76,7 @@ std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
     if (edge.size() == 2 && edge[0].rising != edge[1].rising) components.join(edge[0].face, edge[1].face);
   });
   const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
-  std::vector<std::uint32_t> largest(frames.size());  // by the lowest slot of the component, which comes first
+  std::vector<std::uint32_t> largest(frames.size());  // by the component's lowest slot, which is visited first
   for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
     const std::uint32_t first = components.first(slot);
     if (first == slot || area(slot) > area(largest[first])) largest[first] = slot;
@@ -108,8 +110,8 @@ bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint
 /// It is certain (Bærentzen & Aanæs 2005) if
 /// * every edge is balanced, so that the mesh has no holes;
 /// * the mesh neither intersects itself nor comes so near itself that distances to two triangles may round to the same;
-/// * each component, connected by edges of two consistent triangles, has the outside in front and the inside behind it,
-///   which one triangle tells for all of it;
+/// * each component has the outside in front of it and the inside behind it. Its triangles are connected by edges of
+///   two consistent triangles, so that one of them decides for the whole component;
 /// * no edge or vertex is so sharp that its pseudonormal is dominated by rounding errors.
 ///
 /// Throws `Cancelled`.
@@ -134,7 +136,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     return byWinding(std::move(reason), std::nullopt, std::move(winding));
   }
 
-  // Rounding errors, and surfaces nearer than these, would make pseudonormals those of another surface.
+  // Rounding errors, or surfaces closer to each other than rounding errors, could yield another surface's
+  // pseudonormals.
   const auto thin = std::ranges::find_if_not(frames, bvh::hasArea);
   if (thin != frames.end())
     return byWinding("a face is thinner than the rounding errors of its corners", thin->origin,
@@ -228,7 +231,7 @@ struct ExactDistance::Data {
   /// Computes distances to the nearest triangles of a hierarchy, with the signs of `resolve`.
   void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
     using bvh::kPacket;
-    std::array<bvh::Nearest, kPacket> nearest{};  // those of the previous packet bound the next search from its start
+    std::array<bvh::Nearest, kPacket> nearest{};  // the previous packet's results, which bound the next search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
       const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
       std::array<Vector3, kPacket> packet;
@@ -272,8 +275,8 @@ struct ExactDistance::Data {
                                                                 : Vector3::Zero();
   }
 
-  /// `difference` is x − closest. The caller computes it without rounding to `closest`, which is coarse far from the
-  /// origin.
+  /// `difference` is x − closest, computed by the caller without the rounding of `closest`, which is large far from
+  /// the origin.
   static ClosestPoint signedAt(const Vector3& closest, const Vector3& difference, const Vector3& normal,
                                std::uint32_t triangle, Feature feature) {
     const double length = difference.norm();

@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kSignsPerTask = 16;  // points of one parallel task
 
-/// Returns the random point with a number: even numbers lie in the box, odd ones beside a triangle.
+/// Returns the random point with this number. Points with even numbers lie in the box, those with odd ones near a
+/// triangle.
 Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
   if (number % 2 == 0) return random.inBox(box);
   const auto count = static_cast<double>(mesh.triangles.size());

@@ -28,7 +28,7 @@ struct Member {
       value = numbers[0] != 0;
     else if constexpr (std::is_same_v<T, double>)
       value = numbers.empty() ? 0 : numbers[0];
-    else  // by way of 64 bits, into which every number of a damaged file fits
+    else  // converts by way of 64 bits, which hold every number that a damaged file can contain
       value = static_cast<T>(static_cast<std::int64_t>(numbers[0]));
   }
 };
@@ -256,7 +256,7 @@ const std::vector<Row> kRows = {
      "Threads to use; 0 for all. The field is the same whatever their number."},
 };
 
-/// Does not compile when `BuildOptions` gets a member more. Then the table needs another row, and this list a name.
+/// Fails to compile when `BuildOptions` gets another member. Then add a row to the table, and a name to this list.
 [[maybe_unused]] void requireAllMembers(const BuildOptions& options) {
   [[maybe_unused]] const auto& [m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18, m19,
                                 m20, m21, m22, m23] = options;
@@ -267,7 +267,7 @@ std::string numberText(double number) {
   const auto end = std::to_chars(buffer.begin(), buffer.end(), number).ptr;
   std::string text(buffer.begin(), end);
   const std::size_t e = text.find('e');
-  if (e != std::string::npos && text[e + 2] == '0') text.erase(e + 2, 1);  // 1e-06
+  if (e != std::string::npos && text[e + 2] == '0') text.erase(e + 2, 1);  // shorten 1e-06 to 1e-6
   return text;
 }
 

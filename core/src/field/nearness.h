@@ -59,7 +59,7 @@ struct ErrorGoal {
   }
   /// The goal with all squares multiplied by a factor.
   ErrorGoal times(double factor) const { return {weighted * factor, nearSquare * factor, farSquare * factor}; }
-  /// The goal raised to the totals times a factor, where these are above it.
+  /// Returns the goal, raised to `factor` times the totals where that is greater.
   ErrorGoal relaxedTo(const ErrorTotals& totals, double factor) const {
     if (!byDistance()) return {std::max(weighted, totals.weighted * factor), 0, 0};
     const auto meanSquare = [](double squared, double volume) { return volume > 0 ? squared / volume : 0; };

@@ -35,7 +35,7 @@ struct Group {
 struct Groups {
   std::vector<Group> all;
   std::vector<std::uint32_t> groupOf;  ///< the group of each triangle
-  std::vector<DirectedEdge> edges;     ///< those of the representatives; `DirectedEdge::face` is the group
+  std::vector<DirectedEdge> edges;     ///< edges of the groups' representatives; `DirectedEdge::face` is the group
 };
 
 /// Groups triangles by their corners. The edges are left out where no two triangles have the same corners.
@@ -90,16 +90,17 @@ DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen
 /// one direction as in the other.
 int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
-/// Marks the groups that are shared walls. A connected set of groups with both orientations is one if other triangles
-/// surround it and balance its edges, counted once for each group or with all their duplicates.
+/// Marks the groups that are shared walls. A connected set of groups with both orientations is a wall if other
+/// triangles surround it and balance its edges, where these triangles count once for each group or with all their
+/// duplicates.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
   for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();
   DisjointSets sets = connectedSets(groups, both);
   struct Surroundings {
-    bool exist = false;                   // A group with one orientation has an edge in common with the set.
-    bool unbalanced = false;              // Some edge is unbalanced by one triangle of each such group.
-    bool unbalancedByDuplicates = false;  // Some edge is unbalanced by all triangles of such groups.
+    bool exist = false;                   // A group with one orientation shares an edge with the set.
+    bool unbalanced = false;              // Counted once each, these groups unbalance an edge.
+    bool unbalancedByDuplicates = false;  // Counted with duplicates, they unbalance an edge.
   };
   std::vector<Surroundings> surroundings(groups.all.size());
   forEachEdgeOf(groups, both, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
@@ -129,8 +130,8 @@ struct Kept {
   int excess() const { return same - reversed; }
 };
 
-/// Drops triangles of groups in `several` as long as that leaves fewer edges unbalanced, so that
-/// such sets shrink from their outline inwards.
+/// Drops triangles of groups in `several` as long as that reduces the number of unbalanced edges. Connected sets of
+/// such groups shrink from their outline inwards.
 void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& several, std::vector<Kept>& kept) {
   // Number the edges, and compute the balance of each.
   std::vector<int> balances;
@@ -166,9 +167,9 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
   }
 }
 
-/// The triangles of each group that stay: at least one, or one of each orientation in a wall. Connected groups with
-/// more triangles keep them all, except unbalancing duplicates, where more edges would be unbalanced otherwise: bodies
-/// share them.
+/// Returns the triangles of each group that stay: at least one, or one of each orientation in a wall. Connected
+/// groups keep all their triangles, except unbalancing duplicates, if dropping the others would leave more edges
+/// unbalanced: bodies then share these groups.
 std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
   // Find the groups with more triangles than necessary, and drop unbalancing duplicates from them.
   std::vector<char> several(groups.all.size());

@@ -14,7 +14,7 @@ namespace hpsdf::sign {
 namespace {
 
 constexpr std::uint32_t kFew = 512;      // fewer edges are always summed one by one
-constexpr std::uint32_t kSmallest = 8;   // clusters of so many edges are not halved
+constexpr std::uint32_t kSmallest = 8;   // clusters of at most so many edges are not halved
 constexpr double kCoarsestRatio = 0.25;  // greatest radius of a cluster over its distance
 
 double cube(double x) { return x * x * x; }
@@ -44,8 +44,8 @@ BoundaryEdges::BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<
   }
 }
 
-/// Adds a cluster of edges and, recursively, its halves: it divides the edges along the axis on which their midpoints
-/// extend farthest, recursively.
+/// Adds a cluster of edges and, recursively, its halves. It is divided along the axis on which the edges' midpoints
+/// extend farthest.
 void BoundaryEdges::addCluster(std::uint32_t begin, std::uint32_t end) {
   const std::size_t self = clusters_.size();
   clusters_.push_back(Cluster{.begin = begin, .end = end});
@@ -76,7 +76,7 @@ void BoundaryEdges::Cluster::add(const Edge& edge) {
   const double edgeLength = along.norm();
   radius = std::max({radius, a.norm(), b.norm()});
   length += edgeLength;
-  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // the mean of a convex function is at most its ends'
+  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // convexity: mean ≤ mean of both ends
   first += along;
   second += sum / 2 * along.transpose();
   const Eigen::Matrix3d spread = (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 6;

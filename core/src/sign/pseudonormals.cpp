@@ -46,8 +46,8 @@ class VertexVisitor {
         vertices_(hierarchy.vertices()),
         nextSide_(nextSide) {}
 
-  /// Returns the vertex's pseudonormal from all its `corners`, and links the sides between it and vertices of at least
-  /// its own index.
+  /// Returns the vertex's pseudonormal, computed from all its `corners`. Links the sides that run between this vertex
+  /// and vertices whose index is not lower.
   Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
     sides_.clear();
     numbers_.clear();
@@ -86,7 +86,8 @@ class VertexVisitor {
   std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
-  /// Other vertex in the high half, index in numbers_ in the low half: sorting groups sides by edge.
+  /// Keys that group sides by edge when sorted: the other vertex in the high half, the index into numbers_ in the low
+  /// half.
   std::vector<std::uint64_t> sides_;
   std::vector<std::uint32_t> numbers_;  ///< side numbers 3·slot + k
 };

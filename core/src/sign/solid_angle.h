@@ -22,7 +22,7 @@ class AngleSum {
     if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
     const bool addsHalfTurn = y == 0 && x < 0;
     if (addsHalfTurn && (imaginary_ > 0 || (imaginary_ == 0 && real_ < 0))) ++turns_;
-    // Long products would overflow or underflow: only their angle is of interest.
+    // The product is rescaled, because long products would overflow or underflow; only the angle is of interest.
     const double size = std::abs(real) + std::abs(imaginary);
     const double scale = size < 1e-100 ? 1e100 : size > 1e100 ? 1e-100 : 1;
     real_ = scale * real;

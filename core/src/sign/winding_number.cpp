@@ -89,7 +89,7 @@ void WindingNumber::Moments::add(const std::array<Vector3, 3>& v) {
     radius = std::max(radius, distance);
     cubes += distance * distance * distance;
   }
-  area += normal.norm() * cubes / 3;  // the mean of a convex function is at most that of its corners
+  area += normal.norm() * cubes / 3;  // a convex function's mean is at most that of its corner values
   const Eigen::Matrix3d spread =
       (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
   first += normal;

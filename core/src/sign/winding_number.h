@@ -60,10 +60,10 @@ class WindingNumber {
   std::size_t bytes() const;
 
  private:
-  /// A run of triangles, and the distance from which on its Taylor series replaces it.
+  /// A run of triangles, and the distance beyond which a Taylor series replaces the sum over them.
   struct Cluster {
     Vector3 center = Vector3::Zero();                     ///< in the hierarchy's local coordinates
-    std::array<double, kLevels> squaredFarDistance = {};  ///< from the center, for each accuracy level
+    std::array<double, kLevels> squaredFarDistance = {};  ///< distances from the center, by accuracy level
     std::uint32_t next = 0;                               ///< index of the first cluster that is not a part of this one
     std::uint32_t begin = 0, end = 0;                     ///< range of triangle slots
   };

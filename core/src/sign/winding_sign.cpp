@@ -11,12 +11,12 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::size_t kBatch = 512;  // points that are signed from each other's winding numbers
+constexpr std::size_t kBatch = 512;  // number of points whose signs may follow from each other's winding numbers
 /// Error of the winding number from which the distance to a hole's closing surface is computed. A greater error would
 /// be noise, which refinement of the field would pursue.
 constexpr double kExact = 2e-3;
-/// Errors of the gradient, as change of the winding number over the distance to the triangles: the first mostly shows
-/// that no closing surface is nearer, the second adds little to the noise of `kExact`.
+/// Tolerated errors of the gradient, as the change of the winding number over the distance to the triangles. The
+/// first usually suffices to show that no closing surface is nearer; the second adds little to the noise of `kExact`.
 constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
 
 /// Returns the indices of the distances, the greatest first; those that are not finite come last.
@@ -38,7 +38,7 @@ double probeDistance(const Box& box) {
 /// The side of a point, and bounds from which the sides of its neighbours follow.
 struct WindingSign::Sample {
   Vector3 position;
-  double clearance;  ///< no triangle is nearer
+  double clearance;  ///< lower bound of the distance to the triangles
   double distance;   ///< distance to the surface, including the surfaces that close holes
   bool inside;
   double margin = 0;        ///< lower bound of |w − level|
@@ -46,14 +46,15 @@ struct WindingSign::Sample {
   double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
   double edgeDistance = 0;  ///< lower bound of the distance to the boundary edges, at least `clearance`
 
-  /// Returns the sample that follows for a point x with known distances; of unknown margin where x is too far away.
+  /// Returns the sample that follows from this one for a point x with known distances. Its margin is 0, which means
+  /// unknown, if x is too far away.
   Sample movedTo(const Vector3& x, double itsClearance, double itsDistance) const {
     const double squaredStep = (x - position).squaredNorm();
     if (!(squaredStep < 0.998 * clearance * clearance)) return {x, itsClearance, itsDistance, inside};
     return movedBy(std::sqrt(squaredStep), x, itsClearance, itsDistance);
   }
 
-  /// Returns true if all points within `radius` that no triangle separates from this one are on its side.
+  /// Returns true if all points within `radius` that no triangle separates from this point are on the same side as it.
   bool holdsWithin(double radius) const {
     return radius < edgeDistance && movedBy(radius, position, 0, radius).margin > 0;
   }
@@ -62,8 +63,8 @@ struct WindingSign::Sample {
   bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
 
  private:
-  /// After a step s every boundary edge is at least 1 − s/edgeDistance times as far away. The bound of the derivative
-  /// grows at most with the inverse cube of that.
+  /// After a step of length s every boundary edge is at least 1 − s/edgeDistance times as far away as before. The
+  /// bound of the derivative grows at most with the inverse cube of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
     const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;

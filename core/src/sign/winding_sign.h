@@ -20,19 +20,19 @@ class WindingSign {
  public:
   WindingSign() = default;
 
-  /// Keeps a pointer to the hierarchy, which must neither move nor end before this object. A closed mesh that is
-  /// oriented inward has its inside all around it. `edges` are those of the hierarchy.
+  /// Keeps a pointer to the hierarchy, which must neither move nor end before this object. If a closed mesh is
+  /// oriented inward, the space all around it counts as inside. `edges` are those of the hierarchy.
   WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, BoundaryEdges edges);
 
-  /// Replaces unsigned distances to the triangles by signed distances. It needs the fewer winding numbers the closer
-  /// the points lie. The result of a point does not depend on the other points.
+  /// Replaces unsigned distances to the triangles by signed distances. The closer the points are to each other, the
+  /// fewer winding numbers are computed. The result of a point does not depend on the other points.
   void applyTo(std::span<double> distances, std::span<const Vector3> points) const {
     applyTo(distances, points, distances);
   }
 
-  /// Does so for a mesh some of whose triangles do not count as surface. `distances` are those to the nearest triangle
-  /// that counts, `clearances` those to the nearest triangle of all. Outside, the result is the clearance, because
-  /// triangles with the inside on both sides lie behind others.
+  /// Does the same for a mesh in which some triangles do not count as surface. `distances` are those to the nearest
+  /// triangle that counts, `clearances` those to the nearest of all triangles. Outside, the result is the clearance,
+  /// because triangles with the inside on both sides lie behind others.
   void applyTo(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances) const;
 
   /// Returns true if the triangle in a slot has the outside in front of its centroid and the inside behind it. Compares

@@ -267,7 +267,7 @@ class Finder {
   const bvh::Hierarchy& hierarchy_;
   double margin_;
   std::vector<Vector3> vertices_;         ///< the hierarchy's vertices, scaled to order 1
-  double unit_;                           ///< factor from these to mesh units
+  double unit_;                           ///< factor from `vertices_` to mesh units
   std::vector<std::vector<Box>> levels_;  ///< boxes of the triangles by slot, of four of them, of sixteen, …
 };
 

@@ -63,10 +63,10 @@ struct RadialFace {
   std::uint32_t patch;
 };
 
-/// Sorts faces counterclockwise, as seen with the edge pointing to the viewer. Coplanar faces get the same angle; those
-/// that end a solid precede those that begin one. Coincident faces of one orientation are sorted by patch, so that
-/// solids are matched with the same patches at all edges of a shared wall. `begins` is `rising` of the faces that begin
-/// a solid.
+/// Sorts faces counterclockwise, as seen with the edge pointing to the viewer. Coplanar faces get the same angle;
+/// those that end a solid precede those that begin one. Coincident faces of one orientation are sorted by patch, so
+/// that solids are matched with the same patches at all edges of a shared wall. A face begins a solid if its `rising`
+/// equals `begins`.
 void sortAround(std::vector<RadialFace>& faces, bool begins) {
   std::ranges::sort(faces, {}, &RadialFace::angle);
   const auto before = [begins](const RadialFace& a, const RadialFace& b) {
@@ -107,7 +107,7 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 using Wedge = std::array<RadialFace, 2>;
 
 /// Matches each face that begins a solid with the face that ends it, as parentheses are matched, in two passes around
-/// the edge. There are as many of either.
+/// the edge. As many faces begin a solid as end one.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;
@@ -129,9 +129,9 @@ bool anyIsFlat(const std::vector<Wedge>& wedges) {
   return std::ranges::any_of(wedges, [](const Wedge& wedge) { return wedge[0].angle == wedge[1].angle; });
 }
 
-/// Joins patches that have solid material between them at an edge. Coplanar faces would make a flat body where touching
-/// solids are all oriented inward: then solid and empty are exchanged. If that leads to a flat body too, all patches at
-/// the edge are joined.
+/// Joins patches that have solid material between them at an edge. If coplanar faces would form a flat body, touching
+/// solids may all be oriented inward: then solid and empty are exchanged. If that leads to a flat body too, all
+/// patches at the edge are joined.
 void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies) {
   std::vector<Wedge> wedges = wedgesOf(faces, false);
   if (anyIsFlat(wedges)) wedges = wedgesOf(faces, true);
@@ -232,7 +232,7 @@ void reverseBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
       for (const std::uint32_t f : body.faces) reverse(mesh, f);
 }
 
-/// The winding number of the solid ones of some bodies.
+/// Evaluates the winding number of those bodies of a list that are solid.
 class BodyWinding {
  public:
   BodyWinding(const TriangleMesh& mesh, std::span<const Body> bodies)
@@ -292,8 +292,8 @@ std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, do
 
 enum class Orientation { undecided, outward, inward };
 
-/// Returns the orientation of a body that the winding numbers of the mesh as imported show: step 4 of `repaired`.
-/// `byVolume` is the orientation by the body's own volume.
+/// Returns the orientation of a body that follows from the winding numbers of the imported mesh, by step 4 of
+/// `repaired`. `byVolume` is the orientation by the body's own volume.
 Orientation importedOrientation(const BodyWinding& imported, const std::vector<Vector3>& before,
                                 const std::vector<Vector3>& behind, Orientation byVolume) {
   std::ptrdiff_t outward = 0, inward = 0, left = std::ssize(before), all = left;

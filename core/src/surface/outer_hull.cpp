@@ -22,16 +22,17 @@
 namespace hpsdf::surface {
 namespace {
 
-/// Length of the smallest pieces over the mesh's longest side. It doubles from the first value, up to the second, while
-/// there are too many pieces.
+/// Length of the smallest pieces divided by the mesh's longest side. It starts at `kFinest` and doubles, up to
+/// `kCoarsest`, as long as there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
-/// Factor of that length for pieces that are uncertain only because of holes, which do not merit as many pieces.
+/// Factor by which the smallest pieces are longer if they are uncertain only because of holes, which do not merit as
+/// many pieces.
 constexpr double kCoarserBesideHoles = 8;
 constexpr std::size_t kMostPairs = 2'000'000;
 constexpr std::size_t kMostPieces = 250'000;  // in addition to the mesh's triangles
 
 enum class PieceKind : char {
-  surface,      ///< a side is outside
+  surface,      ///< at least one side is outside
   inner,        ///< both sides are inside
   undecided,    ///< no triangle intersects it, and its sides are unknown
   intersected,  ///< other triangles intersect it, and it is too small to subdivide
@@ -50,7 +51,8 @@ struct Cutter {
   std::uint32_t triangle;
   Corners corners;
   bool isCoplanar;  ///< true if both triangles lie in one plane
-  /// The edges of a coplanar cutter that can cut: only where no neighbour continues the plane, the sides change.
+  /// Marks the edges of a coplanar cutter that can cut. Where a neighbour continues the plane across an edge, inside
+  /// and outside do not change there.
   std::array<bool, 3> counts = {true, true, true};
 };
 
@@ -124,7 +126,7 @@ class Subdivider {
 
   double finest_;
   const Progress& progress_;
-  std::atomic<std::size_t> added_ = 0;  ///< number of pieces, less that of the triangles
+  std::atomic<std::size_t> added_ = 0;  ///< number of pieces less the number of triangles
 };
 
 using Pair = std::array<std::uint32_t, 2>;
@@ -193,7 +195,7 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
     ignoreInnerEdges(mesh, pairs, cutters);
     subdivider.subdivide({corners, t, true}, cutters, parts[n]);
   });
-  // Merge them with the triangles that none intersects.
+  // Merge the pieces with the triangles that no other triangle intersects.
   std::vector<Piece> pieces;
   auto next = parts.begin();
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -260,7 +262,7 @@ struct SideProbe {
   }
 };
 
-/// Returns all pieces with their kinds; undecided ones remain beside holes only. Nothing if there are too many.
+/// Returns all pieces with their kinds, or nothing if there are too many. Pieces remain undecided only near holes.
 std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, double scale,
                                                    const std::vector<Pair>& pairs, const sign::WindingSign& winding,
                                                    double finest, const Progress& progress) {
@@ -271,7 +273,7 @@ std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, dou
   try {
     std::vector<Piece> pieces = subdivideTriangles(mesh, scale, pairs, subdivider);
     probe.classify(pieces, progress, task);
-    // Refine what is undecided, because the winding number varies along a piece beside holes.
+    // Refine undecided pieces: near holes the winding number varies along a piece.
     for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
         if (pieces[i].kind == PieceKind::undecided && subdivider.canSubdivide(pieces[i].corners, kCoarserBesideHoles))

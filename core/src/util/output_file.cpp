@@ -49,7 +49,8 @@ std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   return name;
 }
 
-/// The target of a symbolic link, so that the rename replaces the target and keeps the link; other files stay.
+/// Returns the target of a symbolic link, so that the rename replaces the target and keeps the link. Other files are
+/// returned as they are.
 std::filesystem::path resolved(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_symlink(file, ignored)) return file;

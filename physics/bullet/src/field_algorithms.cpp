@@ -15,7 +15,7 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kMostContacts = SphereMinima::kMost;  // of two bodies, in three of Bullet's manifolds
+constexpr std::size_t kMostContacts = SphereMinima::kMost;  // of two bodies; they fill three of Bullet's manifolds
 constexpr int kNodes = 256;                                 // number of a soft body's nodes that one task handles
 constexpr int kPieces = 64;                                 // greatest number of points sampled on a node's path
 
@@ -34,8 +34,8 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// The first sampled point of a node's path in a step whose distance from the field's body is less than `near`, or the
-/// path's end if there is none. Nodes therefore do not pass through thin bodies.
+/// The first sampled point of a node's path in one step whose distance from the field's body is less than `near`,
+/// or the path's end if there is none. Sampling the path keeps nodes from passing through thin bodies.
 Vector3 firstContact(const Field& field, const Vector3& from, const Vector3& to, double near) {
   // A path whose length is NaN or too great has the greatest number of pieces.
   const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;
@@ -163,7 +163,7 @@ void RigidFieldAlgorithm::withPlane(const btCollisionObject& field, const btColl
 }
 
 void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
-  // Bullet's order of the bodies may differ from that at the algorithm's creation: take the current one.
+  // Bullet may have changed the order of the bodies since the algorithm was created, so the current order is taken.
   const btCollisionObject* one = first.getCollisionObject();
   const btCollisionObject* other = second.getCollisionObject();
 
@@ -192,7 +192,7 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
     const auto nearest = std::ranges::min_element(
         previous_, {}, [&](const btManifoldPoint& old) { return old.m_localPointB.distance2(point.m_localPointB); });
     if (nearest != previous_.end() && nearest->m_localPointB.distance2(point.m_localPointB) < near * near) {
-      point.m_appliedImpulse = nearest->m_appliedImpulse;  // Bullet does not reuse impulses of friction
+      point.m_appliedImpulse = nearest->m_appliedImpulse;  // Bullet does not reuse friction impulses
       previous_.erase(nearest);
     }
     manifolds_[i / 4]->addManifoldPoint(point);
@@ -215,7 +215,7 @@ struct SoftFieldAlgorithm::Pair {
   const btSoftBody& soft;
   const FieldShape& shape;
   Eigen::Isometry3d worldFromField, fieldFromWorld;
-  double margin;  ///< distance within which nodes touch
+  double margin;  ///< distance within which nodes count as touching
   double near;    ///< distance at which a node's path ends
 };
 
@@ -223,13 +223,13 @@ struct SoftFieldAlgorithm::Pair {
 struct SoftFieldAlgorithm::Candidates {
   std::size_t count = 0;
   std::array<int, kNodes> nodes;
-  std::array<Vector3, kNodes> starts, ends;  ///< of their paths
+  std::array<Vector3, kNodes> starts, ends;  ///< starts and ends of the nodes' paths
   std::array<Vector3, kNodes> at;            ///< point of contact, if they touch
 };
 
 void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) {
   const btCollisionObject& object = fieldOf(first) != nullptr ? first : second;
-  if (fieldOf(object) == nullptr) return;  // parts of compound shapes do not collide
+  if (fieldOf(object) == nullptr) return;  // skips parts of compound shapes
   const Pair pair(*btSoftBody::upcast(&object == &first ? &second : &first), object);
   const int count = pair.soft.m_nodes.size();
   if (int(outside_.size()) != count) {
@@ -252,7 +252,7 @@ SoftFieldAlgorithm::Candidates SoftFieldAlgorithm::candidates(const Pair& pair, 
   Candidates found;
   for (int node = begin; node < end; ++node) {
     const Vector3 from = pair.startOf(node), to = pair.endOf(node);
-    if (!from.allFinite() || !to.allFinite()) continue;  // the world reports the body at the end of the step
+    if (!from.allFinite() || !to.allFinite()) continue;  // the world reports this error at the end of the step
     Vector3& outside = outside_[std::size_t(node)];
     if ((to - outside).norm() > kPieces * pair.near) outside = from;
     if (pair.soft.m_nodes[node].m_battach != 0 || field.lowerBound(to) > pair.margin + (to - outside).norm()) {
@@ -316,8 +316,8 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       const btVector3 arm = node.m_x - transform.getOrigin();
       const btVector3 bodyMotion = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
       if (height > contact.m_cti.m_normal.dot(bodyMotion)) continue;
-      // The solver cancels the motion towards the surface since m_q. Move m_q onto the surface, so that this motion is
-      // exactly the penetration, and the correction adds no velocity.
+      // The solver cancels the node's motion towards the surface, measured from the position m_q. With m_q on the
+      // surface this motion is exactly the penetration, and the correction adds no velocity.
       node.m_q -= (contact.m_cti.m_normal.dot(node.m_q) + contact.m_cti.m_offset) * contact.m_cti.m_normal;
       const btVector3 relative = node.m_x - node.m_q - bodyMotion;
       const btScalar along = relative.dot(contact.m_cti.m_normal);

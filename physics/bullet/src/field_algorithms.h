@@ -74,7 +74,7 @@ class RigidFieldAlgorithm final : public FieldAlgorithm {
 
   ContactQuery query_;
   std::vector<BodyContact> contacts_;
-  SphereMinima minima_;  ///< of the sphere, if one of the bodies is a sphere
+  SphereMinima minima_;  ///< minima of the sphere, if one of the bodies is a sphere
   double size_ = 0;      ///< radius of the smaller body's bounding sphere
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btManifoldPoint> previous_;  ///< the contacts of the previous step
@@ -91,7 +91,7 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
   struct Touching {
     int node;
     Vector3 normal;   ///< unit normal of the contact plane, in the world
-    double distance;  ///< of the node from the contact plane at the end of the step
+    double distance;  ///< distance of the node from the contact plane at the end of the step
     double depth;     ///< penetration at the start of the step
   };
   struct Pair;

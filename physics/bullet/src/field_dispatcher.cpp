@@ -36,7 +36,7 @@ class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
 };
 
 struct FieldDispatcher::Algorithms {
-  /// A pair whose contacts are found before Bullet asks for them.
+  /// A pair of bodies whose contacts are found before Bullet asks for them.
   struct Prepared {
     FieldAlgorithm* algorithm;
     const btCollisionObject *first, *second;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kDirections = 128;  // number of points at which a search samples the sphere
 constexpr std::size_t kStarts = 24;       // greatest number of descents
 constexpr int kRounds = 4;                // steps of each descent
-// Directions with a greater cosine of their angle are one: at the start, and at the end of the descents.
+// Directions count as the same if the cosine of their angle is greater: at the start, and after the descents.
 constexpr double kSameStart = 0.93, kSameMinimum = 0.97;
 
 /// Directions along a spiral that cover the sphere evenly: every direction is within about 0.2 radians of one of them.
@@ -62,7 +62,8 @@ void keepLowest(std::size_t most, double sameCosine, std::vector<SphereMinimum>&
   minima.resize(kept);
 }
 
-/// Moves each point by one step of gradient descent. The next step has the length of Barzilai and Borwein (1988).
+/// Moves each point by one step of gradient descent, and sets the length of the next step as Barzilai and Borwein
+/// (1988) do.
 void descend(const Field& field, const Vector3& center, double radius, std::span<SphereMinimum> minima) {
   std::array<SphereMinimum, kStarts> tried;
   const std::span<SphereMinimum> next{tried.data(), minima.size()};

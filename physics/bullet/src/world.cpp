@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr double kFarthest = 1e6;  // units in one step; Bullet silently leaves bodies that move farther where they were
+constexpr double kFarthest = 1e6;  // units per step; Bullet silently skips longer motions
 
 bool finite(const btVector3& v) { return std::isfinite(v.x() + v.y() + v.z()); }
 bool isPossible(const btVector3& velocity, double step) { return velocity.length() * step < kFarthest; }

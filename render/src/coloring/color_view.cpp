@@ -125,7 +125,8 @@ class CellOutlines {
     return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
   }
 
-  // Tells if a plane ends at these two samples because something nearer covers it: that is no edge of a cell.
+  // Tells if a plane ends between these two samples because something nearer covers it. Such an end is no edge of a
+  // cell.
   bool hidden(std::size_t i, std::size_t j) const {
     if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
     const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
@@ -141,7 +142,7 @@ class CellOutlines {
   std::unordered_map<std::uint32_t, float> strengths_;
 };
 
-// Slopes and zero lines of the values in a slice, or on a plane before a camera.
+// Slopes and zero lines of the values in a slice, or on a plane in front of a camera.
 class Contours {
  public:
   /// The zero line is where the value equals `zero`.
@@ -170,7 +171,7 @@ class Contours {
  private:
   std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
 
-  // Prefers differences within the cell, because a jump at a face is no slope.
+  // Prefers differences within one cell, because a jump at a face is not a slope.
   double derivative(std::size_t i, std::size_t step, bool hasBefore, bool hasAfter) const {
     const auto& cell = buffers_.cell;
     const auto& value = buffers_.value;

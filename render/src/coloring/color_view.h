@@ -1,6 +1,6 @@
 #pragma once
-// From the buffers of a view to the colours of its pixels. Only the buffers are read, so that the views of OpenGL and
-// of the oracle are coloured alike.
+// From the buffers of a view to the colours of its pixels. Only the buffers are read, so that views from OpenGL
+// and from the reference renderer are coloured alike.
 
 #include <functional>
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace hpsdf::render {
 
-/// The buffers hold samples × samples points a pixel, whose colours are averaged in linear light.
+/// The buffers hold samples × samples points for each pixel. Their colours are averaged in linear light.
 struct Sampling {
   int samples = 1;
   double lineWidth = 1;   ///< width of thin lines, pixels of the finished picture
@@ -33,10 +33,10 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 /// Colours the distances of a slice with the diverging map, with iso-lines and a bold zero line.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// Colours a lit surface before the backdrop. Surface and boxes have one material where `color` is empty, else that
-/// colour with soft shading. Sections and planes are unlit, with the outlines of their cells; on a plane the surface
-/// f = offset is a line. `lines` is how strongly lines along cells cover each sample (0 to 1), or empty. `bodies` are
-/// the materials of the bodies in the buffers.
+/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have one material, else
+/// the given colours with soft shading. Sections and planes are unlit, with the outlines of their cells; on a
+/// plane the surface f = offset is a line. `lines` is empty, or holds for each sample how strongly the lines along
+/// cells cover it (0 to 1). `bodies` are the materials of the bodies in the buffers.
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
                    double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
 

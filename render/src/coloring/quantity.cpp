@@ -36,8 +36,8 @@ struct Weighted {
   double value, weight;
 };
 
-/// The least and the greatest value above 0, without the lowest hundredth and the highest thousandth by weight: because
-/// of a few outliers all else would have one colour.
+/// The least and the greatest value above 0, without the lowest hundredth and the highest thousandth by weight:
+/// with a few outliers included, everything else would have one colour.
 std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
   if (values.empty()) return {0, 0};
@@ -60,7 +60,7 @@ std::vector<Weighted> weighted(const Field& field, const std::vector<double>& of
   return values;
 }
 
-/// Picks at most some million samples at even intervals, which represent all of them.
+/// Picks at most a million samples at even intervals, which represent all of them.
 std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
   constexpr std::size_t kMost = 1'000'000;
   std::vector<Weighted> values;

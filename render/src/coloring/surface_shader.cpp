@@ -42,15 +42,15 @@ class CameraFrame {
     return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
   }
 
-  /// The normal that a sample shows. A normal that jumps of the field turn away from the eye is replaced by the nearest
-  /// one perpendicular to the ray; otherwise single dark samples speckle the silhouettes.
+  /// The normal that a sample shows. At jumps of the field a normal may point away from the eye. It is replaced by
+  /// the nearest one perpendicular to the ray; otherwise single dark samples would speckle the silhouettes.
   Eigen::Vector3f normal(int x, int y, const Eigen::Vector3f& toEye) const {
     const Eigen::Vector3f n = axes_ * buffers_.normal[std::size_t(y) * buffers_.width + x];
     const float facing = n.dot(toEye);
     return facing >= 0 ? n : (n - facing * toEye).normalized();
   }
 
-  /// Height of the view at this depth before the eye.
+  /// Height of the view at this depth in front of the eye.
   float heightAt(float depth) const { return parallel_ ? 2 * halfHeight_ : 2 * halfHeight_ * depth; }
 
  private:
@@ -78,7 +78,7 @@ struct Lights {
   LinearColor sky = {0.26F, 0.29F, 0.34F};
   LinearColor ground = {0.10F, 0.08F, 0.07F};
 
-  /// Light on a matt surface with unit normal n, of which the share `open` of the ambient light arrives.
+  /// Light on a matt surface with unit normal n, at a point that the share `open` of the ambient light reaches.
   LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
     const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
     const LinearColor lamps =
@@ -121,7 +121,7 @@ class SurfaceShader {
       const LinearColor& material = materialAt(i);
       return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
     }
-    // Light colours by a quantity softly and with white light, so that they match the legend's.
+    // Colours that stand for a quantity are lit softly and with white light, so that they match those of the legend.
     const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
     return color_(i) * light * (0.35F + 0.65F * open) +
            LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
@@ -141,7 +141,7 @@ class SurfaceShader {
       const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
       const float distance = towards.norm();
       if (distance <= 0) continue;
-      // A distant thing in front of the point hides it from the eye but not from the light.
+      // Something far in front of the point hides it from the eye but not from the light.
       const float near = std::max(0.0F, 1 - distance / (3 * radius));
       occluded += near * std::max(0.0F, towards.dot(normal) / distance - float(kFlatRise));
     }

@@ -17,7 +17,7 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kEdgeTolerance = 1e-12;  // in barycentric coordinates, so that no ray passes between two triangles
+constexpr double kEdgeTolerance = 1e-12;  // barycentric tolerance, so that no ray passes between two triangles
 
 struct BodyRay {
   Vector3 start, direction;

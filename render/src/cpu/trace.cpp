@@ -59,9 +59,9 @@ Sample evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length from the point to the exit of the ray from the node's box, or from the box whose faces are `margin`
-/// node edges further inside. The length ends slightly behind the face, because a ray that runs along a face, on it up
-/// to rounding, would otherwise leave the box again at every step.
+/// World length from the point to where the ray leaves the node's box, or a box whose faces are `margin` node
+/// edges further inside. The length ends slightly behind the face. Otherwise a ray that runs along a face, and
+/// lies on it up to rounding, would leave the box again at every step.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -229,9 +229,9 @@ Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
   return std::ldexp(2.0, depth) * local.cwiseProduct(space_.grid).cwiseQuotient(space_.size);
 }
 
-/// The march of one ray to the first crossing of the offset, by steps that cannot pass one (docs/rendering.md,
-/// "Tracing"). Heights are f − offset, signed so that they are positive where the ray starts. The stages have the names
-/// of those in shaders/surface_march.frag.
+/// The march of one ray to the first crossing of the offset, by steps that cannot pass a crossing
+/// (docs/rendering.md, "Tracing"). Heights are f − offset, signed so that they are positive where the ray starts.
+/// The stages have the names of those in shaders/surface_march.frag.
 class TraceField::March {
  public:
   March(const TraceField& field, const Ray& ray, double offset)
@@ -271,7 +271,8 @@ class TraceField::March {
     return leaf.inBlendZone ? stepInBlendZone(leaf) : stepInLeaf(leaf);
   }
 
-  /// Passes a node whose range excludes the offset; a node on the other side of the surface is a hit on its face.
+  /// Steps past a node whose range excludes the offset. A node on the other side of the surface is a hit on its
+  /// face.
   std::optional<Hit> passNode(const CellPoint& at) {
     const double side = field_.bounds_[at.node].lo > offset_ ? 1 : -1;
     if (side_ == 0) side_ = side;
@@ -318,8 +319,8 @@ class TraceField::March {
     return std::nullopt;
   }
 
-  /// Steps where the leaf's polynomial is the field. Its height sags below its chord by at most curve · length² / 8,
-  /// and is monotone where it falls by more than curve · length² / 2.
+  /// Steps where the leaf's polynomial is the field. Over a step the height sags below its chord by at most curve ·
+  /// length² / 8, and it is monotone if it falls by more than curve · length² / 2.
   std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
     const bool falling = leaf.shallowest < 0;  // throughout the leaf, so that there is one root at most

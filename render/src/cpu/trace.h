@@ -1,8 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. This is the oracle, which is
-// tested against the field's own queries: lookup and evaluation repeat those of core on purpose, in order not to share
-// their faults. For the same reason the march takes none of the shaders' short cuts: every ray starts where it enters
-// the domain, and fewer bounds decide its steps.
+// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. This is the reference
+// for the shaders, and is itself tested against the field's own queries. Lookup and evaluation repeat those of
+// core on purpose, in order not to share their faults. For the same reason the march takes none of the shaders'
+// short cuts: every ray starts where it enters the domain, and fewer bounds decide its steps.
 
 #include <optional>
 #include <vector>
@@ -25,7 +25,7 @@ struct CellPoint {
 
 struct Sample {
   double value;
-  Vector3 gradient;  ///< with respect to local coordinates
+  Vector3 gradient;  ///< gradient with respect to local coordinates
 };
 
 /// A part of a ray: point(t) = origin + t · direction, t from 0 to `length`.
@@ -42,10 +42,10 @@ struct Hit {
   bool onFace;    ///< whether f crosses the offset from one leaf to the next, not within one
 };
 
-/// A hit on a face is a crack where |f − offset| exceeds this, in domain diagonals times the slope there (at least 1,
-/// the slope of a distance). The march enters a leaf up to 1.4e-6 diagonals behind its face, so that |f − offset| may
-/// be that large in a continuous field with a zero just behind a face; single precision adds 2e-7. The shaders use the
-/// same value.
+/// A hit on a face is a crack if |f − offset| exceeds this value, given in domain diagonals times the slope at the
+/// hit (at least 1, the slope of a distance). The march enters a leaf up to 1.4e-6 diagonals behind its face, so
+/// that |f − offset| may be that large in a continuous field with a zero just behind a face; single precision adds
+/// 2e-7. The shaders use the same value.
 constexpr double kCrack = 4e-6;
 
 /// A field with what tracing needs. Keeps a reference to the field.
@@ -64,7 +64,7 @@ class TraceField {
 
   int degree(std::uint32_t leaf) const { return node::degree(field_.nodes[leaf]); }
 
-  /// The gradient in world coordinates for one in local coordinates of a cell.
+  /// Converts a gradient with respect to a cell's local coordinates into one with respect to world coordinates.
   Vector3 worldGradient(const Vector3& local, int depth) const;
 
   /// The first crossing of f = offset along a ray (docs/rendering.md, "Tracing").
@@ -88,7 +88,7 @@ class TraceField {
   /// Calls use(leaf, depth, local, weight) for each leaf with a weight at the point `p`, in grid coordinates.
   template <typename Use>
   void forEachWeight(const Vector3& p, const Use& use) const;
-  /// Does the same for the leaves below a node, whose lower corner is `corner`.
+  /// Calls `use` in the same way for the leaves below a node, whose lower corner is `corner`.
   template <typename Use>
   void forEachWeightBelow(std::uint32_t node, int depth, const Vector3& corner, const Vector3& p, const Use& use) const;
 

@@ -17,7 +17,7 @@ namespace {
 
 /// A device to try.
 struct Candidate {
-  std::string name;  ///< for messages
+  std::string name;  ///< name of the device for messages
   std::function<EGLDisplay()> display;
 };
 
@@ -50,7 +50,7 @@ std::string missingLibraries() {
   return {};
 }
 
-/// Adds the software devices, or the hardware devices, to the candidates; adds to `tried` why there are none.
+/// Adds the software or the hardware devices to the candidates. If there are none, adds the reason to `tried`.
 void addDevices(const char* clientExtensions, bool software, std::vector<Candidate>& candidates, std::string& tried) {
   const char* kind = software ? "software" : "hardware";
   const bool enumerates = hasExtension(clientExtensions, "EGL_EXT_device_base") ||

@@ -20,7 +20,8 @@ class EglContext {
   /// The string GL_RENDERER.
   const std::string& renderer() const { return renderer_; }
 
-  /// Makes the context current on this thread for the lifetime of the object, and then the previous context again.
+  /// Makes the context current on this thread for the lifetime of the object. The destructor restores the previous
+  /// context.
   class Current {
    public:
     explicit Current(const EglContext& context);

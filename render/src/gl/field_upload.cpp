@@ -32,8 +32,8 @@ std::size_t uploadedCount(const FieldData& field) {
   return count;
 }
 
-/// Writes the coefficients of a leaf, of which those that it lacks remain zero. A leaf of degree kLowDegree has the
-/// terms of that degree last, so that all leaves up to this degree agree in the order of the lower terms.
+/// Writes the coefficients of a leaf; those that it lacks remain zero. A leaf of degree kLowDegree has the terms
+/// of that degree last, so that all leaves up to this degree have their lower terms in the same order.
 template <typename T>
 void uploadLeaf(const T* c, int degree, float* out) {
   const int all = std::max(degree, kLowDegree - 1);

@@ -31,9 +31,9 @@ struct Instance {
   std::uint32_t body;
 };
 
-/// The transform of points relative to the eye to a tile's clip space, in which rows run downwards and nearer points
-/// have greater depths: leastDepth / depth in perspective, to which floats give the same relative precision near and
-/// far, and depths that fall linearly with the distance for parallel rays.
+/// The transform from points relative to the eye to a tile's clip space, in which rows run downwards and nearer
+/// points have greater depths. In perspective the depth in clip space is leastDepth / depth, for which floats have
+/// the same relative precision near and far. For parallel rays it falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =

@@ -42,7 +42,7 @@ constexpr int evaluationLoops(int degree) {
 }
 
 /// The number of loop iterations of one evaluation in a blend zone: eight candidates at each depth, the descent to
-/// those of the first depth, and the evaluation of sixteen leaves at most.
+/// the candidates of the first depth, and the evaluation of at most sixteen leaves.
 constexpr int blendedEvaluationLoops(int evaluation) {
   return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2;
 }
@@ -219,8 +219,8 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  /// Traces the rays of a tile and reads what they hit. The march continues in further passes only for the pixels that
-  /// its first pass leaves under way.
+  /// Traces the rays of a tile and reads what they hit. After the first pass of the march, further passes continue
+  /// only the pixels whose march has not ended.
   void drawTile(const Tile& tile, GLsizei blocks, const RenderTarget& state, const RenderTarget& target) {
     state.bindForDrawing();
     march(blocks);

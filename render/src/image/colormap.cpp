@@ -102,7 +102,7 @@ DistanceScale distanceScale(double minimum, double maximum) {
   const double largest = std::max(std::abs(minimum), std::abs(maximum));
   if (largest > 0) {
     scale.range = niceCeil(largest);
-    // A section of constant value has no span to divide: divide the range instead.
+    // A section of constant value has no span to divide, so the range is divided instead.
     const double span = maximum - minimum;
     scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range, kIsoLines);
   }

@@ -33,8 +33,9 @@ class ColorScale {
   /// Requires low < high, and 0 < low on a logarithmic scale.
   ColorScale(double low, double high, bool logarithmic);
 
-  /// A scale for values from `least` (above 0) to `greatest`: between powers of ten, at most six decades, if
-  /// logarithmic, else from 0 to a number of one or two digits. Its high end is 1 where `greatest` is 0.
+  /// A scale for values from `least` (above 0) to `greatest`. A logarithmic scale lies between powers of ten and
+  /// spans at most six decades; a linear one runs from 0 to a number of one or two digits. Its high end is 1 where
+  /// `greatest` is 0.
   static ColorScale around(double least, double greatest, bool logarithmic);
 
   LinearColor operator()(double value) const {

@@ -7,7 +7,8 @@
 namespace hpsdf::render {
 namespace {
 
-/// Pixels nearer to each other than this along both axes are neighbours: one edge must not fill the list.
+/// Pixels nearer to each other than this along both axes are neighbours, so that a single edge cannot fill the
+/// list.
 constexpr int kNeighbourhood = 16;
 
 int difference(const Color& a, const Color& b) {

@@ -2,7 +2,7 @@
 
 #include <cassert>
 
-// The assembler includes each file unchanged (.incbin): files of any size, and no generated source.
+// The assembler includes each file unchanged (.incbin), which allows any file size and needs no generated source.
 #define HPSDF_EMBED(symbol, file)                                                                   \
   asm(".pushsection .rodata\n"                                                                      \
       ".balign 16\n"                                                                                \

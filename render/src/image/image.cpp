@@ -12,7 +12,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 
-// Static functions: an application that contains its own copy of stb must still link.
+// Makes the functions static, so that an application that contains its own copy of stb can be linked.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_PNG

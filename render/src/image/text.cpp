@@ -8,7 +8,7 @@
 
 #include "image/embedded.h"
 
-// Static functions: ImGui and others contain their own copy of stb.
+// Makes the functions static, because ImGui and others contain their own copies of stb.
 #define STB_TRUETYPE_IMPLEMENTATION
 #define STBTT_STATIC
 #include <stb/stb_truetype.h>
@@ -58,9 +58,9 @@ char32_t takeCodePoint(std::string_view& text) {
 
 struct PlacedGlyph {
   int glyph;
-  int column;      // integer part of its origin, pixels
-  float fraction;  // fractional part of its origin
-  PixelRect box;   // extent of its bitmap
+  int column;      // integer part of the glyph's origin, pixels
+  float fraction;  // fractional part of the glyph's origin
+  PixelRect box;   // extent of the glyph's bitmap
 };
 
 struct Line {

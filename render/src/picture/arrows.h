@@ -21,13 +21,14 @@ struct Arrow {
   std::function<float(double t, int x, int y)> strength = {};
 };
 
-/// Arrows at every `spacing`-th pixel along both axes that shows the field, centred on the pixel: projections of the
-/// gradient onto the plane. Their length is at most the spacing, so that they do not overlap.
+/// Arrows that show the gradient's projection onto the plane. They are centred on those pixels that show the
+/// field, of every `spacing`-th pixel along both axes. No arrow is longer than the spacing, so that they do not
+/// overlap.
 std::vector<Arrow> gradientArrows(const Field& field, const SliceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 
-/// Arrows at such pixels of a surface that start at the visible point. They are faint where something in the buffers
-/// hides them. View and buffers must outlive the result.
+/// Arrows that show the gradient on a surface, from the visible point of every `spacing`-th pixel along both axes.
+/// They are faint where something in the buffers hides them. View and buffers must outlive the result.
 std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 

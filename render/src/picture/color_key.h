@@ -12,7 +12,7 @@ namespace hpsdf::render {
 
 struct ColorKey {
   SampleColor color;   ///< may refer to the buffers
-  Legend legend = {};  ///< the same as the panel, as data
+  Legend legend = {};  ///< content of the panel, as data
   ScaleOptions scale;  ///< the settings' scale with the limits and levels that were chosen
   std::string name;    ///< name of the colours' meaning in a caption
   std::string range;   ///< range of a quantity's values in a caption; empty for degrees and depths

@@ -23,14 +23,13 @@ constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;
 constexpr double kDotRadius = 2.6;
 constexpr double kMarkCasingBorder = 0.9;
-constexpr double kSmallGroup = 16;   // a group up to this size gets a ring
-constexpr double kLeastRing = 9;     // radius of the smallest ring
-constexpr double kHiddenBeyond = 4;  // pixels of depth that a surface may rise beside an edge of its own
-constexpr double kNearestMark =
-    1e-3;                      // marks nearer to the eye are cut, as a share of the depth of an edge's other end
-constexpr int kGroupCell = 8;  // pixels; marks in neighbouring cells of this size belong to one group
+constexpr double kSmallGroup = 16;     // a group up to this size gets a ring
+constexpr double kLeastRing = 9;       // radius of the smallest ring
+constexpr double kHiddenBeyond = 4;    // a mark is hidden by what is nearer by more than this, in pixels
+constexpr double kNearestMark = 1e-3;  // least depth of a mark, as a share of the depth of an edge's farther end
+constexpr int kGroupCell = 8;          // pixels; marks in neighbouring cells of this size belong to one group
 
-/// The panel's row of a kind, without its count.
+/// The panel's row for a kind of defects, without its count.
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
       {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
@@ -91,8 +90,8 @@ class Painter {
     return hides(buffers_, samples_, x, y, distance, stroke.tolerance);
   }
 
-  /// The gaps depend on the position in the picture, not along the line, so that edges shorter than a dash have gaps
-  /// too. A dot has none.
+  /// The gaps depend on the position in the picture rather than on that along the line, so that edges shorter than a
+  /// dash have gaps too. A dot has none.
   bool isGap(const Stroke& stroke, const Eigen::Vector2d& position) const {
     const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
     double path = across > down ? position.x() : position.y();
@@ -121,7 +120,7 @@ class Groups {
     PicturePoint nearest = {};
   };
 
-  /// Finds all groups and forgets their cells.
+  /// Returns all groups and clears the cells.
   std::vector<Group> extract() {
     std::vector<Group> groups;
     for (int row = 0; row < rows_; ++row)
@@ -174,7 +173,8 @@ class Groups {
   std::vector<Group> cells_;  ///< the points of each cell; their extent is empty where there are none
 };
 
-/// The ends of the part of a segment that lies before the eye; both are behind the eye if there is none.
+/// The ends of the part of a segment that lies in front of the eye; both are behind the eye if there is no such
+/// part.
 std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
   const auto seen = [&](const Vector3& point) { return project(camera, point, width, height); };
   PicturePoint from = seen(ends[0]), to = seen(ends[1]);

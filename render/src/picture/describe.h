@@ -10,31 +10,31 @@
 
 namespace hpsdf::render {
 
-/// "(1, −0.5, 2)".
+/// A vector as text, as in "(1, −0.5, 2)".
 std::string formatVector(const Vector3& v, int digits = 4);
 
 /// The name of the field's source.
 std::string describeSource(const Field& field);
 
-/// "τ = 1e-5".
+/// The field's target error as text, as in "τ = 1e-5".
 std::string describeTarget(const Field& field);
 
-/// "slice z = 0.1", with "slice" as the name.
+/// A plane as text, as in "slice z = 0.1" for the name "slice".
 std::string describePlane(const std::string& name, const Plane& plane);
 
-/// "cells of degree 2, 4–6".
+/// The chosen cells as text, as in "cells of degree 2, 4–6".
 std::string describeCells(const ShownCells& cells);
 
 std::string describeCamera(const OrbitCamera& camera);
 std::string describeCracks(const Cracks& cracks);
 
-/// "3–7", from the least to the greatest of these levels.
+/// The range of the levels as text, from the least to the greatest, as in "3–7".
 std::string describeLevels(const std::map<int, double>& shares);
 
-/// "12.3 kB".
+/// A number of bytes as text, as in "12.3 kB".
 std::string describeBytes(std::size_t bytes);
 
-/// "up to 0.01", of the values that are not NaN.
+/// The greatest of the values that are not NaN as text, as in "up to 0.01".
 std::string describeGreatest(const std::vector<float>& values);
 
 }  // namespace hpsdf::render

@@ -11,7 +11,8 @@ namespace {
 
 constexpr Color kShareBar = {206, 209, 218};
 
-// Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures and shrinks less than smaller ones.
+// Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures, but shrinks less than smaller
+// pictures do.
 double textSizeFor(int width, int height) {
   const double size = std::min<double>(height, width * 9.0 / 16);
   return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
@@ -242,7 +243,7 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
 
   // Choose the lines with numbers: zero and every 1st, 2nd, 5th, 10th … line from it, so that the numbers have room.
   const double perLine = bar.height() * scale.step / (2 * scale.range);
-  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // on either side, about 1e7 at most
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // on each side, about 1e7 at most
   int every = 1;
   for (int decade = 1; every * perLine < 1.7 * bar.labelSize && every <= lines; decade *= 10)
     for (const int digit : {2, 5, 10})

@@ -98,11 +98,12 @@ void addCaption(Overlay& overlay, const Frame& frame, const std::string& name, s
 
 void paint(Image& image, const Overlay& overlay);
 
-/// "−0.25", "15200", "1.5e-7": with the sign U+2212, without an exponent up to 6 digits before the point.
+/// A number as text, as in "−0.25", "15200", "1.5e-7": the sign is U+2212, and numbers with up to 6 digits before
+/// the point have no exponent.
 std::string formatNumber(double value, int digits = 4);
-/// "54,935".
+/// A count as text, with commas, as in "54,935".
 std::string formatCount(std::size_t count);
-/// "63.9 %", "<0.1 %".
+/// A share as text, in percent, as in "63.9 %" or "<0.1 %".
 std::string formatShare(double fraction);
 
 }  // namespace hpsdf::render

@@ -109,7 +109,7 @@ Scale scaleOf(const Chart& chart, double lines) {
   if (!(low <= high)) low = high = 0;
   const double size = std::max(std::abs(low), std::abs(high));
   double margin = kMargin * (high - low);
-  // A constant up to rounding gets a wide margin, so that rounding errors do not look like a curve.
+  // A curve that is constant up to rounding gets a wide margin, so that rounding errors do not look like a curve.
   if (!(high - low > kFlat * size)) margin = size > 0 ? 0.05 * size : 1;
   low -= margin;
   high += margin;
@@ -181,7 +181,8 @@ class Plotter {
       for (PixelRect& row : *rows) row.x0 = left_, row.x1 = right_;
   }
 
-  // Stacks charts and bands. If the charts would be too low to read, the bands are left out, then the last charts.
+  // Stacks charts and bands. If the charts would not be high enough to read, the bands are left out, then the last
+  // charts.
   void layOutRows(int top, int bottom) {
     const int gap = std::max(1, int(std::lround(0.9 * em_))), bandGap = std::max(1, int(std::lround(0.35 * em_)));
     const int band = int(std::lround(1.5 * em_)), least = int(std::lround(2.6 * em_));

@@ -126,7 +126,7 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   checkClip(picture.clip);
   const ShownBodies& bodies = picture.bodies;
   Camera camera = cameraOf(picture.camera, field.domain(), width, height);
-  // Parallel rays start before the domain; let them start before the bodies too.
+  // Parallel rays start in front of the domain; let them start in front of the bodies too.
   if (bodies.renderer) camera = startingBefore(bodies.renderer->bounds(bodies.bodies), camera);
   const SurfaceView view{camera, picture.offset, picture.clip};
   width *= picture.samples;
@@ -144,7 +144,7 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   return scene;
 }
 
-/// Fills the panel of a picture whose colours mean nothing.
+/// Fills the panel of a picture whose colours stand for no quantity.
 void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
   const std::pair<std::string, std::string> facts[] = {

@@ -15,8 +15,8 @@
 namespace hpsdf::render {
 namespace {
 
-// Greatest angle between the normals of faces that are shaded smoothly: above that between the faces of a sphere of 80
-// triangles, below that at the edges of a gear's teeth.
+// Greatest angle between the normals of faces that are shaded smoothly. Faces of a sphere of 80 triangles differ
+// by less, faces at the edges of a gear's teeth by more.
 constexpr double kCreaseDegrees = 40;
 
 constexpr std::size_t kMostTriangles = std::size_t{1} << 26;

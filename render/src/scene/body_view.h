@@ -8,7 +8,8 @@ namespace hpsdf::render {
 /// Throws `Error` for a camera or a size that `BodyRenderer::view` refuses.
 void checkBodyView(const Camera& camera, int width, int height);
 
-/// Depth of the farthest corner of a box, along `forward` from the eye; 1 where no corner lies before the eye.
+/// Depth of the farthest corner of a box, along `forward` from the eye; 1 where no corner lies in front of the
+/// eye.
 double farthestDepth(const Camera& camera, const Box& box);
 
 /// The least visible depth, which `BodyRenderer::view` states, for bodies whose farthest depth is `farthest`.
@@ -30,7 +31,8 @@ void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const Body
 /// Shows in `buffers` each body that is nearer than what the pixel shows.
 void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers);
 
-/// The camera with the start of its parallel rays moved back to before the box; a perspective camera stays as it is.
+/// The camera, with the start of its parallel rays moved back in front of the box; a perspective camera stays as
+/// it is.
 Camera startingBefore(const Box& box, const Camera& camera);
 
 }  // namespace hpsdf::render

@@ -59,7 +59,7 @@ struct CellBox {
   double squaredDistance;  ///< squared distance of the box from the eye
 };
 
-/// The boxes of the cells, the nearest first, because it hides most of the others.
+/// The boxes of the cells, the nearest first, because near boxes hide most of the others.
 std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& cells) {
   const Camera& camera = view.camera;
   std::vector<CellBox> boxes;

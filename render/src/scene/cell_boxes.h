@@ -19,7 +19,7 @@ Box clipped(Box box, const SurfaceView& view);
 /// The corners of a box; bit k of a corner's index is set where its coordinate along axis k is the greater one.
 std::array<Vector3, 8> cornersOf(const Box& box);
 
-/// The edges of a drawn box in parts of those of its cell: below 1, so that the camera sees between boxes.
+/// The edge length of a drawn box as a share of its cell's. It is below 1, so that the camera sees between boxes.
 constexpr double kBoxShare = 0.8;
 
 /// Shows each cell as a solid box about its centre where it is the nearest thing to the eye: the face that a pixel's

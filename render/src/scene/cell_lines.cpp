@@ -117,7 +117,7 @@ class EdgePainter {
     return middle + half > nearDepth_ && pixelsAt(box.sizes().maxCoeff(), middle - half) > kGoneLength * width_;
   }
 
-  /// The part of a segment before the eye, in the picture.
+  /// The part of a segment in front of the eye, in the picture.
   Edge projected(Segment segment) const {
     const auto toPicture = [&](const Vector3& p) { return project(camera_, p, buffers_.width, buffers_.height); };
     Edge edge{segment, toPicture(segment.a), toPicture(segment.b)};

@@ -34,9 +34,9 @@ inline PixelRect pixelsAround(std::span<const PicturePoint> points, double least
           clamped(std::floor(hull.max().y() + 0.5 + kMargin), height)};
 }
 
-/// Draws things with known rectangles in parallel: calls fill(y0, y1, indices) for strips of 16 rows, where `indices`
-/// are those of the rectangles that meet the rows, ascending. The result does not depend on the number of threads as
-/// long as `fill` changes only these rows.
+/// Draws things with known rectangles in parallel: calls fill(y0, y1, indices) for strips of 16 rows, where
+/// `indices` are those of the rectangles that meet the strip, ascending. The result does not depend on the number
+/// of threads as long as `fill` changes only the rows of its strip.
 template <typename Fill>
 void forEachStrip(int height, const std::vector<PixelRect>& rects, const Fill& fill) {
   constexpr int kRows = 16;

@@ -82,7 +82,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
   ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
   const double nudge = kClipNudge * field.domain().sizes()[axis];
   plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
-  // Rays start behind the plane, so that the section lies before whatever they hit.
+  // Rays start behind the clipping plane, so that the section lies in front of everything that they hit.
   addScenePlane(
       field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
       [&](double value) { return value < view.offset; }, buffers);

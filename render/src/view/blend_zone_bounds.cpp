@@ -79,7 +79,7 @@ class Polynomial {
 
   double& at(int i, int j, int k) { return c_[(std::size_t(i) * size_ + j) * size_ + k]; }
 
-  /// Restricts the box along an axis: the coordinate up to now is scale · s + shift, s being the new one.
+  /// Restricts the box along an axis: the old coordinate is scale · s + shift, where s is the new one.
   void restrict(int axis, double scale, double shift) {
     if (scale == 1 && shift == 0) return;
     findRows(scale, shift);

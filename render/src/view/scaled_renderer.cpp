@@ -20,7 +20,8 @@ Field scaled(const Field& field, double factor) {
   return Field(std::move(data));
 }
 
-/// Passes views to `inner`, whose unit of length is `unit` world units, and its buffers back in world units.
+/// Passes views on to `inner`, whose unit of length is `unit` world units, and converts its buffers to world
+/// units.
 class ScaledRenderer final : public Renderer {
  public:
   ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}

@@ -152,7 +152,7 @@ class BlockFinder {
   double offset_;
   double near_;  ///< depth up to which a corner counts as behind the eye, world units
   Vector3 worldFromGrid_;
-  Eigen::Matrix3d viewFromGrid_;  ///< to the camera's frame, whose axes are its forward, right and up vectors
+  Eigen::Matrix3d viewFromGrid_;  ///< transform to the camera's frame, whose axes are its forward, right and up vectors
   float side_;
   int columns_, rows_;
   std::vector<float> starts_;  ///< `Block::start` of every block of the view, kNone for blocks that see nothing

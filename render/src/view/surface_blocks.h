@@ -1,6 +1,6 @@
 #pragma once
-// Blocks of pixels whose rays may meet the surface, and a lower bound of the distance to it: pixels that do not see the
-// surface are not drawn at all, and rays of the others start near it.
+// Blocks of pixels whose rays may meet the surface, and a lower bound of the distance to it. Pixels that do not
+// see the surface are not drawn at all, and the rays of the other pixels start near it.
 
 #include <vector>
 
@@ -17,8 +17,8 @@ struct Block {
 };
 
 struct SurfaceBlocks {
-  /// The sign, 1 or −1, of f − offset along every ray from its entry into the domain to `Block::start`, or to its exit
-  /// where its pixel is in none of the blocks.
+  /// The sign, 1 or −1, of f − offset along every ray from its entry into the domain: up to `Block::start`, or up to
+  /// its exit from the domain if its pixel lies in no block.
   float side;
   std::vector<Block> blocks;
 };

@@ -27,7 +27,7 @@ SurfaceBounds leafBounds(const T* c, int degree) {
   // Sum the coefficients' magnitudes, times the greatest derivatives of their basis functions.
   double sum = 0;
   double nonlinear = 0;
-  Vector3 gradient = Vector3::Zero();  // of the nonlinear part
+  Vector3 gradient = Vector3::Zero();  // bound of the nonlinear part's gradient
   Vector3 pure = Vector3::Zero();      // second derivatives xx, yy, zz
   Vector3 mixed = Vector3::Zero();     // second derivatives yz, zx, xy
   const T* next = c;

@@ -20,16 +20,16 @@ constexpr std::string_view kAsked = "What you ask for", kResult = "What you get"
 }
 
 /// One setting of `BuildOptions`. Its value is a list of numbers: one for a number; 0 or 1 for a flag; the index of a
-/// word for a choice; one for each axis of the grid; none where the setting asks for nothing.
+/// word for a choice; one for each axis of the grid. The list is empty if the setting is off or unset.
 struct BuildSetting {
   enum class Type : std::uint8_t { number, wholeNumber, wholeNumbers, choice, flag };
-  /// The way in which a setting ends the construction.
+  /// How a setting ends the construction.
   enum class Ending : std::uint8_t {
-    none,           ///< it does not
-    target,         ///< by the target error
-    byDistance,     ///< by errors by distance, in place of the target error
-    otherQuantity,  ///< by the maximum error or the bytes; then the target error has no default
-    steps,          ///< early, whatever the target
+    none,           ///< not at all
+    target,         ///< when the target error is reached
+    byDistance,     ///< when the errors by distance are reached, which replace the target error
+    otherQuantity,  ///< at a maximum error or a limit of bytes; the target error then has no default
+    steps,          ///< after a number of steps, whatever the target
   };
 
   std::string_view name = {};  ///< as users write it: "max-depth"
@@ -40,38 +40,38 @@ struct BuildSetting {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
   bool minimumExcluded = false;
-  std::vector<std::string_view> words = {};  ///< of a choice
+  std::vector<std::string_view> words = {};  ///< the words of a choice
   std::vector<double> fallback = {};         ///< default of a setting that `BuildOptions` leaves unset
   Ending ending = Ending::none;
-  std::string_view exclusive = {};  ///< the setting that it takes the place of, which must not be given too
+  std::string_view exclusive = {};  ///< a setting that this one replaces, so that both cannot be given
   std::string_view owner = {};      ///< the setting, with its word, without which it has no effect: "continuity weak"
   bool (*hasOwner)(const BuildOptions&) = nullptr;
-  int storedAt = 0;           ///< its position among the settings in a field's file; 0: it is not stored
+  int storedAt = 0;           ///< position among the settings in a field's file; 0: not stored
   bool decides = true;        ///< the field depends on it
   bool isOffered = true;      ///< the program has an option for it
   bool isAdvanced = false;    ///< help texts show it only where all options are asked for
-  bool isChecked = false;     ///< values out of range can be given in C++ and are refused
-  std::string_view key = {};  ///< its name in JSON where that is not `name` with underscores
+  bool isChecked = false;     ///< `checkBuild` refuses values out of range, which C++ code could set
+  std::string_view key = {};  ///< name in JSON if it differs from `name` with underscores
   std::vector<double> (*get)(const BuildOptions&) = nullptr;
   void (*set)(BuildOptions&, std::span<const double>) = nullptr;
 };
 
-/// All settings in the order in which users read them; a setting follows its owner.
+/// Returns all settings in the order in which they are shown to users. A setting follows its owner.
 std::span<const BuildSetting> buildSettings();
 
-/// Throws std::logic_error for a name that the table does not have.
+/// Returns the setting of this name. Throws std::logic_error if the table does not have it.
 const BuildSetting& buildSetting(std::string_view name);
 
-/// A setting's value as users write it: "4", "6,6,6", "hp", "true"; empty where it asks for nothing.
+/// Returns a setting's value as users write it: "4", "6,6,6", "hp", "true"; empty if the setting is off or unset.
 std::string settingText(const BuildSetting& setting, const BuildOptions& options);
 
-/// The value that holds where users give none.
+/// Returns the value that a setting has if users give none.
 std::string defaultText(const BuildSetting& setting);
 
-/// The settings that a field keeps, all others as in a field that was not built.
+/// Returns `options` in which all settings that a field does not store are those of a field that was not built.
 BuildOptions storedSettings(const BuildOptions& options);
 
-/// The settings with which a field like this one is built again: those it keeps, and those that its arrays show.
+/// Returns settings that build a field like this one: those that it stores, and those that follow from its arrays.
 BuildOptions settingsOf(const FieldData& field);
 
 }  // namespace hpsdf

@@ -16,17 +16,17 @@ namespace hpsdf {
 /// The record of how a field was built: stored with it, shown by `info`. Lengths are in the field's own units.
 struct FieldMetadata {
   Source source;
-  /// The settings as they took effect: where errors by distance were asked for, τ is the error reached and θ the
-  /// exponent that followed from them. Files keep those that `BuildSetting::storedAt` numbers.
+  /// The settings that took effect. If errors by distance were asked for, τ is the error reached and θ the exponent
+  /// that followed from them. Files store the settings that have a `BuildSetting::storedAt`.
   BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
-  double totalError = 0;       ///< ε, weighted by nearness, at the paper's scale: comparable with τ
-  double referenceLength = 2;  ///< L: an error at the paper's scale times (L/2)^5 is one in the field's own units^5
+  double totalError = 0;               ///< ε, weighted by nearness, at the paper's scale: comparable with τ
+  double referenceLength = 2;          ///< L; an error at the paper's scale times (L/2)^5 is in the field's own units^5
   std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction
   /// Leaves that the construction raised or split; nothing where that is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
-  /// Greatest |f − Φ| at the probed points, for the leaves' own polynomials, if a maximum error was asked for; the
-  /// effect of rounding is added where it exceeds a hundredth of that maximum.
+  /// Greatest |f − Φ| at the probed points, without blending, if a maximum error was asked for. The effect of
+  /// rounding is added if it exceeds a hundredth of that maximum.
   double measuredError = 0;
 
   /// √(ε/|Ω|): the estimated RMS error that the construction ended with.
@@ -73,9 +73,9 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// Blend extents of a leaf: how far its weight overlaps the neighbours across each face, and how far inside the face it
-/// grows to 1. Each extent is `FieldData::blend` edges of the deepest leaf that touches the face, the leaf itself
-/// included; 5 bits hold the depth of that leaf, or `kDomainFace` where the domain ends.
+/// Blend extents of a leaf. The extent at a face is the distance to either side of it within which the leaf's weight
+/// grows from 0 outside to 1 inside. It is `FieldData::blend` edges of the deepest leaf that touches the face, the
+/// leaf itself included; 5 bits hold the depth of that leaf, or `kDomainFace` where the domain ends.
 namespace blend_extent {
 constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {

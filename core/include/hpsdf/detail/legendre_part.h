@@ -38,7 +38,7 @@ inline void restrictToPart(std::vector<double>& c, int degree, int axis, const L
   for (int j = 0; j < n; ++j)
     for (int k = 0; j + k < n; ++k) {
       double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
-      for (int a = 0; a + j + k < n; ++a) {  // upwards, since the sums need the former coefficients above a
+      for (int a = 0; a + j + k < n; ++a) {  // a ascends, because each sum needs the former coefficients above a
         double sum = 0;
         for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * rows[i][a];
         line[a * stride[axis]] = sum;

@@ -20,7 +20,7 @@ double machineMemory();
 /// Three quarters of the machine's memory, or of what control groups (Linux) leave this process, in bytes.
 double allowedMemory();
 
-/// A number of bytes in the unit that suits it, such as "8.40 MB".
+/// Returns a number of bytes as text with a suitable unit, such as "8.40 MB".
 std::string bytesText(double bytes);
 
 /// Throws `Error` (limit) where `what`, such as "a cloth of 1e6 nodes", would take more bytes than `allowedMemory`. The

@@ -34,9 +34,10 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// The known name that was probably meant, the first of equally near ones; empty when none is near. A name is near when
-/// at most a third of the letters (at least one) differ, or when `wanted` is its beginning of three letters or more.
-/// Names of more than 64 letters are not compared, because names in untrusted files can be very long.
+/// Returns the known name that was probably meant, the first one if several are equally near; empty if none is near.
+/// A name is near when at most a third of the letters (at least one) differ, or when `wanted` is its beginning of
+/// three letters or more. Names of more than 64 letters are not compared, because names in untrusted files can be
+/// very long.
 inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
   constexpr std::size_t kLongest = 64;
   std::string best;

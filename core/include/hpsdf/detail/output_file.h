@@ -41,7 +41,7 @@ class OutputFile {
     others,  ///< all processes but this one; for a caller that holds the lock on the file
   };
 
-  /// Removes the temporary files that such writers of `file` left in its folder.
+  /// Removes the temporary files of `file` that processes of the given kind left in its folder.
   static void removeAbandoned(const std::filesystem::path& file, Writers writers = Writers::killed);
 
  private:
@@ -52,7 +52,7 @@ class OutputFile {
   std::FILE* stream_ = nullptr;
 };
 
-/// Throws the `Error` that writing `file` would end with, as far as it is known beforehand. Call it before long work.
+/// Throws the `Error` that writing `file` would throw, as far as this is known beforehand. Call it before long work.
 void checkWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

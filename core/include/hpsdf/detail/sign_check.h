@@ -9,9 +9,9 @@
 
 namespace hpsdf {
 
-/// Returns the generalised winding number of a mesh about a point, above ½ inside; a whole number if the mesh is closed
-/// (Jacobson et al. 2013). It is the sum over all triangles, 15 ns each, for comparisons with the faster sum over
-/// clusters in `ExactDistance`.
+/// Returns the generalised winding number of a mesh about a point, above ½ inside; a whole number if the mesh is
+/// closed (Jacobson et al. 2013). It is summed over all triangles, at 15 ns each, and serves to check the faster sum
+/// over clusters in `ExactDistance`.
 double windingNumber(const TriangleMesh& mesh, const Vector3& x);
 
 /// Comparison of signs at `points` random points.

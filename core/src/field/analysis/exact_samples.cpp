@@ -99,7 +99,8 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
   return {permuted(samples.points, order), permuted(samples.distances, order)};
 }
 
-/// Divides the domain into blocks and returns those that may intersect the band, because Φ is 1-Lipschitz.
+/// Divides the domain into blocks and returns those that may intersect the band. The others cannot, because Φ is
+/// 1-Lipschitz.
 std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domain, double band) {
   constexpr int kBlocks = 32;  // along each axis
   const Vector3 size = domain.sizes() / kBlocks;

@@ -65,7 +65,7 @@ std::optional<Span> clipToDomain(const Axes& axes) {
   return span;
 }
 
-/// Returns the width of the leaf that holds a cell of the greatest depth, in such cells.
+/// Returns the width of the leaf that holds a cell of the greatest depth, measured in cells of that depth.
 std::int64_t leafWidth(const Field& field, const query::CellIndex& cell) {
   query::GridPoint point{{}, cell, 0};
   for (int a = 0; a < 3; ++a) point.path |= query::pathBits(a, cell[a]);
@@ -85,8 +85,8 @@ double tAtExit(const Axis& axis, std::int64_t corner, std::int64_t width) {
   return axis.speed < 0 ? axis.tAtFace(corner) : std::numeric_limits<double>::infinity();
 }
 
-/// Walks from leaf to leaf. Each step advances along at least one axis and goes back along none, whatever is rounded,
-/// so that the walk ends and visits no leaf twice. Cells are those of the greatest depth.
+/// Walks from leaf to leaf. Despite rounding, each step advances along at least one axis and goes back along none, so
+/// that the walk ends and visits no leaf twice. Cells are those of the greatest depth.
 std::vector<Piece> walk(const Field& field, const GridFrame& frame, const Axes& axes, const Span& span) {
   std::vector<Piece> pieces;
   query::CellIndex cell, corner;

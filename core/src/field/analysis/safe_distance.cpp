@@ -32,7 +32,8 @@ double safeDistance(const Field& field, const Vector3& x) {
   const GridFrame& frame = field.lookupGrid().frame;
   const Vector3 closest = query::closestInDomain(frame, x);
   const query::GridPoint point = query::gridPoint(frame, closest);
-  // The descent uses the octree because the lookup grid does not tell the node, by which bounds are stored.
+  // The descent starts at the base cells, because bounds are stored by node and the lookup grid does not give the
+  // node's index.
   const auto [node, depth, cellIndex] = query::findLeafNode(data, point);
   const query::LeafPoint leaf = query::leafPoint(data.nodes[node], depth, node, cellIndex, point.coordinates);
   const double value = query::evaluateInLeaf<double>(data, field.lookupGrid(), point.coordinates, leaf);

@@ -17,8 +17,8 @@
 namespace hpsdf {
 namespace {
 
-/// Number of samples whose sums are added before those of other chunks, so that the number of threads does not change
-/// the rounding.
+/// Number of samples in a chunk. Sums are added chunk by chunk, so that the number of threads does not change the
+/// rounding.
 constexpr std::size_t kPointsPerTask = 4096;
 
 detail::Sums sumsOf(std::span<const double> values) {

@@ -23,7 +23,7 @@ namespace {
 
 using namespace detail;
 
-/// Beyond the goal where pruning follows.
+/// Returns the goal of the growth. If pruning follows, the growth has to reach a smaller error than the construction.
 ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
   return options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal;
 }
@@ -51,10 +51,10 @@ class Construction {
     state_.nearness = nearnessOf(options, domain);
     state_.tree.domain = domain;
     state_.tree.grid = options.grid;
-    refiner_.requireMemory();  // for Φ, before anything is built
+    refiner_.requireMemory();  // checks the memory of Φ before anything is built
   }
 
-  /// Keeps the state in a file from now on. Continues from the state that it holds and returns true if there is one.
+  /// Keeps the state in a file from now on. If the file already holds a state, continues from it and returns true.
   bool resume(CheckpointFile& file) {
     observer_.atWholeState = [this, &file] {
       if (!file.isDue()) return;
@@ -91,13 +91,13 @@ class Construction {
     FieldMetadata built = metadata(sumOfErrors(tree));
     FieldData field = layOut(std::move(tree), std::move(built));
 
-    // Make the coefficients final: jumps are reduced in double precision.
+    // Make the coefficients final. Jumps are reduced in double precision, before rounding.
     if (options.continuityWeight)
       continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
     roundCoefficients(budget_.coefficientType(), field);
     field.blend = options.blend;
 
-    // Bound the final coefficients as they are blended.
+    // Compute bounds for the final coefficients with blending.
     if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
     ownEvaluations_ += fitter_.evaluations() - before;
     return field;
@@ -107,7 +107,8 @@ class Construction {
     const BuildOptions& options = setup_.options;
     PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
     for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
-    // A growth that ended early, but not by bytes, has refinements to take back all the same.
+    // If the growth ended before its goal, but not because of the limit of bytes, relax the goal so that pruning can
+    // still take back refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
       limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
     if (options.maxBytes) limits.mostBytes = budget_.limit();
@@ -161,7 +162,7 @@ class Construction {
   CellFitter fitter_;
   GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
   Refiner refiner_;
-  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of Φ for earlier fields, which do not count for later ones
+  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of Φ by earlier `finish`, which later fields do not count
 };
 
 }  // namespace

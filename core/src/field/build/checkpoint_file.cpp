@@ -45,7 +45,7 @@ class Digest {
 std::uint64_t digestOf(const Source& source) {
   Digest digest;
   digest.add(source.fingerprint);
-  if (source.fingerprint == 0) digest.add(source.name);  // a mesh file with a fingerprint may be renamed
+  if (source.fingerprint == 0) digest.add(source.name);  // a fingerprint allows the mesh file to be renamed
   digest.add(source.vertices);
   digest.add(source.faces);
   digest.add(source.box);
@@ -103,7 +103,7 @@ void checkTimes(const Checkpoint& checkpoint) {
     throw Error("checkpoint: expected a share of the time above 0 up to 1");
 }
 
-/// Bits that tell which parts of a fit follow.
+/// Bits that tell which parts of a fit follow in the file.
 enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
 
 // The functions for items work in both directions: a `CheckedWriter` writes the state and leaves it unchanged, a
@@ -216,7 +216,7 @@ void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evalua
   stream.item(state.processed);
 }
 
-/// Throws `Error` unless these nodes are leaves, each named once.
+/// Throws `Error` unless all `nodes` are leaves and none occurs twice.
 void requireLeaves(const CheckedReader& reader, const BuildTree& tree, std::span<const std::uint32_t> nodes) {
   std::vector<bool> isNamed(tree.nodes.size());
   for (const std::uint32_t n : nodes) {

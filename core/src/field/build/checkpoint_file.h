@@ -21,7 +21,8 @@ class CheckpointFile {
   CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
                  const BuildOptions& options);
 
-  /// A reader at the beginning of the state, if there is one. Throws `Error` for the state of another construction.
+  /// Returns a reader at the beginning of the stored state, if there is one. Throws `Error` if the state belongs to
+  /// another construction.
   std::optional<CheckedReader> open() const;
 
   /// Tells whether enough time has passed since the construction began or the last state was kept.
@@ -37,8 +38,8 @@ class CheckpointFile {
   struct Identity {
     std::string program;  ///< version of the program
     std::uint64_t surface = 0;
-    std::uint64_t options = 0;   ///< of settings and domain
-    std::uint64_t distance = 0;  ///< of values of Φ at 4096 points
+    std::uint64_t options = 0;   ///< digest of settings and domain
+    std::uint64_t distance = 0;  ///< digest of the values of Φ at 4096 points
   };
 
   void waitFor(double seconds);
@@ -51,8 +52,8 @@ class CheckpointFile {
 /// Writes the state, which stays as it is, and the number of evaluations of Φ.
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
-/// Reads them into a state that has its domain and grid, and checks that a construction with these options could have
-/// left them. Throws `Error` otherwise. Returns the number of evaluations of Φ.
+/// Reads what `save` wrote into `state`, whose domain and grid are set already. Throws `Error` unless a construction
+/// with these options could have left this state. Returns the number of evaluations of Φ.
 std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
                       const ByteBudget& budget);
 

@@ -17,8 +17,8 @@ namespace {
 
 using Stage = ConstructionState::Stage;
 
-/// Extrapolates the decay of the error over the work (evaluations of Φ): they follow a power law, whose exponent is
-/// taken from the last decade.
+/// Extrapolates the decay of the error over the work (evaluations of Φ). They are assumed to follow a power law,
+/// whose exponent is measured over the last decade of the error.
 class GrowthProgress {
  public:
   /// Records a state and returns the fraction done, which never falls; 1 once the error is at the target.
@@ -26,15 +26,16 @@ class GrowthProgress {
     if (error <= target) return 1;
     if (history_.empty() || error < 0.8 * history_.back().error) history_.push_back({work, error});
     const Sample& past = latestAbove(10, error);
-    double exponent = 0.7;  // typical of scanned meshes, as long as nothing can be measured
+    double exponent = 0.7;  // typical of scanned meshes; holds until an exponent can be measured
     if (past.error > 2 * error && work > past.work)
       exponent = std::log(work / past.work) / std::log(past.error / error);
     fraction_ = std::max(fraction_, std::min(0.99, std::pow(target / error, exponent)));
     return fraction_;
   }
 
-  /// A lower bound for the final work over the present work: it assumes that from now on the error falls exponentially,
-  /// no slower than at present. It is 1 until the error has fallen by a decade, since that is too little to judge by.
+  /// Returns a lower bound of the final work divided by the present work. It assumes that from now on the error falls
+  /// exponentially with the work, at its present rate, which is faster than a power law. It is 1 until the error has
+  /// fallen by a decade, because less does not suffice for an estimate.
   double leastFactor(double work, double error, double target) const {
     if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
     const Sample& past = latestAbove(3, error);
@@ -47,7 +48,7 @@ class GrowthProgress {
     double work, error;
   };
 
-  /// The latest sample whose error was more than `factor` times as great; the first one where there is none.
+  /// Returns the latest sample whose error was more than `factor` times `error`; the first sample if there is none.
   const Sample& latestAbove(double factor, double error) const {
     const auto latest =
         std::find_if(history_.rbegin(), history_.rend(), [&](const Sample& s) { return s.error > factor * error; });
@@ -65,7 +66,7 @@ class Growth {
   explicit Growth(Refiner& refiner)
       : setup_(refiner.setup), fitter_(refiner.fitter), state_(refiner.state), refiner_(refiner) {
     if (state_.stage != Stage::refine) return;
-    // A restored state has no queue, which follows from its leaves.
+    // A restored state has no queue; it is rebuilt from the leaves.
     std::vector<bool> isDeferred(state_.tree.nodes.size());
     for (const std::uint32_t leaf : state_.deferred) isDeferred[leaf] = true;
     for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
@@ -85,7 +86,7 @@ class Growth {
     bool operator<(const Entry& other) const { return std::pair(error, other.node) < std::pair(other.error, node); }
   };
 
-  /// False where the growth ended early, by steps or bytes.
+  /// Returns false if the growth ended early, for instance by the limit of steps or bytes.
   bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals); }
 
   void fitBaseCells() {
@@ -120,7 +121,8 @@ class Growth {
     setup_.budget.requireRoomForBaseGrid(refiner_.bytes(), least);
   }
 
-  /// Chooses θ such that a cell at the mean distance of the far cells weighs less by the ratio of the errors asked for.
+  /// Chooses θ such that the weight of a cell at the mean distance of the far cells is the ratio of the squared errors
+  /// asked for, near to far.
   void chooseNearness() {
     double distance = 0, volume = 0;
     for (const BuildNode& node : state_.tree.nodes) {
@@ -137,13 +139,14 @@ class Growth {
       node.fit.error.weighted = nearness.weight(node.fit.coefficients[0]) * node.fit.error.squared;
   }
 
-  /// False where the maximum error alone decides what is refined: refining by bytes alone would leave it no room.
+  /// Returns false if the maximum error alone decides what is refined. Refinement by the errors of cells would then
+  /// leave no bytes for it.
   bool growsByErrors() const { return !setup_.options.targetError.isNone() || !(setup_.options.maxError > 0); }
 
   void refineWorstCells() {
     while (!reachedGoal() && refiner_.mayStep() && (!queue_.empty() || enqueueDeferred())) {
       refineRound();
-      // Rounding in the running total must end the construction neither early nor never.
+      // Rounding errors of the running total must neither end the construction early nor keep it from ending.
       if (reachedGoal() || state_.totals.weighted < 1e-6 * state_.lastSum) refiner_.sumTotals();
       refiner_.observer.atWholeState();
     }
@@ -162,9 +165,9 @@ class Growth {
     }
   }
 
-  /// Takes the leaves of a round from the queue and defers those that are exact enough.
+  /// Takes the leaves of a round from the queue, and defers those whose kind, near or far, has reached its goal.
   std::vector<std::uint32_t> worstLeaves() {
-    constexpr std::size_t kRound = 32;  // few enough to stay close to the paper's order, one cell at a time
+    constexpr std::size_t kRound = 32;  // few enough to stay close to the paper's order, which refines cells one by one
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
       const std::uint32_t next = queue_.top().node;
@@ -208,7 +211,7 @@ class Growth {
     return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
   }
 
-  /// Enqueues the deferred leaves that are not exact enough after all. Returns false where the queue stays empty.
+  /// Enqueues the deferred leaves whose kind does not meet its goal any longer. Returns false if the queue stays empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))

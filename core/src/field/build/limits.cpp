@@ -65,7 +65,7 @@ bool hasEnd(const BuildOptions& options) {
   });
 }
 
-/// Throws `Error` for settings of the end that contradict each other.
+/// Throws `Error` if the settings of when the construction ends contradict each other.
 void checkEnds(const BuildOptions& options) {
   const NearFarError byDistance = options.targetError.byDistance();
   if ((byDistance.near > 0) != (byDistance.far > 0)) refuse("near error and far error belong together: give both");
@@ -88,8 +88,8 @@ void checkEnds(const BuildOptions& options) {
     refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
 }
 
-/// The part of the limit that remains without the lookup grid. The grid has an entry for each base cell or, if that is
-/// more, for a sixteenth of the bytes of nodes and coefficients; blending adds half an entry.
+/// Returns the part of the limit that remains without the lookup grid. The grid has one entry for each base cell, or
+/// takes a sixteenth of the bytes of nodes and coefficients if that is more; blending adds half an entry to each.
 double limitWithoutLookup(const BuildOptions& options) {
   if (!options.maxBytes) return HUGE_VAL;
   const auto limit = double(*options.maxBytes);
@@ -135,7 +135,7 @@ static void requireGridMemory(const BuildOptions& options) {
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
-  constexpr double kTolerance = 1.5;  // for the extrapolated part
+  constexpr double kTolerance = 1.5;  // the extrapolated need may exceed the limit by this factor
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
     refuse("the distance that the field is made from holds ", bytesText(fixed), " of memory, more than the ",
@@ -165,7 +165,8 @@ double ByteBudget::nodeBytes() const {
 }
 
 double ByteBudget::growthLimit() const {
-  // Pruning needs refinements to choose from. The factor was measured like `kGrowth` in growth.cpp.
+  // Pruning needs refinements to choose from, so that the growth may exceed the limit. The factor was measured like
+  // `kGrowth` in limits.h.
   constexpr double kByteGrowth = 1.6;
   return options_.criterion == Criterion::optimal ? limit_ * kByteGrowth : limit_;
 }

@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Ratio of the error at which growth ends to the goal where pruning follows. On bunny_69k at τ = 1e-6, 0.7 takes 1.3
-/// times the evaluations of Φ for 0.49 times the coefficients, 0.5 takes 1.7 times for 0.48.
+/// Where pruning follows, the growth ends at this fraction of the error goal. On bunny_69k at τ = 1e-6, a fraction of
+/// 0.7 takes 1.3 times the evaluations of Φ for 0.49 times the coefficients; 0.5 takes 1.7 times for 0.48 times.
 constexpr double kGrowth = 0.7;
 
 /// The degree of the base cells before any refinement.
@@ -29,11 +29,11 @@ ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
 /// Memory that a construction holds, and its growth.
 struct MemoryNeed {
   std::size_t nodes = 0, coefficients = 0;
-  double growthFactor = 1;     ///< how many times as much there will be at the end, at least
+  double growthFactor = 1;     ///< lower bound of the octree's final size divided by its present size
   std::size_t fixedBytes = 0;  ///< bytes besides the octree
 };
 
-/// Throws `Error` where the octree and the fixed bytes exceed the memory that is allowed, or will at the end.
+/// Throws `Error` if the octree and the fixed bytes exceed the allowed memory, or will exceed it at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 
 /// Counts the bytes of the finished field by its nodes and coefficients, without its lookup grid.
@@ -47,7 +47,7 @@ class ByteBudget {
   }
   /// Number of coefficients that the finished field keeps of a leaf.
   std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
-  /// A node's own bytes with its blend extent and bound.
+  /// Bytes of a node, including its blend extent and bound if the field has them.
   double nodeBytes() const;
   double leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }
   double bytes(double nodes, double coefficients) const {
@@ -56,9 +56,10 @@ class ByteBudget {
 
   /// The limit for nodes and coefficients; infinite without a limit.
   double limit() const { return limit_; }
-  /// The limit while the octree grows: beyond `limit` where pruning follows.
+  /// The limit while the octree grows. It is greater than `limit` if pruning follows.
   double growthLimit() const;
-  /// Throws `Error` where base cells of these bytes, or of these least bytes after pruning, exceed the limit.
+  /// Throws `Error` if the base cells take more than the growth limit with `bytes`, or more than the limit with
+  /// `leastBytes`, the least that pruning can leave.
   void requireRoomForBaseGrid(double bytes, double leastBytes) const;
 
   /// Precision of the finished field's coefficients: float where bytes are limited and the choice is free.

@@ -23,7 +23,7 @@ struct Probes {
   std::vector<Vector3> local;             ///< the points in local coordinates
 };
 
-/// The lattice block by block: exact distances are fastest for eight neighbouring points.
+/// Returns the lattice block by block, because exact distances are fastest for eight neighbouring points.
 const Probes& probes() {
   static const Probes all = [] {
     constexpr int kBlocks = kAcross / 2;  // number of blocks of eight neighbours along an axis
@@ -111,7 +111,7 @@ class MaxErrorPass {
     return candidates;
   }
 
-  /// Applies the candidate's refinement and lets the new leaves wait for their turn.
+  /// Applies the candidate's refinement and appends the new leaves to those that wait to be probed.
   void apply(std::uint32_t leaf, Candidate&& candidate) {
     if (!candidate.trial) {
       state_.measuredError = std::max(state_.measuredError, candidate.worst);
@@ -120,7 +120,7 @@ class MaxErrorPass {
     const bool mayStep = refiner_.mayStep();
     if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
     if (!mayStep || state_.isFull || candidate.raises) {
-      state_.pending.push_back(leaf);  // without a step it is only measured
+      state_.pending.push_back(leaf);  // probed again; if no step is left, only to measure it
       return;
     }
     const std::uint32_t first = state_.tree.nodes[leaf].firstChild;
@@ -143,7 +143,7 @@ class MaxErrorPass {
       return candidate;
     }
 
-    // Probe the leaf. A probe outside of the band stands for the points around it that are within.
+    // Probe the leaf. A probe that lies slightly outside the band represents the points around it within the band.
     const Box box = state_.tree.boxOf(leaf);
     const std::vector<double> exact = fitter_.distances(box, probes().local);
     const double band = setup_.options.band;

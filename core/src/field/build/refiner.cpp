@@ -54,7 +54,7 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     return;
   }
 
-  // Exchange the leaf's error for that of its successors.
+  // Replace the leaf's error by the errors of its refinement.
   state.coefficients += added;
   state.totals.add(tree.nodes[leaf].fit.error, -1);
   if (raises) {
@@ -76,8 +76,8 @@ void Refiner::sumTotals() {
 }
 
 void Refiner::requireMemory(double factor) const {
-  // Where refinements may be pruned, cached projections and internal nodes hold about three times the leaves' own
-  // coefficients on top.
+  // If pruning follows, cached projections and internal nodes take about three times the memory of the leaves' own
+  // coefficients in addition.
   const bool keepsAll = setup.options.criterion == Criterion::optimal;
   detail::requireMemory({.nodes = state.tree.nodes.size(),
                          .coefficients = keepsAll ? 4 * state.coefficients : state.coefficients,

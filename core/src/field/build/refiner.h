@@ -22,13 +22,13 @@ struct ConstructionState {
   Nearness nearness;
   ErrorTotals totals;           ///< running sums, updated with each step
   double lastSum = 0;           ///< weighted total when the totals were last summed exactly
-  double measuredError = 0;     ///< greatest error that the max-error pass has left
+  double measuredError = 0;     ///< greatest error among the leaves that the max-error pass has finished
   bool isFull = false;          ///< a refinement would exceed the limit of bytes
   std::uint64_t processed = 0;  ///< number of entries of `pending` that the max-error pass has finished
   BuildTree tree;
-  std::vector<std::uint32_t> deferred;  ///< leaves whose kind, near or far, was exact enough when their turn came
-  std::vector<std::uint32_t> pending;   ///< leaves of the max-error pass, in the order of their turns
-  std::size_t coefficients = 0;         ///< that the finished field keeps of all leaves; derived, not stored
+  std::vector<std::uint32_t> deferred;  ///< leaves put aside because their kind, near or far, had reached its goal
+  std::vector<std::uint32_t> pending;   ///< leaves of the max-error pass, in the order in which they are probed
+  std::size_t coefficients = 0;         ///< number of coefficients of the finished field; derived, not stored
 };
 
 /// The goal of a construction, and what all its stages share.
@@ -38,15 +38,15 @@ struct ConstructionSetup {
   const Progress& progress;
   double referenceLength;  ///< L
   ErrorGoal goal;
-  ErrorGoal growthGoal;  ///< beyond `goal` where pruning follows
+  ErrorGoal growthGoal;  ///< a smaller error than `goal` if pruning follows
   const ByteBudget& budget;
 };
 
-/// Calls back while the octree grows.
+/// Callbacks while the octree grows.
 struct GrowthObserver {
   /// Called with the number of steps: 0 once the base cells are fitted, then after each step. May be empty.
   std::function<void(std::uint64_t steps)> afterStep;
-  /// Called where the state is whole and may be kept.
+  /// Called whenever the state is complete, so that it can be saved.
   std::function<void()> atWholeState;
 };
 
@@ -57,7 +57,7 @@ struct Refiner {
   ConstructionState& state;
   const GrowthObserver& observer;
 
-  /// Returns nothing where the leaf has reached the limits of degree and depth.
+  /// Returns the refinements that the limits of degree and depth allow for a leaf; nothing if they allow none.
   std::optional<Refinement> allowed(const BuildNode& leaf) const;
   /// False once the limit of steps or bytes is reached.
   bool mayStep() const;
@@ -67,14 +67,15 @@ struct Refiner {
     return fitter.attempt(state.tree.boxOf(leaf), leaf.fit, allowed);
   }
 
-  /// Raises the degree of a leaf or splits it as tried, unless the limit of bytes forbids it: then the state is full.
+  /// Raises the degree of a leaf or splits it, as `trial` did. If the limit of bytes forbids this, sets `isFull` of
+  /// the state instead.
   void apply(std::uint32_t leaf, Trial&& trial, bool raises);
 
   /// Sums the totals exactly.
   void sumTotals();
-  /// Bytes of the field so far, by the budget's count.
+  /// Returns the bytes of the present field, as `ByteBudget` counts them.
   double bytes() const { return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)); }
-  /// Throws `Error` where the octree exceeds memory, or will when `factor` times as much has grown.
+  /// Throws `Error` if the octree exceeds the allowed memory, or will exceed it after growing by `factor`.
   void requireMemory(double factor = 1) const;
 };
 
@@ -89,8 +90,8 @@ ErrorTotals sumOfErrors(const BuildTree& tree);
 /// reached.
 void growByErrors(Refiner& refiner);
 
-/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The greatest error that
-/// the limits leave goes into the state.
+/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The state stores the
+/// greatest error that remains because of the limits.
 void refineByProbes(Refiner& refiner);
 
 }  // namespace hpsdf::detail

@@ -14,7 +14,8 @@ struct BuildNode {
   std::uint32_t firstChild = 0;  ///< 0: a leaf
   std::uint32_t depth = 0;
   std::array<std::uint32_t, 3> cellIndex{};  ///< in cells of its depth, from the domain's lower corner
-  /// The leaf's fit; of an internal node the fit that it would have as a leaf, where pruning may follow, else empty.
+  /// The fit of a leaf. For an internal node it is the fit that the node would have as a leaf if pruning follows, and
+  /// otherwise empty.
   Fit fit;
 };
 
@@ -33,7 +34,7 @@ struct BuildTree {
   /// Sets depth and cell indices of the eight children of a node.
   void setChildIndices(std::uint32_t parent);
 
-  /// Adds eight children with their fits to a leaf, and replaces its own fit.
+  /// Adds eight children with their fits to a leaf, whose own fit is replaced by `own`.
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 

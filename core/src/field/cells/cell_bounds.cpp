@@ -28,7 +28,7 @@ constexpr double kRounding = 1e-12;
 struct Part {
   Vector3 center, half;              ///< in the field's units
   double value = 0;                  ///< constant coefficient: the linear polynomial's value at the centre
-  Vector3 gradient;                  ///< of the linear polynomial
+  Vector3 gradient;                  ///< gradient of the linear polynomial
   std::array<double, 3> squares{};   ///< coefficients of L_2 along each axis
   std::array<double, 3> products{};  ///< coefficients of the products yz, xz, xy
   double rest = 0;                   ///< bound of the terms of degree 3 and more
@@ -93,10 +93,10 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
 }
 
 /// Number of points at which Φ is evaluated to bound it over a part: the centre, and one point on either side of it
-/// along the polynomial's gradient, at the distance of an edge of the leaf. Seen from the part, the surface-free ball
-/// around a distant point on that line is nearly a half-space.
+/// along the polynomial's gradient, at the distance of an edge of the leaf. The farther away such a point y is, the
+/// more nearly its bounds Φ(y) ± |x − y| are linear over the part.
 constexpr std::size_t kPointsPerPart = 3;
-constexpr double kSideDistance = 1;  // in edges; with 2, 0.7, 1.4 bunny's median bound is 2.1, 1.03, 1.2 times as great
+constexpr double kSideDistance = 1;  // in edges; 0.7, 1.4 and 2 multiply bunny's median bound by 1.03, 1.2 and 2.1
 
 std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain, double edge) {
   std::array<Vector3, kPointsPerPart> partPoints;
@@ -289,7 +289,7 @@ void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F&
   });
 }
 
-/// By node: depth of the deepest leaf among a leaf's neighbours and their neighbours.
+/// Returns for each node the depth of the deepest leaf among a leaf's neighbours and their neighbours.
 std::vector<int> deepestAround(const FieldData& field, const std::vector<query::OctreeNode>& leaves) {
   std::vector<int> deepest(field.nodes.size(), 0);
   for (const query::OctreeNode& leaf : leaves) deepest[leaf.node] = leaf.depth;
@@ -354,7 +354,7 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   std::vector<CellBound> bounds(field.nodes.size());
   const std::vector<query::OctreeNode> leaves = query::allLeaves(field);
   const BoundFinder find(field, distance);
-  const double share = field.blend > 0 ? 0.5 : 1;  // of the progress
+  const double share = field.blend > 0 ? 0.5 : 1;  // share of the progress
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, share * double(begin) / double(leaves.size()));
     tbb::parallel_for(begin, std::min(begin + kLeavesPerStep, leaves.size()),

@@ -37,8 +37,8 @@ void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& poin
   intoGroups(order.subspan(middle), points);
 }
 
-/// The order of points in compact groups. Empty, for the order as it is, where there are so many points that eight in
-/// succession lie close to each other anyway.
+/// Returns the order of points in compact groups. It is empty, for the given order, if there are so many points that
+/// eight consecutive ones lie close to each other anyway.
 std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
   constexpr std::size_t kMost = 8 * 1000;
   if (points.size() > kMost) return {};
@@ -133,8 +133,8 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
   const double residual = std::max(meanSquare - represented, 0.0);
   if (options_.estimator == Estimator::residual) return residual;
 
-  // Where Φ is even or odd about the cell's centre, every other shell of coefficients is empty, and the embedded
-  // estimate may vanish. Then the residual ∫Φ² − Σc² replaces it, but only where it is far above the shell, so that
+  // If Φ is even or odd about the cell's centre, the coefficients of every other total degree vanish, and the
+  // embedded estimate may vanish too. The residual ∫Φ² − Σc² then replaces it, but only if it is far greater, so that
   // everywhere else the paper's estimate decides.
   const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
   return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;

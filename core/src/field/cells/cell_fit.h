@@ -47,8 +47,8 @@ enum class Refinement : std::uint8_t { degree, octree, either };
 /// Samples Φ and fits polynomials. Thread-safe: cells are fitted in parallel.
 class CellFitter {
  public:
-  /// Keeps references. `nearness` may change between two fits. Cells may hold points near the surface where the mean
-  /// of their field is less than `nearDistance` and half their diagonal from it.
+  /// Keeps references to its arguments. `nearness` may change between two fits. A cell counts as near the surface if
+  /// the mean of its field is at most `nearDistance` plus half of the cell's diagonal, in absolute value.
   CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
              double nearDistance, const Progress& progress);
 
@@ -71,7 +71,7 @@ class CellFitter {
   /// The quadrature of all cells of one degree p.
   struct Rules {
     std::unique_ptr<const basis::Projection>
-        projection;                           ///< onto degree p+1, whose lower coefficients are those of degree p
+        projection;                           ///< onto degree p+1, which contains the projection onto degree p
     std::vector<std::uint32_t> orderOfOne;    ///< order in which a cell is sampled; empty: that of the points
     std::vector<std::uint32_t> orderOfEight;  ///< order for eight children, child · points + point
   };

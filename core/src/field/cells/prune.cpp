@@ -13,8 +13,8 @@
 namespace hpsdf::detail {
 namespace {
 
-constexpr std::uint8_t kSplit = 0xff;  ///< stands for a degree where a node stays split
-constexpr int kHalvings = 60;          // of the logarithmic range of λ, down to its last bits
+constexpr std::uint8_t kSplit = 0xff;  ///< value in place of a degree for a node that stays split
+constexpr int kHalvings = 60;          // halvings of the range of log λ, down to the last bits of λ
 
 /// Squared errors of a node by degree, up to the degree of its cached projection.
 std::vector<double> squaredErrors(const Fit& fit) {
@@ -68,7 +68,8 @@ class Pruning {
     return error;
   }
 
-  /// Chooses the best leaf degree or split of each node for this λ, from the leaves up: children follow their parents.
+  /// Chooses for each node its best degree as a leaf, or to stay split, for this λ. It works from the leaves up: in
+  /// the array, children come after their parents.
   void choose(double lambda) {
     std::vector<double> cost(tree_.nodes.size());
     for (std::size_t n = tree_.nodes.size(); n-- > 0;) {
@@ -87,7 +88,7 @@ class Pruning {
   double chooseDegree(std::size_t n, double lambda) {
     const Fit& fit = tree_.nodes[n].fit;
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
-    // Outside of the narrow band no error counts, so that lowering would leave nothing of the fit.
+    // Outside of the narrow band no error counts, so that pruning would lower every degree to the least.
     const int low = fit.outsideBand ? fit.degree : std::min(limits_.leastDegree, top);
     double least = HUGE_VAL;
     for (int degree = low; degree <= top; ++degree) {
@@ -141,7 +142,7 @@ class Pruning {
     kept.grid = tree_.grid;
     const std::size_t base = tree_.baseCells();
     for (std::size_t n = 0; n < base; ++n) take(kept, n);
-    for (std::size_t n = 0; n < kept.nodes.size(); ++n) {  // grows
+    for (std::size_t n = 0; n < kept.nodes.size(); ++n) {  // the list grows
       const std::uint32_t from = kept.nodes[n].firstChild;
       if (from == 0) continue;
       kept.nodes[n].firstChild = static_cast<std::uint32_t>(kept.nodes.size());
@@ -166,7 +167,7 @@ class Pruning {
 
   BuildTree& tree_;
   const PruneLimits& limits_;
-  std::vector<std::vector<double>> squared_;  ///< by node, by degree
+  std::vector<std::vector<double>> squared_;  ///< squared errors by node and degree
   std::vector<double> weight_;
   std::vector<std::uint8_t> chosen_;  ///< a leaf's degree, or kSplit
 };

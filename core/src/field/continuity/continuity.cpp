@@ -115,7 +115,7 @@ class ConjugateGradients {
 
   FaceCoupling& coupling_;
   const WeakContinuity& options_;
-  std::vector<float> preconditioner_;  ///< float suffices, as any positive numbers do, and halves the bytes read
+  std::vector<float> preconditioner_;  ///< any positive numbers would do; float halves the bytes to read
   std::vector<double> change_, residual_, direction_, product_;
 };
 
@@ -158,7 +158,7 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   const std::vector<double> change = solver.solve(squaredNorm(x), progress);
   FieldMetadata& metadata = field.metadata;
   metadata.settings.continuityWeight = options.weight;
-  metadata.settings.maxError = metadata.measuredError = 0;  // They hold for the polynomials before the change.
+  metadata.settings.maxError = metadata.measuredError = 0;  // both held only before the change
   metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);
   field.bounds.clear();
   if (solver.figures.change > 0) {

@@ -271,8 +271,8 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
     out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// Computes the jump across a link, times √(w_F·area/|Ω|), in the polynomials of the small face. The large leaf's
-/// unknowns carry the root of a greater volume, which `scale` takes off.
+/// Computes the jump across a link, times √(w_F·area/|Ω|), in the polynomials of the small face. The unknowns of the
+/// large leaf contain the root of a greater volume; `scale` corrects them to that of the small leaf.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   std::array<double, kMaxFaceCoefficients> large;

@@ -77,7 +77,7 @@ class Numbering {
 
  private:
   GridIndex cells_;
-  std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis, then of all nodes
+  std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis; then the node count
 };
 
 /// Returns the n-th node of the cell with this lower corner. Nodes 0 to 7 are the corners, n = x + 2y + 4z; then come

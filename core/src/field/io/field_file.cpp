@@ -16,9 +16,9 @@
 namespace hpsdf {
 namespace {
 
-// The carriage return, line feed and end-of-file mark show a transfer that took the file for text, like PNG's.
+// As in PNG files, the carriage return, line feed and end-of-file mark reveal a transfer that took the file for text.
 constexpr detail::Magic kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-// Version 1 has no steps; 2 neither continuity, bounds, maximum error nor criteria; 3 no inside test.
+// Version 2 added the steps; 3 continuity, bounds, maximum error and criteria; 4 the inside test.
 constexpr std::uint32_t kVersion = 4;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
@@ -151,7 +151,7 @@ Field load(const std::filesystem::path& file) {
   reader.require(sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8, "its coefficients have an unknown type");
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
-  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // the only one of these versions
+  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // their only inside test
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);

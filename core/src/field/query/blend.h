@@ -29,14 +29,15 @@ struct Ramp {
   double slope;  ///< derivative of the value in world units
 };
 
-/// Evaluates S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1 at t = 1, where
-/// t is the distance to the nearer face in parts of the blend extent there. Only one face's blend zone holds the point.
+/// Evaluates S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1 at t = 1,
+/// where t is the signed distance to the nearer face in units of the blend extent there. A point lies in the blend
+/// zone of at most one of two opposite faces.
 inline Ramp rampAlong(const FieldData& field, const LookupGrid& lookupGrid, const LeafPoint& leaf, int axis) {
   const GridFrame& frame = lookupGrid.frame;
   const bool upper = leaf.local[axis] > 0;
   const int depth = blend_extent::depth(lookupGrid.blendExtents[leaf.blendExtentsIndex], axis, upper);
   if (depth == blend_extent::kDomainFace) return {1, 0};
-  // 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to parts of the blend extent.
+  // 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to units of the blend extent.
   const double scale = std::bit_cast<double>(std::uint64_t(1022 + depth - leaf.depth) << 52) / field.blend;
   const double t = std::clamp((1 - std::abs(leaf.local[axis])) * scale, -1.0, 1.0);
   const double toWorld = 2.0 * (std::uint32_t{1} << leaf.depth) * frame.cells[axis] / frame.size[axis];
@@ -48,8 +49,8 @@ inline std::int64_t fixedPointAcross(std::int64_t cellIndex, int depth, bool upp
   return upper ? (cellIndex + 1) << (kMaxDepth - depth) : (cellIndex << (kMaxDepth - depth)) - 1;
 }
 
-/// Tells whether only two leaves have a weight at a point that is near the first leaf's face across `axis` alone, given
-/// its local coordinates in the leaf across. Most points in blend zones are of this kind.
+/// Tells whether only two leaves have a weight at a point that is near the first leaf's face across `axis` alone,
+/// given the point's local coordinates in the leaf across that face. Most points in blend zones are of this kind.
 inline bool onlyTwoOverlap(const FieldData& field, const std::array<double, 3>& localAcross, int axis) {
   return (blendZoneAxes(field, localAcross) & ~(1U << axis)) == 0;
 }
@@ -66,7 +67,7 @@ inline ValueAndGradient blendTwo(const ValueAndGradient& a, const Ramp& rampA, c
   return result;
 }
 
-/// The cells of one depth that come within `blend` of their edges of a point: one or two along each axis.
+/// The cells of one depth that are at most `blend` of their edge lengths away from a point: one or two along each axis.
 struct CandidateCells {
   CellIndex first;
   std::array<int, 3> extra;  ///< number of cells besides the first along each axis, 0 or 1
@@ -98,7 +99,7 @@ struct OpenNodes {
   bool any = false;
 };
 
-/// Visits the leaves among the candidates of the first depth: that of the lookup grid, or 0.
+/// Visits the leaves among the candidates of the first depth, which is that of the lookup grid or 0.
 template <typename Visit>
 OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
                           const std::array<double, 3>& gridCoordinates, bool byLookupGrid, Visit&& visit) {
@@ -145,10 +146,11 @@ OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const s
   return open;
 }
 
-/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. It works depth by depth:
-/// a child comes no closer to a point than its parent does, measured in their own edges, so that each depth has eight
-/// candidates at most. `ownDepth` is the depth of the leaf that holds the point. If that leaf is larger than the lookup
-/// grid's entries, others of its size overlap more than an entry's edge tells, and the search starts at the base cells.
+/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. It works depth by
+/// depth. In units of its own edge, a child is at least as far from the point as its parent, so that only children of
+/// candidates are candidates, at most eight at each depth. `ownDepth` is the depth of the leaf that holds the point.
+/// If that leaf is larger than the lookup grid's entries, leaves of its size may have a weight although their entries
+/// are not among the candidates; the search then starts at the base cells.
 template <typename Visit>
 void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, int ownDepth, Visit&& visit) {

@@ -32,7 +32,7 @@ struct GridPoint {
   }
 };
 
-/// Returns which of its parent's children the cell of a depth on an octree path is.
+/// Returns the number, within its parent, of the cell of this depth on an octree path.
 inline std::uint32_t childOnPath(std::uint64_t path, int depth) {
   const std::uint64_t bits = (path >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;

@@ -160,7 +160,7 @@ void listByDegree(const T* coefficients, Batch& batch) {
     const int degree = node::degree(batch.bits[i]);
     const T* first = coefficients + node::offset(batch.bits[i]);
     const std::size_t last = coefficientCount(degree) - 1;
-    // The same number of cache lines for all leaves, because a loop end that varies would be mispredicted.
+    // Each leaf gets the same number of cache lines, because a varying end of the loop would be mispredicted.
     for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
       __builtin_prefetch(first + std::min(at, last));
     for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
@@ -220,7 +220,7 @@ HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::si
 template <typename T, std::size_t Count>
 HWY_INLINE void loadAllTransposed(const std::array<const T*, kLanes>& from, std::array<Lanes, Count>& out) {
   for (std::size_t i = 0; i < Count; i += kLanes) {
-    const std::size_t at = std::min(i, Count - kLanes);  // The last step overlaps the one before, not the end.
+    const std::size_t at = std::min(i, Count - kLanes);  // The last step overlaps the one before to stay in range.
     loadTransposed(from, at, out.data() + at);
   }
 }
@@ -262,7 +262,7 @@ void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
-/// Evaluates every point's own leaf.
+/// Evaluates the polynomial of each point's own leaf, without blending.
 template <typename T, typename Result>
 void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
@@ -293,7 +293,7 @@ Result blendAllAt(const FieldData& field, const LookupGrid& lookupGrid, const Ba
                           LookupGrid::depthOf(batch.bits[i]));
 }
 
-/// The points of a batch that lie in blend zones, without branches as in `descend`.
+/// The points of a batch that lie in blend zones, collected without branches, as in `descend`.
 struct BlendZonePoints {
   std::uint8_t point[kBatch];
   std::uint8_t axes[kBatch];  ///< as `blendZoneAxes` returns them
@@ -312,8 +312,8 @@ struct BlendZonePoints {
 /// Points near one face of their leaves, with the descent to the leaf across that face.
 struct AcrossFaces {
   Batch batch;
-  std::uint8_t point[kBatch];  ///< index into the batch of the points themselves
-  std::uint8_t axis[kBatch];   ///< across the face
+  std::uint8_t point[kBatch];  ///< index of the point in the original batch
+  std::uint8_t axis[kBatch];   ///< axis across the face
 };
 
 /// Adds a point that is near the face across `axis` alone, unless the domain ends at that face.

@@ -25,7 +25,7 @@ void checkDomain(const FieldData& data) {
     notAField("its domain is empty or not finite");
 }
 
-/// Returns the number of base cells. Throws unless the nodes hold at least these.
+/// Returns the number of base cells. Throws if there are fewer nodes than base cells.
 std::size_t checkGrid(const FieldData& data) {
   std::size_t cells = 1;
   for (const std::uint32_t n : data.grid) {

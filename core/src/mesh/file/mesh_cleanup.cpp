@@ -65,7 +65,7 @@ bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
   for (Vector3& edge : edges) edge /= scale;  // Products of scaled edges neither underflow nor overflow.
   std::sort(edges.begin(), edges.end(),
             [](const Vector3& u, const Vector3& v) { return u.squaredNorm() < v.squaredNorm(); });
-  // The cross product of the two shorter edges carries the least cancellation.
+  // The cross product of the two shorter edges suffers least from cancellation.
   const double rounding = 4 * std::numeric_limits<double>::epsilon() * edges[0].norm() * edges[1].norm();
   return edges[0].cross(edges[1]).norm() <= rounding;
 }
@@ -112,7 +112,7 @@ Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   return t;
 }
 
-/// Flips the longest edge of a triangle where that yields two triangles with areas and no edge of more than two.
+/// Flips the longest edge of a triangle if both new triangles have an area and no edge gets more than two triangles.
 bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   const auto [a, b, middle] = longestEdgeFirst(mesh, mesh.triangles[face]);
   const std::uint32_t neighbour = edges.face(b, a);
@@ -147,8 +147,8 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
 
   EdgeMap edges(mesh.triangles);
   std::size_t flips = 0;
-  // A flip may be possible only after that of a neighbour without area, hence the rounds. Every round but the last
-  // flips a triangle.
+  // A flip may become possible only after a neighbour without area is flipped. The search is therefore repeated in
+  // rounds, each of which, except the last, flips a triangle.
   for (bool changed = true; changed;) {
     const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
     flips += flipped;

@@ -118,8 +118,8 @@ class EarClipper {
 
   std::vector<Triangle> clip() {
     // Positions come from float, which rounds corners away from a straight side. Ears as thin as that rounding, and
-    // ears whose cut passes a corner that closely, would yield slivers with normals of noise. They are the second
-    // choice.
+    // ears whose cut passes another corner that closely, would yield slivers whose normals are noise. They are cut
+    // off only if there is no other ear.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
@@ -137,8 +137,8 @@ class EarClipper {
     return corner;
   }
 
-  /// Returns true if the corner is an ear. `tolerance`, relative to the triangle's sides, is how far the corner must be
-  /// from straight and how far all other corners must be from the triangle.
+  /// Returns true if the corner is an ear. The corner must deviate from a straight angle, and all other corners must
+  /// be outside the triangle, by more than `tolerance`, which is relative to the triangle's sides.
   bool isEar(std::uint32_t corner, double tolerance) {
     const std::uint32_t before = previous_[corner], after = next_[corner];
     const std::array<Vector2, 3> ear = {points_[before], points_[corner], points_[after]};

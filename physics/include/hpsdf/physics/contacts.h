@@ -1,5 +1,6 @@
 #pragma once
-// The surface samples of one body that lie in another body: position, depth, and direction out of that body.
+// The samples of one body's surface that lie in another body: position, depth, and direction out of the other
+// body.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,21 +15,21 @@ namespace hpsdf::physics {
 
 struct ContactOptions {
   double margin = 0;  ///< samples up to this distance outside are contacts too; world units, 0 or more
-  /// The number of contacts to keep, the deepest first, of equal depths the lower sample index first. Without it all
-  /// contacts are returned, in the order of the samples.
+  /// The number of contacts to keep: the deepest ones, in descending order; among equal depths the lower sample
+  /// index comes first. Without a number all contacts are returned, in the order of the samples.
   std::optional<std::size_t> deepest = {};
 };
 
 struct Contact {
   std::uint32_t sample;  ///< index of the sample
   double depth;          ///< −f at the sample: above 0 inside
-  Vector3 position;      ///< of the sample, in the world
+  Vector3 position;      ///< position of the sample, in the world
   /// Unit vector in the world out of the field's body: the field's direction of steepest ascent. Where the gradient
   /// vanishes, the opposite of the sample's normal.
   Vector3 normal;
 };
 
-/// Samples of one body and the field of another. All lengths have one unit; transforms are rotations with translations.
+/// The samples of one body and the field of another. All lengths have the same unit; transforms are rigid motions.
 struct BodyPair {
   const SurfaceSamples* samples;
   Eigen::Isometry3d worldFromSamples;
@@ -47,8 +48,8 @@ struct QueryCost {
 
 class PairContacts;
 
-/// Runs queries one after another. It reuses its memory, so that a query allocates only if it has more contacts than
-/// all before.
+/// Runs queries one after another. It reuses its memory, so that a query allocates only if it has more contacts
+/// than every query before.
 class ContactQuery {
  public:
   /// Finds exactly the samples that evaluating the field at each sample would find. The result is valid until the next

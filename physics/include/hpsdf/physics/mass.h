@@ -17,9 +17,9 @@ struct MassProperties {
   Box box;          ///< bounding box of the mesh in the frame of inertia
 };
 
-/// Integrates over the tetrahedra of the faces and one point (divergence theorem; Tonon 2004 gives their moments).
-/// Throws `Error` for a mesh without volume, with indices out of range or coordinates that are not finite. The
-/// properties of an open mesh are those of some closed one.
+/// Integrates over the tetrahedra that the faces form with one point (divergence theorem; Tonon 2004 gives their
+/// moments). Throws `Error` for a mesh without volume, with indices out of range or coordinates that are not
+/// finite. For an open mesh the result is that of some closed mesh.
 MassProperties massProperties(const TriangleMesh& mesh);
 
 }  // namespace hpsdf::physics

@@ -22,7 +22,7 @@ struct SampleOptions {
   /// Side in mesh units of the square of surface that each sample represents. The nearest neighbour of a sample is
   /// about 0.85 times as far away.
   std::optional<double> spacing = {};
-  std::uint64_t seed = 1;  ///< of the random candidates
+  std::uint64_t seed = 1;  ///< seed of the random candidates
 };
 
 /// Points of a surface with its outward normals, sorted so that the points of each sphere are contiguous. Immutable.
@@ -42,14 +42,14 @@ class SurfaceSamples {
   std::vector<Sphere> spheres_;
 };
 
-/// Distributes samples evenly over a mesh, with the normals of their triangles, by sample elimination (Yuksel 2015): of
-/// five times as many random points, the one with the nearest neighbours is removed until the number is right. Surfaces
-/// that face away from each other, as the two sides of a thin wall, are sampled independently. The same mesh and
-/// options give the same bytes.
+/// Distributes samples evenly over a mesh, with the normals of their triangles, by sample elimination (Yuksel
+/// 2015). It starts from five times as many random points and removes the point with the most and nearest
+/// neighbours until the number is right. Surfaces that face away from each other, like the two sides of a thin
+/// wall, are sampled independently. The same mesh and options give the same bytes.
 ///
-/// Throws `Error` for a mesh without triangles or area, with indices out of range or coordinates that are not finite,
-/// for options that do not have exactly one of count and spacing, for a count of 0 or beyond `kMaxSamples`, and for a
-/// spacing that is not above 0 or not finite.
+/// Throws `Error` for a mesh without triangles or area, with indices out of range or coordinates that are not
+/// finite, for options that do not have exactly one of count and spacing, for a count of 0 or beyond
+/// `kMaxSamples`, and for a spacing that is not above 0 or not finite.
 SurfaceSamples sampleSurface(const TriangleMesh& mesh, const SampleOptions& options);
 
 }  // namespace hpsdf::physics

@@ -29,9 +29,9 @@ struct Body {
   Color color = bodyColor(0);
 };
 
-/// The bodies that the pixels of a view see, rows top to bottom. Distances compare with those of `ViewBuffers`, so that
-/// the nearer of a body and the surface hides the other. A pixel without a body has `body` kNoBody and 0 in the other
-/// buffers.
+/// The bodies that the pixels of a view see, rows top to bottom. Distances can be compared with those of
+/// `ViewBuffers`, so that the nearer of a body and the surface hides the other. A pixel without a body has `body`
+/// kNoBody and 0 in the other buffers.
 struct BodyBuffers {
   int width = 0;
   int height = 0;
@@ -51,10 +51,10 @@ class BodyRenderer {
  public:
   virtual ~BodyRenderer();
 
-  /// Renders bodies. In perspective nothing is seen at depths below 1e-5 of the farthest body's; with parallel rays,
-  /// nothing before the plane in which they start. Requires that the camera's forward, right and up vectors are at
-  /// right angles. Throws `Error` for a view of more than 64 Mi pixels, before memory is taken, and for bodies as
-  /// `bounds` does.
+  /// Renders bodies. In perspective, nothing is seen at depths below 1e-5 of the farthest body's depth; with
+  /// parallel rays, nothing in front of the plane in which the rays start. Requires that the camera's forward, right
+  /// and up vectors are at right angles. Throws `Error` for a view of more than 64 Mi pixels, before memory is
+  /// taken, and for bodies as `bounds` does.
   virtual BodyBuffers view(const Camera& camera, std::span<const Body> bodies, int width, int height) = 0;
 
   /// Moves the vertices of a mesh, world units; its triangles stay. Throws `Error`, and leaves the mesh as it is, for
@@ -69,9 +69,9 @@ class BodyRenderer {
   virtual std::string description() const = 0;
 };
 
-/// The oracle: intersects the ray of each pixel with the triangles in double precision, without OpenGL. Throws `Error`,
-/// naming the mesh, for a mesh without triangles, with coordinates that are not finite or beyond 1e15, or with indices
-/// of no vertex; throws `Error` for more than 2^26 triangles in all.
+/// The reference renderer: intersects the ray of each pixel with the triangles in double precision, without
+/// OpenGL. Throws `Error`, naming the mesh, for a mesh without triangles, with coordinates that are not finite or
+/// beyond 1e15, or with indices of no vertex; throws `Error` for more than 2^26 triangles in all.
 std::unique_ptr<BodyRenderer> makeCpuBodyRenderer(std::vector<TriangleMesh> meshes);
 
 /// Renders with OpenGL: each mesh is uploaded once, and each body is an instance of its mesh. OpenGL decides which

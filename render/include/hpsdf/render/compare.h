@@ -10,9 +10,10 @@
 
 namespace hpsdf::render {
 
-/// The tolerated difference of a channel, of 255: another processor rounds the low bits differently.
+/// The tolerated difference of a channel, out of 255: processors differ in how they round the lowest bits.
 constexpr int kFreeDifference = 3;
-/// The tolerated share of pixels that differ more: at cell edges and silhouettes a low bit decides between two cells.
+/// The tolerated share of pixels that differ by more: at cell edges and silhouettes the lowest bit may choose the
+/// cell.
 constexpr double kPixelBudget = 0.002;
 
 struct Comparison {
@@ -30,8 +31,8 @@ Comparison compare(const Image& baseline, const Image& actual);
 /// pixels differ.
 std::string problem(const Comparison& comparison, double budget);
 
-/// Shows the differences between two pictures of one size: black where the pixels are equal, dark grey where their
-/// difference is tolerated, and from mid grey to white where it is not.
+/// Shows the differences between two pictures of the same size: black where the pixels are equal, dark grey where
+/// their difference is tolerated, and from mid grey to white where it is not.
 Image differencePicture(const Image& baseline, const Image& actual);
 
 struct PixelDifference {
@@ -39,10 +40,10 @@ struct PixelDifference {
   int y;  ///< row, counted from the top
   Color baseline;
   Color actual;
-  int difference;  ///< of the channel that differs most
+  int difference;  ///< difference of the channel that differs most
 };
-/// At most `count` of the pixels that differ most, the worst first; only the worst of neighbours is listed. Both
-/// pictures must have one size.
+/// At most `count` of the pixels that differ most, the worst first. Of neighbouring pixels only the worst is
+/// listed. Both pictures must have the same size.
 std::vector<PixelDifference> worstPixels(const Image& baseline, const Image& actual, std::size_t count);
 
 }  // namespace hpsdf::render

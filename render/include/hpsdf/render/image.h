@@ -8,7 +8,7 @@
 
 namespace hpsdf::render {
 
-/// An sRGB colour with 8 bits a channel.
+/// An sRGB colour with 8 bits per channel.
 using Color = std::array<std::uint8_t, 3>;
 
 /// sRGB picture, rows top to bottom.
@@ -29,8 +29,8 @@ void savePng(const Image& image, const std::filesystem::path& file);
 /// Throws `hpsdf::Error` that names the file.
 Image loadPng(const std::filesystem::path& file);
 
-/// Throws `Error` unless a picture of a view may have this size and sample count: 16 to 16384 pixels a side, 1 to 8
-/// samples a pixel along each axis, no more than 64 Mi samples in all.
+/// Throws `Error` unless a picture of a view may have this size and sample count: 16 to 16384 pixels per side, 1
+/// to 8 samples per pixel along each axis, and no more than 64 Mi samples in all.
 void checkPictureSize(int width, int height, int samples);
 
 }  // namespace hpsdf::render

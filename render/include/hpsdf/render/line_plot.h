@@ -1,5 +1,5 @@
 #pragma once
-// A plot of a field along a straight line: the clearest view of a jump.
+// A plot of a field along a straight line, which shows jumps most clearly.
 
 #include <span>
 

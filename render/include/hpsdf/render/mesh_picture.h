@@ -14,11 +14,12 @@
 namespace hpsdf::render {
 
 struct MeshPicture {
-  /// Circles the centre of the mesh; distances are in diagonals of a cube around it, as of a field's domain.
+  /// The camera orbits the centre of the mesh. Its distances are in diagonals of a cube around the mesh, as they are
+  /// in diagonals of the domain in the picture of a field.
   OrbitCamera camera;
   int width = 1280;
   int height = 720;
-  int samples = 1;     ///< samples a pixel along each axis, 1 to 8
+  int samples = 1;     ///< samples per pixel along each axis, 1 to 8
   bool whole = false;  ///< replaces the camera's distance by the nearest one that shows the whole mesh
 };
 

@@ -59,8 +59,8 @@ struct Pick {
   double value;  ///< f as the renderer computed it; on a surface the offset, up to rounding
 };
 
-/// Ignores lines and arrows and returns what lies behind them. Nothing where the pixel shows no part of the field:
-/// paper, backdrop, legend, bodies. Throws `Error` for a pixel outside of the picture.
+/// Returns what lies behind lines and arrows at a pixel; nothing where the pixel shows no part of the field, but
+/// paper, backdrop, legend or bodies. Throws `Error` for a pixel outside of the picture.
 std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y);
 
 /// The quantity at each pixel of a view's buffers; NaN where the pixel does not show the field. Throws `Error` where
@@ -83,7 +83,7 @@ ViewSize viewSize(const SurfacePicture& picture);
 /// The view that `draw` colours. Its pixels are square at `viewSize`.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
 
-/// The same plane, framed for `width` × `height` square pixels instead: for files of raw values.
+/// The same plane, framed for `width` × `height` square pixels, for files of raw values.
 SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height);
 
 }  // namespace hpsdf::render

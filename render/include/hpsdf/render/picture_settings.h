@@ -26,7 +26,7 @@ enum class ColorBy : std::uint8_t {
   degree,    ///< degree of the cell
   depth,     ///< depth of the cell
   distance,  ///< f; not for surfaces
-  // The quantities follow: numbers that are never negative, on a scale from dark to light.
+  // The following values are quantities: numbers that are never negative, on a scale from dark to light.
   valueJump,     ///< greatest jump of f at the cell's faces; needs `ReferenceData::jumps`
   gradientJump,  ///< greatest jump of ∇f at the cell's faces; needs `ReferenceData::jumps`
   slope,         ///< ||∇f| − 1| at the point
@@ -36,11 +36,12 @@ enum class ColorBy : std::uint8_t {
 };
 constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
 
-/// The data from which some quantities are computed, besides the field. All of it must live while a picture is drawn.
+/// The data, besides the field, from which some quantities are computed. All of it must live while a picture is
+/// drawn.
 struct ReferenceData {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;  ///< Φ
-  const Field* other = nullptr;             ///< g; outside its domain its continuation counts
+  const Field* other = nullptr;             ///< g; outside of its domain g is continued
   /// The mesh's defects, in the field's units; they are marked on a surface as in a picture of the mesh alone
   /// (mesh_picture.h).
   const MeshDefects* defects = nullptr;
@@ -50,9 +51,9 @@ struct ReferenceData {
 /// compared.
 struct ScaleOptions {
   /// The values of the darkest and the lightest colour of a quantity, ascending, above 0 on a logarithmic scale; for
-  /// distances, the lowest and the highest value for which colours and iso-lines are chosen. Without limits the values
-  /// decide, a few outliers left out: those of all cells if the quantity belongs to cells, else those of the points
-  /// shown.
+  /// distances, the lowest and the highest value for which colours and iso-lines are chosen. Without limits they are
+  /// chosen from the values, except a few outliers: from the values of all cells if the quantity belongs to cells,
+  /// else from those of the points shown.
   std::optional<std::array<double, 2>> limits = {};
   bool logarithmic = true;
   /// Degrees or depths, 0 to 255 and ascending, that the legend contains in addition to the field's own.
@@ -75,7 +76,7 @@ struct SlicePicture {
   ColorBy color = ColorBy::degree;
   int width = 1280;  ///< pixels of the whole picture, legend included
   int height = 720;  ///< pixels of the whole picture, caption included
-  int samples = 1;   ///< samples a pixel along each axis, 1 to 8
+  int samples = 1;   ///< samples per pixel along each axis, 1 to 8
   ScaleOptions scale = {};
   bool bare = false;                   ///< draws the view alone, as large as the picture, without legend and caption
   double zoom = 1;                     ///< 1 shows the whole section with the domain; above 0
@@ -83,8 +84,8 @@ struct SlicePicture {
   int arrows = 0;                      ///< pixels between arrows along the gradient, 4 to 1000; 0 draws none
 };
 
-/// Bodies beside a field's surface. They keep their own colours, and a clipping plane does not cut them. Renderer and
-/// bodies must live while a picture is drawn.
+/// Bodies that are shown together with a field's surface. They keep their own colours, and a clipping plane does
+/// not cut them. The renderer and the bodies must live while a picture is drawn.
 struct ShownBodies {
   BodyRenderer* renderer = nullptr;  ///< holds the bodies' meshes; nullptr for no bodies
   std::span<const Body> bodies = {};
@@ -103,18 +104,18 @@ struct SurfacePicture {
   ColorBy color = ColorBy::normal;
   int width = 1280;
   int height = 720;
-  int samples = 1;  ///< samples a pixel along each axis, 1 to 8
+  int samples = 1;  ///< samples per pixel along each axis, 1 to 8
   ScaleOptions scale = {};
   std::optional<ClipPlane> clip = {};  ///< the section is coloured like the surface, with the outlines of its cells
-  bool cracks = false;                 ///< marks where f jumps over the offset at a face (`ViewBuffers::crack`)
+  bool cracks = false;                 ///< marks where f jumps across the offset at a face (`ViewBuffers::crack`)
   bool bare = false;                   ///< draws the view alone, without legend and caption
   bool surface = true;                 ///< draws the surface and its section
   std::optional<Plane> plane = {};     ///< the domain's section with this plane is drawn, in the picture's colours
   ShownCells cells = {};
   int arrows = 0;  ///< pixels between arrows along the gradient, 4 to 1000; 0 draws none
   ShownBodies bodies = {};
-  /// Replaces the caption about the field, which may be only a part of what is shown. With `ColorBy::normal` the panel
-  /// of facts about the field is left out too, and the view takes its room.
+  /// Replaces the caption about the field, for pictures of which the field is only a part. With `ColorBy::normal`
+  /// the panel of facts about the field is left out too, and the view takes its space.
   std::optional<Caption> caption = {};
 };
 
@@ -129,7 +130,7 @@ struct Legend {
     double t;  ///< position on the bar, 0 at its low end, 1 at its high end
     std::string text;
   };
-  std::string title = {};          ///< empty where colours mean nothing
+  std::string title = {};          ///< empty where colours stand for no quantity
   std::vector<Level> levels = {};  ///< ascending; empty unless the colours stand for degrees or depths
   std::vector<Color> bar = {};     ///< colours from the low end to the high end; empty for degrees and depths
   std::vector<Mark> marks = {};

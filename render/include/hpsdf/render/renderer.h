@@ -20,7 +20,7 @@ class Renderer {
  public:
   virtual ~Renderer();
 
-  /// Samples a rectangle. Throws `Error` for a view that is not finite or a size beyond 1 to 2^20 pixels a side.
+  /// Samples a rectangle. Throws `Error` for a view that is not finite or a size outside 1 to 2^20 pixels per side.
   virtual ViewBuffers slice(const SliceView& view, int width, int height) = 0;
 
   /// Traces the surface f = offset. Throws `Error` as `slice` does, and for an offset that is not finite.
@@ -30,11 +30,13 @@ class Renderer {
   virtual std::string description() const = 0;
 };
 
-/// The oracle: fills the buffers in double precision, without OpenGL. The field must outlive the renderer.
+/// The reference renderer: fills the buffers in double precision, without OpenGL. The field must outlive the
+/// renderer.
 std::unique_ptr<Renderer> makeCpuRenderer(const Field& field);
 
-/// Renders with OpenGL 4.5 core through EGL, without a window. The field is uploaded once, its coefficients as float.
-/// Throws `Error` when no device offers OpenGL 4.5, naming the devices tried, or when the field exceeds its buffers.
+/// Renders with OpenGL 4.5 core through EGL, without a window. The field is uploaded once, its coefficients as
+/// float. Throws `Error` when no device offers OpenGL 4.5, naming the devices tried, or when the field is too
+/// large for the device.
 std::unique_ptr<Renderer> makeGlRenderer(const Field& field, GlChoice choice = GlChoice::automatic);
 
 /// The GL_RENDERER string of the device that `choice` selects. Throws as `makeGlRenderer` does.

@@ -14,7 +14,7 @@ namespace hpsdf::render {
 struct SliceView {
   Vector3 origin;  ///< centre of the rectangle, world units
   Vector3 right;   ///< vector along the whole width, world units
-  Vector3 up;      ///< vector along the whole height, world units
+  Vector3 up;      ///< vector along the whole height, upwards, world units
 };
 
 /// The point that pixel (x, y) of a view of width × height pixels samples, world units.
@@ -53,14 +53,14 @@ struct OrbitCamera {
 struct Camera {
   Vector3 eye;      ///< common start of the rays; orthographic: middle of the plane in which rays start
   Vector3 forward;  ///< unit vector
-  Vector3 right;    ///< half the width of the view, in perspective at distance 1
-  Vector3 up;       ///< half the height of the view, in perspective at distance 1
+  Vector3 right;    ///< vector to the right, half the view's width long, in perspective at distance 1
+  Vector3 up;       ///< vector upwards, half the view's height long, in perspective at distance 1
   Projection projection = Projection::perspective;
 };
 
-/// The rays of an orbiting camera. An orthographic view is as high as the perspective one is at the target. Its rays
-/// start just before the domain whatever the camera's distance, so that none starts within the domain and lengths along
-/// them stay precise. Throws `Error` for numbers out of range.
+/// The rays of an orbiting camera. An orthographic view is as high as the perspective one is at the target. Its
+/// rays start just in front of the domain, whatever the camera's distance, so that none starts within the domain
+/// and lengths along them stay precise. Throws `Error` for numbers out of range.
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
 /// The start of the ray of pixel (x, y) of a view of width × height pixels, world units.
@@ -120,8 +120,8 @@ struct ViewBuffers {
   std::vector<float> value;             ///< f at the point of a slice or at the hit of a ray
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f scaled to a unit vector; empty for slices
   std::vector<float> distance;  ///< distance along the ray from its start to the hit, world units; empty for slices
-  /// 1 where the field jumps across the offset at a face between two cells, else 0; `value` is then that of the far
-  /// side, so that f − offset is the part of the jump beyond the offset. Empty for slices.
+  /// 1 where the field jumps across the offset at a face between two cells, else 0. At a 1, `value` is the value on
+  /// the far side of the face, so that f − offset is the part of the jump beyond the offset. Empty for slices.
   std::vector<std::uint8_t> crack;
   /// The part of the scene that each pixel with a cell shows; empty where the scene is a surface alone.
   std::vector<Shown> shown;

@@ -8,12 +8,13 @@
 
 namespace hpsdf::physics {
 
-/// Figures of one step's dispatch; for sleeping bodies those of their last step awake.
+/// Figures of one step's dispatch. For sleeping bodies they are those of the last step in which the bodies were
+/// awake.
 struct DispatchFigures {
   double querySeconds = 0;      ///< time of the queries of samples in fields
   std::size_t pairs = 0;        ///< pairs with a field whose bounding boxes overlap
   std::size_t penetrating = 0;  ///< samples, spheres and nodes of soft bodies that lie in a field
-  std::size_t contacts = 0;     ///< contacts for the solver: at most 12 a pair of bodies, and nodes within the margin
+  std::size_t contacts = 0;     ///< for the solver: at most 12 per pair of bodies, and nodes within the margin
   double deepest = 0;           ///< greatest penetration, world units
 };
 

@@ -13,17 +13,18 @@ btTransform toBullet(const Eigen::Isometry3d& transform);
 inline Vector3 fromBullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 inline btVector3 toBullet(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
-/// The shape of any number of bodies: a field with the samples that represent its surface in other fields. Bodies of
-/// this shape collide with each other, with spheres, with static planes and with soft bodies, if a `FieldDispatcher`
-/// dispatches them. Two fields collide by the samples of each in the other's field.
+/// A collision shape that any number of bodies may share: a field, with the samples that represent its surface in
+/// other fields. Bodies of this shape collide with each other, with spheres, with static planes and with soft
+/// bodies, if a `FieldDispatcher` dispatches them. Two fields collide by the samples of each in the field of the
+/// other.
 ///
-/// Refers to field and samples, which must outlive it. A body's frame is that of `MassProperties`: its origin is the
-/// centre of mass. As a part of a compound shape it collides with nothing.
+/// The shape refers to the field and the samples, which must outlive it. A body's frame is that of
+/// `MassProperties`: its origin is the centre of mass. As a part of a compound shape it collides with nothing.
 class FieldShape final : public btConcaveShape {
  public:
-  /// The samples are those of the field's own mesh; mesh and world have one unit. Contacts are made up to a distance of
-  /// `margin` (about 1/100 of the body's size), so that bodies at rest keep theirs. Throws `Error` for a margin that is
-  /// not above 0.
+  /// The samples are those of the field's own mesh; mesh and world have the same unit. Contacts are made up to a
+  /// distance of `margin` (about 1/100 of the body's size), so that bodies at rest keep their contacts. Throws
+  /// `Error` for a margin that is not above 0.
   FieldShape(const FieldCollider& field, const SurfaceSamples& samples, const MassProperties& mass, double margin);
 
   const FieldCollider& field() const { return *field_; }
@@ -34,14 +35,14 @@ class FieldShape final : public btConcaveShape {
   void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
   void setLocalScaling(const btVector3&) override {}  ///< does nothing: a field cannot be scaled
   const btVector3& getLocalScaling() const override { return scaling_; }
-  void processAllTriangles(btTriangleCallback*, const btVector3&, const btVector3&) const override {}  ///< has none
+  void processAllTriangles(btTriangleCallback*, const btVector3&, const btVector3&) const override {}  ///< no triangles
   const char* getName() const override { return "Field"; }
 
  private:
   const FieldCollider* field_;
   const SurfaceSamples* samples_;
   Eigen::Isometry3d bodyFromMesh_;
-  btVector3 center_, halfSize_;  ///< of the mesh's bounding box, in the body's frame
+  btVector3 center_, halfSize_;  ///< centre and half size of the mesh's bounding box, in the body's frame
   btVector3 inertia_;            ///< principal moments for mass 1
   btVector3 scaling_{1, 1, 1};
 };

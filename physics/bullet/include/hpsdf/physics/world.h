@@ -17,8 +17,8 @@ struct WorldOptions {
   Vector3 gravity = {0, 0, -9.81};  ///< units per second²
   double step = 1.0 / 240;          ///< seconds
   int solverIterations = 20;
-  /// Penetration that the solver tolerates, in units; at most about 1/100 of the bodies' size. With it contacts at rest
-  /// persist from step to step, and piles are calmer.
+  /// The penetration that the solver tolerates, in units, at most about 1/100 of the bodies' size. A value above 0
+  /// makes contacts at rest persist from step to step, so that piles are calmer.
   double slop = 0;
 };
 
@@ -52,9 +52,9 @@ class World {
   World& operator=(const World&) = delete;
 
   /// Adds a rigid body, which is static if its mass is 0, and returns its number: 0, 1, … in the order of addition.
-  /// Refers to the shape, which must outlive the world. The body's frame is that of the shape (for a `FieldShape` the
-  /// frame of inertia). Throws `Error` for a mass that is negative or not finite and for a transform that is not finite
-  /// or not rigid.
+  /// The world refers to the shape, which must outlive it. The body's frame is that of the shape (for a `FieldShape`
+  /// the frame of inertia). Throws `Error` for a mass that is negative or not finite and for a transform that is not
+  /// finite or not rigid.
   std::size_t add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                   const Material& material = {});
 
@@ -63,8 +63,8 @@ class World {
   /// Adds a soft body and returns its number; soft bodies have their own numbers 0, 1, ….
   std::size_t add(std::unique_ptr<btSoftBody> body);
 
-  /// Throws `Error`, with the step and the body, if a position or velocity is no longer finite or a body moves a
-  /// million units in one step, which Bullet silently leaves out. The world cannot be used afterwards.
+  /// Throws `Error`, which names the step and the body, if a position or velocity is no longer finite, or if a body
+  /// moves a million units in one step: Bullet silently skips such motions. The world cannot be used afterwards.
   void step();
 
   std::uint64_t steps() const { return steps_; }
