@@ -1,4 +1,5 @@
-// Writes the indices of the body and the triangle that a pixel sees; the CPU computes the rest in double precision.
+// Writes the indices of the body and of the triangle that a pixel sees. The CPU computes distances and normals
+// in double precision.
 
 flat in uint body;
 

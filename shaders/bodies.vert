@@ -1,4 +1,4 @@
-// Transforms a mesh that is drawn once for each of its bodies, as instances.
+// Transforms the vertices of a mesh. The mesh is drawn once for each of its bodies, by instancing.
 
 layout(location = 0) in vec3 position;  // relative to the centre of the mesh's ball
 layout(location = 1) in mat4 targetFromMesh;

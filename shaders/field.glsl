@@ -11,10 +11,10 @@ const uint kNoCell = 0xffffffffu;
 struct Node {
   uint index;
   bool leaf;
-  // Internal nodes:
+  // Members for internal nodes:
   uint firstChild;
   float lo, hi;  // range of the field
-  // Leaves; see SurfaceBounds:
+  // Members for leaves; for the bounds see SurfaceBounds:
   int degree;
   int offset;  // index of the first coefficient
   float valueDeviation, gradientDeviation, secondDerivative;
@@ -36,15 +36,15 @@ Node fetchNode(uint index) {
   return node;
 }
 
-// The blending at a point of a leaf. All members are 0 in a field without blending.
+// Data about the blending at a point of a leaf. All members are 0 in a field without blending.
 struct BlendZone {
   bool inside;                                        // whether other leaves may have a weight at the point
   float valueDifference, gradientDifference, extent;  // see BlendZoneBounds
   float width;                                        // width of the blend zones along the faces, in edges of the leaf
 };
 
-// The value of the field at a point, and the least and the greatest value there of the polynomials of all leaves
-// that have a weight at the point.
+// The value of the field at a point, and the range of some polynomials there: the least and the greatest value
+// at the point of the polynomials of all leaves with a weight.
 struct FieldRange {
   float value, lowest, highest;
 };
@@ -53,7 +53,7 @@ uint baseCellIndex(uvec3 base) { return (base.z * grid.y + base.y) * grid.x + ba
 
 uint childIndex(Node node, uvec3 upper) { return node.firstChild + upper.x + 2u * upper.y + 4u * upper.z; }
 
-// Replaces L_i(x) and L_{i-1}(x) by L_{i+1}(x) and L_i(x).
+// Steps the Legendre recurrence: replaces the values L_i(x) and L_{i-1}(x) by L_{i+1}(x) and L_i(x).
 void nextLegendre(inout float value, inout float previous, float x, float i) {
   float product = x * value;
   float next = product + (product - previous) * (i / (i + 1.0));
@@ -61,9 +61,9 @@ void nextLegendre(inout float value, inout float previous, float x, float i) {
   value = next;
 }
 
-// The coefficients of a leaf up to degree 4: the terms up to degree 3, then those of degree 4, which are zero in a leaf of
-// a lower degree. Such leaves are evaluated without loops and from whole texels, because loops and single loads are what
-// costs time on llvmpipe.
+// Leaves up to degree 4 have a fixed order of coefficients: the terms up to degree 3, then the terms of degree
+// 4. The latter are zero in a leaf of a lower degree. Such leaves are evaluated without loops and from whole
+// texels, because loops and single loads are slow on llvmpipe.
 const int kLowDegree = 4;
 
 struct LowDegree {
@@ -96,7 +96,7 @@ LowDegree fetchLowDegree(int offset, int degree) {
   return s;
 }
 
-// The Legendre polynomials L_2, L_3 and L_4 of each coordinate.
+// The functions legendre2 to legendre4 evaluate the Legendre polynomials L_2, L_3 and L_4 of each coordinate.
 vec3 legendre2(vec3 x) { return 1.5 * x * x - 0.5; }
 vec3 legendre3(vec3 x) { return (2.5 * x * x - 1.5) * x; }
 vec3 legendre4(vec3 x) { return (4.375 * x * x - 3.75) * x * x + 0.375; }
@@ -113,7 +113,7 @@ float evaluateLowDegree(LowDegree s, vec3 one) {
   return x0 + x1 * one.x + x2 * two.x + x3 * three.x + s.i.z * four.x;
 }
 
-// Evaluates a polynomial at local coordinates in [-1, 1]^3.
+// Evaluates the polynomial of a leaf of any degree at local coordinates in [-1, 1]^3.
 float evaluateAnyDegree(int offset, int degree, vec3 local) {
   float value = 0.0;
   float x = 1.0, xPrevious = 0.0;
@@ -141,14 +141,15 @@ float evaluate(int offset, int degree, vec3 local) {
   return evaluateLowDegree(fetchLowDegree(offset, degree), local);
 }
 
-// Replaces L_i' and L_{i-1}' by L_{i+1}' and L_i', where `value` is L_i.
+// Steps the recurrence of the derivatives: replaces L_i' and L_{i-1}' by L_{i+1}' and L_i'. `value` is L_i.
 void nextDerivative(inout float derivative, inout float previous, float value, int i) {
   float next = previous + float(2 * i + 1) * value;
   previous = derivative;
   derivative = next;
 }
 
-// Evaluates the gradient with respect to local coordinates (xyz) and the value (w).
+// Evaluates the polynomial of a leaf. Returns its gradient with respect to local coordinates (xyz) and its
+// value (w).
 vec4 evaluateAnyDegreeWithGradient(int index, int degree, vec3 local) {
   float value = 0.0;
   vec3 gradient = vec3(0.0);
@@ -181,7 +182,7 @@ vec4 evaluateLowDegreeWithGradient(LowDegree s, vec3 one) {
   vec3 twoSlope = 3.0 * one;
   vec3 threeSlope = 7.5 * one * one - 1.5;
   vec3 fourSlope = (17.5 * one * one - 7.5) * one;
-  // xIyJ is the sum over k of c_IJk L_k(z), and xI the sum over j of xIyJ L_j(y).
+  // The names of partial sums: xIyJ is the sum over k of c_IJk L_k(z), and xI is the sum over j of xIyJ L_j(y).
   float x0y1 = s.b.x + s.b.y * one.z + s.b.z * two.z + s.f.y * three.z;
   float x0y2 = s.b.w + s.c.x * one.z + s.f.z * two.z;
   float x0y3 = s.c.y + s.f.w * one.z;

@@ -1,4 +1,5 @@
-// The field of leaves without blending: the interface of leaves_blended.glsl where each leaf's polynomial is the field.
+// The field without blending: the polynomial of each leaf is the field in that leaf. This file has the same
+// functions as leaves_blended.glsl.
 
 const bool kBlended = false;
 

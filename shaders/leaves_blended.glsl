@@ -1,5 +1,5 @@
-// The field of leaves with blending (core/src/field/query/blend.h): near a leaf's faces the field is the weighted mean of
-// several polynomials.
+// The field with blending (core/src/field/query/blend.h): near the faces of a leaf the field is the weighted
+// mean of the polynomials of several leaves.
 
 layout(binding = 6) uniform usamplerBuffer zones;  // see FieldUpload
 layout(location = 18) uniform float blend;         // see FieldData::blend
@@ -12,9 +12,9 @@ const int kDeepest = 20;  // greatest depth of a leaf
 // Returns true if a point of a leaf, in local coordinates, lies in a blend zone.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
-// The cells of depth `level` that are at most `near` (up to 0.5) of their edges away from a point: one or two
-// along each axis, from `first` to `first` + `more`. The point is given by the cell of depth `depth` that contains
-// it.
+// Finds the cells of depth `level` whose distance from a point is at most `near` (up to 0.5) of their edge
+// length. There are one or two along each axis, from `first` to `first` + `more`. The point is given by its
+// cell of depth `depth` and the fraction within that cell.
 void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float near, out ivec3 first,
                     out ivec3 more) {
   ivec3 cell;
@@ -35,27 +35,29 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
   more = clamp(cell + ivec3(greaterThan(inCell, vec3(1.0 - near))), ivec3(0), last) - first;
 }
 
-// For each axis: the depth of the smallest leaf that touches this leaf's side that is nearer to a point; kWall at
-// a wall.
+// For each axis, returns the depth of the smallest leaf that touches this leaf's side nearer to the point
+// `local`, or kWall if this side lies at a wall of the domain.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
   return ivec3(uvec3(extents) >> shift & kWall);
 }
 
-// For each axis: the distance of a point from the nearer side of the leaf, positive inside, in parts of the leaf's
-// blend extent across this side.
+// For each axis, returns the distance of a point from the nearer side of the leaf, positive inside. The unit is
+// the leaf's blend extent across this side.
 vec3 rampPosition(uint extents, int depth, vec3 local) {
   ivec3 neighbour = smallestNeighbour(extents, local);
   vec3 t = (1.0 - abs(local)) * ldexp(vec3(0.5), neighbour - depth) / blend;
   return mix(t, vec3(1.0), equal(neighbour, ivec3(kWall)));
 }
 
-// The derivatives of the ramps at positions `t`, in the leaf's local coordinates.
+// The derivatives of the weight's ramps at the ramp positions `t`, with respect to the leaf's local
+// coordinates.
 vec3 rampSlopes(uint extents, int depth, vec3 local, vec3 t) {
   return -sign(local) * 0.75 * (1.0 - t * t) * ldexp(vec3(0.5), smallestNeighbour(extents, local) - depth) / blend;
 }
 
-// A point's local coordinates in the leaf of cell index other.xyz and depth other.w.
+// Converts a point's local coordinates to those in another leaf, which has the cell index other.xyz and depth
+// other.w.
 vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
   vec3 fraction = 0.5 * local + 0.5;
   int down = other.w - depth;
@@ -64,13 +66,14 @@ vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
   return 2.0 * inOther - 1.0;
 }
 
-// The offset of the n-th candidate cell from the first, and the number of a candidate with a given offset.
+// candidateOffset is the offset of the n-th candidate cell from the first. candidateNumber numbers a candidate
+// by its offset.
 ivec3 candidateOffset(int n, ivec3 more) { return ivec3(n, n >> more.x, n >> (more.x + more.y)) & more; }
 int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.z; }
 
-// The weighted sum of the leaves' polynomials at a point. For the sake of single precision, the differences of the
-// polynomials from the first one are summed. Vectors hold a gradient, in the local coordinates of the point's own
-// leaf, and a value.
+// The weighted sum of the polynomials of leaves at a point. The first polynomial is subtracted from the others
+// before they are summed, for the sake of single precision. Each vec4 holds a gradient (xyz), in the local
+// coordinates of the point's own leaf, and a value (w).
 struct LeafSum {
   vec4 first, sum, weights;
   float lowest, highest;  // over the leaves whose weights reach the point if widened by `margin` extents
@@ -105,9 +108,9 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
 
-// Finds the node of the candidate cell `cell` at the first level: a node of the cell's size, or a larger leaf `up`
-// levels above. A larger leaf counts only for the first candidate that lies in it. Returns whether the node
-// counts.
+// Finds the node of the candidate cell `cell` at the first level: a node of the same size as the cell, or a
+// larger leaf `up` levels above it. A larger leaf counts only for the first candidate cell that lies in it.
+// Returns true if the node counts.
 bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int up) {
   up = level;
   node = fetchNode(baseCellIndex(uvec3(cell >> level)));
@@ -118,8 +121,8 @@ bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int 
   return !any(greaterThan(min(offset, cell - (cell >> up << up)), ivec3(0)));
 }
 
-// Finds the node of the candidate cell `cell` below the first level, where `parents` are the first children of the nodes
-// one level above. Returns whether there is such a node.
+// Finds the node of the candidate cell `cell` below the first level. `parents` holds the indices of the first
+// children of the nodes one level above. Returns true if there is such a node.
 bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell, out Node node) {
   ivec3 parent = (cell >> 1) - parentFirst;
   if (any(lessThan(parent, ivec3(0))) || any(greaterThan(parent, parentMore))) return false;
@@ -129,9 +132,9 @@ bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell,
   return true;
 }
 
-// Sums the leaves with a weight at a point of a leaf. The search goes down level by level; the candidates on each
-// level are the nodes near the point. Whole numbers and the fraction within the own leaf tell which nodes are
-// near, so that single precision is enough. Leaves are evaluated in one place in the code, and the leaves found
+// Sums the polynomials of all leaves with a weight at a point. The search descends level by level. Its
+// candidates on each level are the nodes near the point, found from integers and the fraction within the own
+// leaf, so that single precision is enough. Only one place in the code evaluates leaves, and the leaves found
 // are not kept in an array: drivers would unroll loops over the array and take seconds to compile the result.
 LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margin, bool withGradient) {
   LeafSum total = LeafSum(vec4(0.0), vec4(0.0), vec4(0.0), 1e30, -1e30);
@@ -170,8 +173,8 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
   return total;
 }
 
-// The value of the field at a point, and the range of the polynomials of all leaves whose weights reach the point
-// if they are widened by `margin` times their extents.
+// Returns the value of the field at a point, and the range of the polynomials of some leaves there: all leaves
+// whose weights reach the point if their extents are widened by the share `margin`.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);
@@ -181,7 +184,7 @@ float fieldValue(Node leaf, uint depth, uvec3 cellIndex, vec3 local) {
   return blendedRange(leaf, depth, cellIndex, local, 0.0).value;
 }
 
-// The gradient with respect to the leaf's local coordinates (xyz) and the value (w).
+// Returns the gradient of the field with respect to the leaf's local coordinates (xyz) and its value (w).
 vec4 fieldWithGradient(Node leaf, uint depth, uvec3 cellIndex, vec3 local) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, 0.0, true);
   float mean = total.sum.w / total.weights.w;

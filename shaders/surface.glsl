@@ -1,4 +1,5 @@
-// Parts of both passes of a surface: the pixel's ray, the lookup of nodes along it, and the state between the passes.
+// Code that both passes of a surface share: the ray of a pixel, the lookup of nodes along the ray, and the
+// state of a pixel between the passes.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;
@@ -14,9 +15,9 @@ layout(location = 15) uniform dvec3 shownLo;   // corners of the visible part of
 layout(location = 16) uniform dvec3 shownHi;
 layout(location = 17) uniform bool parallel;  // whether rays are parallel
 
-// The state of a pixel. Its integers are kind, t and side as bits of floats, and the last leaf. Its floats are,
-// for a bracket, its ends a and b and a first guess of the root; for a pixel under way, the last height and the
-// longest step to try.
+// The state of a pixel after the march. Its integers are the kind, t and side (floats stored as bits), and the
+// last leaf. Its floats are, for a bracketed root, the ends a and b of the bracket and a first guess of the
+// root. For a pixel still under way they are the last height and the longest step to try.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 
@@ -33,7 +34,7 @@ struct Ray {
   double length;         // length within the visible part, world units; negative for a ray that misses it
 };
 
-// `middle` plus the vector from the picture's middle to the pixel.
+// `middle` plus the vector from the middle of the picture to this pixel.
 dvec3 onPicture(dvec3 middle) {
   ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
   return middle + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
@@ -79,7 +80,7 @@ struct CellPoint {
   vec3 fraction;  // position of the point within the node, in [0, 1]^3
 };
 
-// The base cell at a point.
+// The base cell that contains a point, with the position of the point in it.
 CellPoint baseCellAt(vec3 p) {
   p = clamp(p, vec3(0.0), vec3(grid));
   uvec3 base = min(uvec3(p), grid - 1u);

@@ -1,9 +1,10 @@
-// Second pass of a surface: finds the hit in the bracket of the first crossing, with positions along the ray in
+// Second pass of a surface: finds the hit in the bracket of the first crossing. Positions along the ray are in
 // double precision. A pixel whose march has not ended counts as a miss.
 
 layout(location = 11) uniform int mostRefinements;
 
-// The second number is degree | depth << 8 | crack << 16; value and distance are stored as bits of floats.
+// The members are cell, degree | depth << 8 | crack << 16, value and distance. The last two are the bits of
+// floats.
 layout(location = 0) out uvec4 cellLevelsValueDistance;
 layout(location = 1) out vec4 normal;
 
@@ -17,15 +18,15 @@ vec3 localAt(CellPoint cell, Ray ray, double t) {
   return vec3(2.0lf * (inBase * double(cell.scale) - dvec3(cell.path)) - 1.0lf);
 }
 
-// The root along a ray.
+// The root of f - offset along a ray, with the field there.
 struct Root {
   float added;          // distance from the first guess, world units
   vec4 gradientValue;  // gradient in local coordinates, and value, at the root
 };
 
-// Refines the root in a bracket by Newton's method, and by halving where Newton's method would leave the bracket. Without
-// a bracket, only evaluates the field. The bracket, from a to b, and the root are relative to the point `local`, so that
-// single precision is enough.
+// Refines the root in a bracket by Newton's method, and by bisection if Newton's method would leave the
+// bracket. Without a bracket, only evaluates the field. The bracket, from a to b, and the root are distances
+// along the ray from the point `local`, so that single precision is enough.
 Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool bracketed, float a, float b) {
   uvec3 cellIndex = cellIndexOf(at);
   bool blended = blendZoneAt(at.node.index, at.fraction).inside;
@@ -46,7 +47,7 @@ Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool brac
     change = -height / slope;
     bool newton = added + change >= a && added + change <= b;
     if (!newton) change = 0.5 * (a + b) - added;
-    // The root lies within curve / slope * change^2 / 2 of the next point.
+    // The distance of the root from the next point is at most curve / slope * change^2 / 2.
     float turned = newton ? abs(curve / slope * change) : kInfinity;
     bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
     if (close || abs(change) <= kConverged * diagonal) break;
@@ -66,7 +67,7 @@ void main() {
   float t = uintBitsToFloat(integers.y);
   float side = uintBitsToFloat(integers.z);
 
-  // Find the leaf in which the march ended, from the point that the march computed.
+  // Find the leaf in which the march ended. It contains the last point of the march.
   Ray ray = pixelRay();
   CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);

@@ -1,10 +1,10 @@
-// First pass of a surface: the march of each pixel's ray to the leaf and the bracket of the first crossing of f = offset
-// (docs/rendering.md, "Tracing"). A height is f - offset, signed so that it is positive where the ray starts. The stages
-// have the names of those in trace.cpp.
+// First pass of a surface: each pixel's ray marches to the leaf and the bracket of the first crossing of
+// f = offset (docs/rendering.md, "Tracing"). A height is f - offset, signed so that it is positive where the
+// ray starts. The functions for the stages have the same names as in trace.cpp.
 //
-// llvmpipe executes both sides of a branch, so that each expensive expression occurs once within the loops, with cheap
-// tests before it. It also ends all loops of a shader silently once the sum of their iterations is 65535; so a pixel is
-// left under way after `mostSteps`, and the pass is drawn again.
+// llvmpipe executes both sides of a branch. Therefore each expensive expression occurs once within the loops,
+// with cheap tests before it. llvmpipe also ends all loops of a shader silently once the sum of their
+// iterations is 65535. Therefore a pixel is left under way after `mostSteps`, and the pass is drawn again.
 
 layout(location = 11) uniform int mostSteps;
 layout(location = 12) uniform bool resume;       // continue the pixels under way, leave the others as they are
@@ -18,7 +18,7 @@ flat in float start;  // see Block::start
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
-// The same as in trace.cpp.
+// These constants have the same values as in trace.cpp.
 const float kNudge = 1e-6;     // distance by which steps end behind a face, in domain diagonals; also the shortest step
 const float kPastFace = 4e-7;  // greatest distance behind a face at which rays enter a node, in parts of the grid
 const float kGrain = 0.25;     // step where no bound excludes a zero, in parts of a blend zone's extent
@@ -45,7 +45,7 @@ struct March {
   float zoneStep;  // the next step in the blend zone
 };
 
-// The node at t, and bounds of the height along the ray.
+// The node that contains the ray's point at parameter t, with bounds of the height along the ray.
 struct LeafPoint {
   CellPoint at;
   BlendZone zone;
@@ -58,8 +58,8 @@ struct LeafPoint {
   float steepestOfAll;    // least slope of the polynomial of any leaf with a weight
 };
 
-// World length from the point to where the ray leaves the node's box, or a box whose faces are `margin` node edges
-// further inside. It ends slightly behind the face: see trace.cpp.
+// World length along the ray from a point to the exit from its node's box. With a margin, the faces of the box
+// lie `margin` node edges further inside. The length ends slightly behind the face (see trace.cpp).
 float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(ray.direction, vec3(0.0))) - margin;
   vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * ray.inverse, vec3(kInfinity),
@@ -67,12 +67,12 @@ float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// The length over which a height whose slope is at least `steepest` cannot fall to zero.
+// Length of the step over which the height certainly stays positive, if its slope is at least `steepest`.
 float certainlyAbove(float height, float steepest) {
   return height > 0.0 ? (steepest < 0.0 ? height / -steepest : kInfinity) : 0.0;
 }
 
-// The leaf at a point, or the first node along the descent whose range excludes the offset.
+// The leaf at a point, or the first node on the descent to the leaf whose range of values excludes the offset.
 CellPoint relevantNodeAt(vec3 p) {
   CellPoint at = baseCellAt(p);
   while (!at.node.leaf && at.node.lo <= offset && at.node.hi >= offset) descend(at);
@@ -104,13 +104,14 @@ March startMarch(Ray ray, MarchRay marchRay) {
   return march;
 }
 
-// Finds the node at t and bounds the height there; sets the side where it is unknown and the bounds tell it.
+// Finds the node at parameter t of the ray and bounds the height there. Also sets march.side if it is unknown
+// and the bounds tell it.
 LeafPoint boundHeight(MarchRay ray, inout March march) {
   LeafPoint leaf;
   leaf.at = relevantNodeAt(ray.origin + march.t * ray.direction);
   leaf.toLeave = lengthToExit(leaf.at, ray, 0.0);
   leaf.localDirection = 2.0 * leaf.at.scale * ray.direction;
-  // Bound f - offset.
+  // Bound f - offset in the node at t.
   leaf.middle = 0.0;
   leaf.slope = 0.0;
   leaf.lowest = leaf.at.node.lo - offset;
@@ -124,7 +125,8 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
     leaf.lowest = leaf.middle - leaf.at.node.valueDeviation - leaf.zone.valueDifference;
     leaf.highest = leaf.middle + leaf.at.node.valueDeviation + leaf.zone.valueDifference;
   }
-  // Turn the signs if the ray starts where f is below the offset, since heights are positive at the start.
+  // Find the sign of f - offset at the ray's start. If it is negative, negate the bounds, since heights are
+  // positive there.
   if (march.side == 0.0) march.side = leaf.lowest > 0.0 ? 1.0 : leaf.highest < 0.0 ? -1.0 : 0.0;
   if (march.side < 0.0) {
     float negated = -leaf.lowest;
@@ -139,8 +141,9 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
   return leaf;
 }
 
-// Moves t to the exit of a node in which the ray cannot cross the surface. Returns whether a crossing in the node
-// remains possible. A node that lies on the other side of the surface is a hit on its face.
+// Moves t to the exit of a node if the ray cannot cross the surface in the node. If the node lies on the other
+// side of the surface, the ray hits the surface on the face where it enters the node. Returns true if neither
+// is the case.
 bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   bool above = (leaf.lowest > 0.0 && leaf.lowest + leaf.slope * leaf.toLeave > 0.0) ||
                (leaf.known && march.lastHeight - leaf.zone.valueDifference +
@@ -159,8 +162,8 @@ bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   return true;
 }
 
-// Takes the value at t as the first height in a leaf. Returns whether the blended field must decide on which side
-// the ray starts.
+// Stores the polynomial's value at t as the first height in a leaf. Returns true if the blended field must
+// decide on which side of the surface the ray starts.
 bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   bool undecided = leaf.zone.inside && march.side == 0.0 && abs(value) <= lower;
   if (march.side == 0.0 && !undecided) march.side = value >= 0.0 ? 1.0 : -1.0;
@@ -171,9 +174,9 @@ bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   return undecided;
 }
 
-// Handles a step to a point with the height `ahead`: moves t there if the ray provably crosses nothing before it,
-// brackets a crossing, or shortens the step. Over a step the height sags below its chord by at most curve *
-// length^2 / 8, and it is monotone if it falls by more than curve * length^2 / 2.
+// Handles a step of the march to a point with the height `ahead`. Moves t to this point if the ray provably
+// crosses nothing before it, brackets a crossing, or shortens the step. Over a step the height sags below its
+// chord by at most curve * length^2 / 8. The height is monotone if it falls by more than curve * length^2 / 2.
 void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float lower, float curve, bool certain,
              inout March march) {
   float clear = march.lastHeight - lower;
@@ -194,7 +197,8 @@ void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float 
   }
 }
 
-// Steps by the polynomial of the leaf. Returns whether the weights of other leaves decide where the field is zero.
+// Takes a step by the leaf's polynomial. Returns true if the weights of other leaves decide where the field is
+// zero.
 bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   float curve = leaf.at.node.secondDerivative * dot(leaf.localDirection, leaf.localDirection);
   float steepest = leaf.slope - leaf.slopeDeviation;
@@ -209,7 +213,7 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
       return false;
     }
     if (!leaf.known) {
-      // An upper bound of the height serves as well as the height itself.
+      // Use an upper bound of the height, which serves as well as the height itself.
       leaf.known = true;
       march.lastHeight = leaf.highest;
       march.lastLeaf = leaf.at.node.index;
@@ -230,8 +234,8 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   return false;
 }
 
-// Marches by the polynomials of single leaves, up to a point at which the weights of other leaves matter. Returns whether
-// there is such a point, and its leaf.
+// Marches by the polynomials of single leaves until the weights of other leaves matter. Returns true if the ray
+// reaches such a point, and sets `leaf` to the leaf there.
 bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   bool blended = false;
   while (!blended && march.kind == kUnderWay && march.steps < mostSteps) {
@@ -247,8 +251,8 @@ bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   return blended;
 }
 
-// Steps by the blended field: as far as the height is certainly positive, or by a small part of the zone's extent. The
-// first evaluation in a leaf is that at t.
+// Takes a step by the blended field: as far as the height is certainly positive, or by a small part of the
+// blend zone's extent. The first evaluation in a leaf is at t itself, without a step.
 void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
   march.steps += blendedSteps;
   float stepLength = leaf.at.node.index == march.zoneLeaf ? min(leaf.toLeave, march.zoneStep) : 0.0;
@@ -267,8 +271,8 @@ void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
     march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
     if (!(march.t <= ray.length)) march.kind = kMiss;
   }
-  // Choose the next step such that, over it, no polynomial of a leaf with a weight within one extent of the point
-  // falls to zero.
+  // Choose the next step so short that over it no polynomial falls to zero, among all leaves whose weight extends
+  // to within one extent of the point.
   float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
   float extent = leaf.zone.extent / length(leaf.localDirection);
   march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;

@@ -12,12 +12,12 @@
 
 namespace {
 
-/// Opens /dev/null for each standard stream that the caller closed. Otherwise the next file that the program opens
-/// would become that stream.
+/// Opens /dev/null for each standard stream that is closed at the start of the program. Otherwise the next
+/// file that the program opens would become that standard stream.
 void occupyClosedStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(stream, F_GETFD) == -1) {
-      // The stream is opened for the wrong direction, so that using a closed stream remains an error.
+      // /dev/null is opened for the wrong direction, so that reading or writing the closed stream remains an error.
       [[maybe_unused]] const int opened = open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
     }
 }
@@ -27,8 +27,8 @@ void occupyClosedStreams() {
 int main(int argc, char** argv) {
   occupyClosedStreams();
   hpsdf::app::installInterruptHandlers();
-  // With these signals ignored, a closed pipe and a file beyond the size limit are reported like other failed
-  // writes.
+  // The signals SIGPIPE and SIGXFSZ are ignored. A closed pipe and a file beyond the size limit are then
+  // reported like other failed writes.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGCHLD, SIG_DFL);  // waitpid would fail where the caller ignores the signal

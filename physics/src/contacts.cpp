@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kBlock = 8;  // pairs that one task handles
 
-/// Throws `Error` for an invalid pair; messages start with the pair's number, if there is one. Allocates nothing for a
-/// valid pair.
+/// Throws `Error` if the pair is invalid. The message starts with the pair's number if `number` is given.
+/// Allocates no memory if the pair is valid.
 void requireValid(const BodyPair& pair, std::optional<std::size_t> number = {}) {
   const auto refuse = [&](const std::string& what) {
     throw Error((number ? "pair " + std::to_string(*number) + ": " : std::string()) + what);
@@ -33,7 +33,8 @@ void requireValid(const ContactOptions& options) {
   if (options.deepest == std::size_t{0}) throw Error("contacts: the number of the deepest must be 1 or more");
 }
 
-/// The query of one pair. It collects the samples that may be contacts and evaluates the field at them in batches.
+/// The query of one body pair. It collects the samples that may be contacts and evaluates the field at
+/// these samples in batches.
 class Search {
  public:
   Search(const BodyPair& pair, const ContactOptions& options, std::vector<Contact>& out)
@@ -44,7 +45,8 @@ class Search {
 
   QueryCost run() {
     const std::span<const Sphere> spheres = pair_.samples->spheres();
-    // Bound the distance by which rounding, and the tolerance of rotations, may move a sample out of its sphere.
+    // Compute the tolerance of the sphere tests. Rounding, and the tolerance of rotations, may move a sample
+    // out of its bounding sphere.
     const double size = fieldFromSamples_.translation().norm() + spheres[0].center.norm() + spheres[0].radius;
     const double slack = margin_ + 32 * std::numeric_limits<double>::epsilon() * size;
     for (std::uint32_t node = 0; node < spheres.size();) {
@@ -101,7 +103,7 @@ class Search {
   std::array<ValueAndGradient, kBatch> results_;
 };
 
-/// Keeps the deepest of the contacts from index `first` on.
+/// Sorts the contacts from index `first` on by depth, and keeps only the deepest `count` of them.
 void keepDeepest(std::size_t count, std::size_t first, std::vector<Contact>& contacts) {
   const auto begin = contacts.begin() + static_cast<std::ptrdiff_t>(first);
   const auto end = begin + static_cast<std::ptrdiff_t>(std::min(count, contacts.size() - first));
@@ -150,7 +152,7 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
   const std::size_t blocks = (pairs.size() + kBlock - 1) / kBlock;
   if (out.blocks_.size() < blocks) out.blocks_.resize(blocks);  // never shrinks, so that its memory is reused
 
-  // Query the blocks in parallel.
+  // Query the pairs in parallel, in blocks of consecutive pairs.
   out.pairs_ = pairs.size();
   out.ends_.resize(pairs.size());
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t number) {
@@ -162,7 +164,7 @@ void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options
     }
   });
 
-  // Concatenate the blocks in the order of the pairs.
+  // Concatenate the contacts of all blocks, in the order of the pairs.
   out.contacts_.clear();
   out.cost_ = {};
   for (std::size_t number = 0; number < blocks; ++number) {

@@ -27,7 +27,7 @@ struct Piece {
   double at(int i, int j, int k) const { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
   double& at(int i, int j, int k) { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
 
-  /// Calls f(i, j, k) for all terms whose total degree is in a range.
+  /// Calls f(i, j, k) for all terms of a polynomial whose total degree is from `least` to `most`.
   template <typename F>
   static void forEachTerm(int least, int most, const F& f) {
     for (int i = 0; i <= most; ++i)
@@ -35,11 +35,11 @@ struct Piece {
         for (int k = std::max(0, least - i - j); i + j + k <= most; ++k) f(i, j, k);
   }
 
-  /// Restricts the polynomial to a part of one axis, which the rows describe.
+  /// Restricts the polynomial to a part of its box along one axis. `rows` describe this part.
   void restrict(int axis, const detail::LegendreRows& rows) { detail::restrictToPart(c, degree, axis, rows); }
 
-  /// Leaves out the terms of the highest degrees, as long as the magnitudes of all coefficients left out sum up to
-  /// at most `tolerance`.
+  /// Removes the terms of the highest degrees from the polynomial, as long as the magnitudes of all removed
+  /// coefficients sum up to at most `tolerance`.
   void trim(double tolerance) {
     int kept = degree;
     double sum = 0, leftOut = 0;
@@ -55,7 +55,7 @@ struct Piece {
     *this = std::move(smaller);
   }
 
-  /// A bound of the sum of all terms beyond the linear ones, rounding included.
+  /// Returns a bound of the magnitude of the sum of all terms of degree 2 or more, including rounding errors.
   double nonlinearBound() const {
     double high = rest, low = 0;
     forEachTerm(0, 1, [&](int i, int j, int k) { low += std::abs(at(i, j, k)); });
@@ -80,8 +80,8 @@ class LowerBounds {
   }
 
  private:
-  /// A leaf's polynomial over the box in which the leaf has a weight: a blended field is a weighted mean of such
-  /// polynomials.
+  /// Returns a leaf's polynomial over the box in which the leaf has a weight. A blended field is a weighted
+  /// mean of the polynomials of several leaves.
   Piece pieceOf(const Cell& leaf) const {
     const FieldData& data = field_.data();
     const GridFrame& frame = field_.lookupGrid().frame;
@@ -113,7 +113,8 @@ class LowerBounds {
     return piece;
   }
 
-  /// Halves the piece until its polynomial is almost linear, and lowers the bounds of the cells that it overlaps.
+  /// Halves the piece recursively until its polynomial is almost linear. Then lowers the bounds of the grid
+  /// cells that the piece overlaps.
   void bound(Piece piece) {
     piece.trim(tolerance_ / 8);
     const double nonlinear = piece.nonlinearBound();
@@ -131,9 +132,10 @@ class LowerBounds {
     bound(std::move(piece));
   }
 
-  /// Lowers the bounds of all cells that the piece overlaps to the piece's linear part minus `nonlinear`.
+  /// Lowers the bound of each cell that the piece overlaps to the smallest value of the piece's linear part
+  /// in the cell, minus `nonlinear`.
   void fill(const Piece& piece, double nonlinear) {
-    // Find the least value of each axis's linear term over each cell.
+    // For each axis, find the smallest value of the axis's linear term in each cell that the piece overlaps.
     std::array<std::int64_t, 3> first, count;
     std::array<double, 3> slope{};
     if (piece.degree > 0) slope = {piece.at(1, 0, 0), piece.at(0, 1, 0), piece.at(0, 0, 1)};
@@ -175,7 +177,7 @@ CellIndex cellIndexOf(std::int64_t n, const std::array<std::int64_t, 3>& size) {
   return {n % size[0], n / size[0] % size[1], n / size[0] / size[1]};
 }
 
-/// The least value of each cell and its 26 neighbours.
+/// Returns for each cell the smallest of the values of the cell and its 26 neighbours.
 std::vector<double> leastAround(std::vector<double> values, const std::array<std::int64_t, 3>& size) {
   std::int64_t stride = 1;
   for (int axis = 0; axis < 3; stride *= size[axis++]) {
@@ -190,9 +192,10 @@ std::vector<double> leastAround(std::vector<double> values, const std::array<std
   return values;
 }
 
-/// The greatest ratio between the length of a path by steps to neighbouring cells and the distance of its ends.
-/// For paths by steps along axis a, along both a and b, and along all three axes, the length is a linear function
-/// of the end point, and the ratio is at most the length of its gradient.
+/// Returns the greatest ratio between the length of a path by steps to neighbouring cells and the distance
+/// between the path's ends. The length is a linear function of the end point for paths with steps along
+/// axis a, along both a and b, and along all three axes. The ratio is therefore at most the length of this
+/// function's gradient.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -204,9 +207,10 @@ double worstDetour(const Vector3& cell) {
   return worst;
 }
 
-/// Chamfer distance transform (Borgefors 1986): replaces each value by the least sum of the value of a cell and
-/// the length of the shortest path to this cell. Steps are shortened so that no path is longer than the distance
-/// of its ends. One pass forwards and one backwards find the shortest paths.
+/// Chamfer distance transform (Borgefors 1986): replaces the value of each cell by the smallest sum of
+/// another cell's value and the length of the shortest path to that cell. Steps are shortened so that no
+/// path is longer than the distance between its ends. One forward pass and one backward pass find the
+/// shortest paths.
 void distanceTransform(std::vector<double>& values, const std::array<std::int64_t, 3>& size, const Vector3& cell) {
   struct Step {
     CellIndex by;
@@ -239,7 +243,7 @@ void distanceTransform(std::vector<double>& values, const std::array<std::int64_
   for (std::int64_t n = std::ssize(values); n-- > 0;) visit(n, -1);
 }
 
-/// The least value of the cells at the domain's sides.
+/// Returns the smallest value of the cells that touch the domain's sides.
 double leastAtSides(const std::vector<double>& values, const std::array<std::int64_t, 3>& size) {
   double least = std::numeric_limits<double>::infinity();
   for (std::int64_t n = 0; n < std::ssize(values); ++n) {
@@ -271,8 +275,9 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
   wall_ = leastAtSides(within, size_);
   for (double& bound : within) bound = std::max(bound, 0.0);
 
-  // The distance between points of two cells is at least that between the centre of one cell and the nearest centre
-  // in the 3 × 3 × 3 neighbourhood of the other. Therefore first take the least value of each neighbourhood.
+  // Compute the bounds around each cell. The distance between points of two cells is at least that between
+  // the centre of one cell and the nearest centre in the 3 × 3 × 3 neighbourhood of the other cell. Therefore
+  // the smallest value of each neighbourhood is taken first.
   std::vector<double> around = leastAround(within, size_);
   distanceTransform(around, size_, cell);
   if (wall_ > 0) wall_ = leastAtSides(around, size_);
@@ -286,14 +291,15 @@ const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const 
   const double scale = double(std::uint32_t{1} << depth_);
   std::array<std::int64_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {
-    // Compute exactly what the field computes to find its own cells.
+    // This must be exactly the expression by which the field finds the cell of a point.
     const double coordinate = (inDomain[axis] - frame.lower[axis]) / frame.size[axis] * frame.cells[axis];
     at[axis] = std::min(static_cast<std::int64_t>(coordinate * scale), size_[axis] - 1);
   }
   return cells_[(at[2] * size_[1] + at[1]) * size_[0] + at[0]];
 }
 
-// Outside the domain the field is f(q) + |x − q| with the domain's closest point q to x, and f ≥ `wall_` at the sides.
+// At a point x outside the domain the field is f(q) + |x − q|, where q is the point of the domain closest
+// to x. At the domain's sides the field is at least `wall_`.
 
 double FieldCollider::lowerBound(const Vector3& x) const {
   const Box& domain = field_->domain();
@@ -304,10 +310,12 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// `around` at q also holds at x, because |q − q_y| ≤ |x − y| for every y and its closest point q_y in the domain.
-// The second bound is `wall_` + |x − q|. For y outside it holds, because y is at most |x − y| nearer to the domain
-// than x. For y inside it holds, because the path from x to y crosses a side, around which a `wall_` of 0 or more
-// is a bound; with a negative `wall_` the second bound is less than |x − q| and concerns no y inside.
+// Let q be the point of the domain closest to x. Two lower bounds hold at x. The first is `around` at q,
+// because |q − q_y| ≤ |x − y| for every y and the point q_y of the domain closest to y. The second is
+// `wall_` + |x − q|. It holds for y outside the domain, because y is at most |x − y| nearer to the domain
+// than x. For y inside the domain it holds because the path from x to y crosses a side of the domain,
+// around which a `wall_` of 0 or more is a bound. If `wall_` is negative, the second bound is less than |x
+// − q| and concerns no y inside the domain.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -8,7 +8,8 @@ namespace hpsdf::physics {
 
 MassProperties massProperties(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
-  // Integrate about a vertex, so that a body far from the origin loses no precision.
+  // Integrate the moments relative to a vertex of the mesh, so that a body far from the origin loses no
+  // precision.
   const Vector3 base = mesh.vertices.empty() ? Vector3::Zero() : mesh.vertices.front();
   double volume = 0;
   Vector3 first = Vector3::Zero();
@@ -23,7 +24,8 @@ MassProperties massProperties(const TriangleMesh& mesh) {
   }
   if (!(volume > 0) || !second.allFinite()) throw Error("a body needs a closed surface around some volume");
 
-  // Diagonalise the covariance: its eigenvectors are the principal axes.
+  // Diagonalise the covariance of the body about its centre of mass. The eigenvectors are the principal axes
+  // of inertia.
   const Vector3 center = first / volume;
   const Eigen::Matrix3d covariance = second / volume - center * center.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);

@@ -1,15 +1,15 @@
 #pragma once
-// A check of the transforms of rigid bodies.
+// A check that the transform of a rigid body is a rigid motion.
 
 #include <Eigen/Geometry>
 
 namespace hpsdf::physics {
 
-/// The greatest deviation of RᵀR from the identity for which R counts as a rotation.
+/// R counts as a rotation if RᵀR deviates from the identity by at most this value.
 constexpr double kRotationTolerance = 1e-6;
 
-/// Describes why a transform is not a rotation with a translation, for a message in which the owner's name precedes the
-/// text; nullptr if it is one. Allocates no memory.
+/// Describes why a transform is not a rotation followed by a translation. Returns nullptr if the transform
+/// is rigid. In messages the name of the transform's owner precedes the returned text. Allocates no memory.
 inline const char* transformFault(const Eigen::Isometry3d& transform) {
   if (!transform.matrix().allFinite()) return "transform is not finite";
   const Eigen::Matrix3d rotation = transform.linear();

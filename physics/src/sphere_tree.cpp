@@ -36,8 +36,8 @@ class Builder {
     tree_.spheres[self].next = static_cast<std::uint32_t>(tree_.spheres.size());
   }
 
-  /// Divides the points into halves along the box's longest axis. Points with equal coordinates are ordered by
-  /// index.
+  /// Divides the points from `begin` to `end` into halves along the longest axis of their bounding box.
+  /// Points with equal coordinates are ordered by index.
   std::uint32_t split(std::uint32_t begin, std::uint32_t end, const Box& box) {
     Eigen::Index axis;
     box.sizes().maxCoeff(&axis);
@@ -49,8 +49,8 @@ class Builder {
     return middle;
   }
 
-  /// Approximates the smallest enclosing sphere: the centre moves towards the farthest point by ever smaller steps
-  /// (Bădoiu, Clarkson 2003), and the best of its positions is kept.
+  /// Approximates the smallest enclosing sphere of the points. The sphere's centre moves towards the farthest
+  /// point by ever smaller steps (Bădoiu, Clarkson 2003), and the best of its positions is kept.
   Sphere fit(std::uint32_t begin, std::uint32_t end, Vector3 center) const {
     Sphere best{center, std::numeric_limits<double>::infinity(), begin, end, 0};
     for (int step = 2; step < kFitSteps + 2; ++step) {

@@ -21,7 +21,7 @@ struct Candidate {
   std::uint32_t triangle;
 };
 
-/// Areas and normals of a mesh, whose data is checked.
+/// The areas and normals of a mesh's triangles. The data of the mesh has been checked.
 struct Surface {
   std::vector<double> areasUpTo;  ///< total area of each triangle and all before it
   std::vector<Vector3> normals;
@@ -54,7 +54,8 @@ std::size_t countOf(const SampleOptions& options, double area) {
   if (options.spacing && (!(*options.spacing > 0) || !std::isfinite(*options.spacing)))
     throw Error("samples: the spacing must be a number above 0");
   if (options.count == std::size_t{0}) throw Error("samples: the count must be 1 or more");
-  // The quotient of an area and a tiny square may exceed every integer type.
+  // Compute the count as a double: the quotient of an area and a tiny squared spacing may exceed every
+  // integer type.
   const double count =
       options.count ? double(*options.count) : std::max(1.0, std::round(area / *options.spacing / *options.spacing));
   if (!(count <= double(kMaxSamples)))
@@ -63,7 +64,8 @@ std::size_t countOf(const SampleOptions& options, double area) {
   return static_cast<std::size_t>(count);
 }
 
-/// Draws one candidate in each of `count` parts of equal area, in the order of the triangles.
+/// Divides the surface into `count` parts of equal area, in the order of the triangles, and draws one
+/// random candidate in each part.
 std::vector<Candidate> drawCandidates(const TriangleMesh& mesh, const Surface& surface, std::size_t count,
                                       std::uint64_t seed) {
   std::vector<Candidate> candidates(count);
@@ -82,8 +84,8 @@ std::vector<Candidate> drawCandidates(const TriangleMesh& mesh, const Surface& s
   return candidates;
 }
 
-/// Finds candidates within a radius. It sorts them by the cells of a grid, x fastest, whose cells are at least as wide
-/// as the radius.
+/// Finds the candidates within a fixed radius of a candidate. Sorts the candidates by the cells of a grid,
+/// x fastest. The cells are at least as wide as the radius.
 class Neighbours {
  public:
   Neighbours(std::vector<Candidate>& candidates, double radius) : radius_(radius) {
@@ -104,7 +106,7 @@ class Neighbours {
     candidates = std::move(sorted);
   }
 
-  /// Calls f(other, distance) for all other candidates within the radius around candidate `index`.
+  /// Calls f(other, distance) for all other candidates that are within the radius of candidate `index`.
   template <typename F>
   void forEach(const std::vector<Candidate>& candidates, std::size_t index, const F& f) const {
     const auto [x, y, z] = cellAt(candidates[index].point);
@@ -137,8 +139,8 @@ class Neighbours {
   std::vector<std::uint64_t> keys_;
 };
 
-/// Removes the candidate with the greatest weight, i.e. with the most and nearest neighbours, until `count` are left
-/// (Yuksel 2015, with the weights that are proposed there).
+/// Removes the candidate with the greatest weight, i.e. with the most and nearest neighbours, again and
+/// again until `count` candidates are left. Uses the weights that Yuksel (2015) proposes.
 std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surface& surface, std::size_t count) {
   const double radius =
       std::sqrt(surface.area() / (2 * std::numbers::sqrt3 * double(count)));  // radius of disks in the densest packing
@@ -150,8 +152,8 @@ std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surfac
     return fourth * fourth;
   };
   std::vector<double> weights(candidates.size(), 0.0);
-  // Weights only decrease. An outdated entry of the queue is too high, so that it comes to the top and can be
-  // corrected.
+  // The weights of candidates only decrease. An outdated entry of the queue is therefore too high, so that it
+  // comes to the top of the queue, where it is corrected.
   std::priority_queue<std::pair<double, std::uint32_t>> heaviest;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     neighbours.forEach(candidates, i,

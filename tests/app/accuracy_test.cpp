@@ -29,7 +29,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace accuracy_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
@@ -446,5 +446,5 @@ TEST_F(Accuracy, mistakesInStudiesAreNamedBeforeLongWork) {
           "max-coefficients: the base cells of");
 }
 
-}  // namespace
+}  // namespace accuracy_test
 }  // namespace hpsdf::app

@@ -28,7 +28,7 @@
 #include "language/script.h"
 
 namespace hpsdf::app {
-namespace {
+namespace batch_test {
 
 using namespace cli;
 using cli::Call;  // a script has calls too
@@ -601,5 +601,5 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
   EXPECT_THAT(statuses, AllOf(SizeIs(kShapes), Each("skipped")));
 }
 
-}  // namespace
+}  // namespace batch_test
 }  // namespace hpsdf::app

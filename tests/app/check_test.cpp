@@ -20,7 +20,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace check_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -391,5 +391,5 @@ TEST(JUnit, invalidXmlCharactersAreReplaced) {
   EXPECT_FALSE(isWellFormed("<?xml ?><a b=\"<\"></a>"));
 }
 
-}  // namespace
+}  // namespace check_test
 }  // namespace hpsdf::app

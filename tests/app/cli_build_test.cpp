@@ -10,9 +10,10 @@
 #include "hpsdf/field_file.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_build_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using BuildCommand = Cli;
 
 TEST_F(BuildCommand, buildWritesAFieldThatLoads) {
@@ -229,5 +230,5 @@ TEST_F(BuildCommand, normalizationIsRemembered) {
   EXPECT_THAT(run({{"info", at("f.hpsdf")}}).out, HasSubstr("field = 0.5 · (mesh − (12, 1, 1))"));
 }
 
-}  // namespace
+}  // namespace cli_build_test
 }  // namespace hpsdf::app

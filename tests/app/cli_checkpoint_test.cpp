@@ -12,9 +12,10 @@
 #include "support/short_files.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_checkpoint_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 
 /// Identifies one version of a file, which is replaced at each write; nothing where the file does not exist.
 std::optional<ino_t> identityOf(const fs::path& file) {
@@ -124,5 +125,5 @@ TEST_F(Checkpoints, warnsWhereACheckpointCannotBeWritten) {
   EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
 }
 
-}  // namespace
+}  // namespace cli_checkpoint_test
 }  // namespace hpsdf::app

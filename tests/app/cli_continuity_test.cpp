@@ -7,9 +7,10 @@
 #include "hpsdf/jumps.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_continuity_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Continuity = Cli;
 
 TEST_F(Continuity, smoothEqualsBuildWithWeakContinuity) {
@@ -187,5 +188,5 @@ TEST_F(Continuity, continuityIsStudied) {
   expectRefused({{"study", "continuity", "analytic:sphere", "--enrich", "-o", at("none")}}, "enrich");
 }
 
-}  // namespace
+}  // namespace cli_continuity_test
 }  // namespace hpsdf::app

@@ -17,9 +17,10 @@
 #include "support/one_leaf_field.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_field_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using FieldFile = Cli;
 
 TEST_F(FieldFile, infoDescribesTheField) {
@@ -221,5 +222,5 @@ TEST_F(FieldFile, fileThatAppearsAndDisappearsIsReadOrRefused) {
   EXPECT_GT(read, 0);
 }
 
-}  // namespace
+}  // namespace cli_field_test
 }  // namespace hpsdf::app

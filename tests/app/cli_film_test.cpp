@@ -8,9 +8,10 @@
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_film_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Films = Cli;
 
 TEST_F(Films, turntableEqualsRenderFromAllDirections) {
@@ -159,5 +160,5 @@ TEST(ReportPage, escapesWhatItShows) {
   EXPECT_THAT(html, Not(HasSubstr("<b>&")));
 }
 
-}  // namespace
+}  // namespace cli_film_test
 }  // namespace hpsdf::app

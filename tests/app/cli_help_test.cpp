@@ -5,9 +5,10 @@
 #include "cli_fixture.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_help_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using HelpCommand = Cli;
 
 TEST_F(HelpCommand, helpAndVersionArePrinted) {
@@ -88,5 +89,5 @@ TEST_F(HelpCommand, badOptionsAreRefused) {
   expectRefused(build({"--margin", "inf"}), "--margin");
 }
 
-}  // namespace
+}  // namespace cli_help_test
 }  // namespace hpsdf::app

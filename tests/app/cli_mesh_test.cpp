@@ -10,9 +10,10 @@
 #include "cli_fixture.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_mesh_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using MeshCommand = Cli;
 
 TEST_F(MeshCommand, reportsSelfIntersectionsAndInsideTest) {
@@ -166,5 +167,5 @@ TEST_F(MeshCommand, importerEndsWithTheProgram) {
   }
 }
 
-}  // namespace
+}  // namespace cli_mesh_test
 }  // namespace hpsdf::app

@@ -10,9 +10,10 @@
 #include "support/short_files.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_output_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Outputs = Cli;
 
 TEST_F(Outputs, unwritableOutputsAreRefusedBeforeTheWork) {
@@ -154,5 +155,5 @@ TEST_F(Outputs, olderFileSurvivesAnInterrupt) {
   EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
 }
 
-}  // namespace
+}  // namespace cli_output_test
 }  // namespace hpsdf::app

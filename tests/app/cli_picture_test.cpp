@@ -15,9 +15,10 @@
 #include "support/require_gl.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_picture_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Pictures = Cli;
 
 TEST_F(Pictures, drawsOnTheCpu) {
@@ -242,5 +243,5 @@ TEST_F(Pictures, slicesOfFieldsAwayFromTheOriginCutTheirMiddle) {
   EXPECT_THAT(readFile(at("s.csv")), HasSubstr(",11.5,"));
 }
 
-}  // namespace
+}  // namespace cli_picture_test
 }  // namespace hpsdf::app

@@ -13,9 +13,10 @@
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_sampling_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Sampling = Cli;
 
 TEST_F(Sampling, jumpsAreReportedAndListed) {
@@ -191,5 +192,5 @@ TEST_F(Sampling, probeNeedsNoExactDistance) {
   EXPECT_EQ(tableOf(readFile(at("script.csv"))), with) << "the mesh is still at hand";
 }
 
-}  // namespace
+}  // namespace cli_sampling_test
 }  // namespace hpsdf::app

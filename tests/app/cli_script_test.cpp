@@ -10,9 +10,10 @@
 #include "support/require_gl.h"
 
 namespace hpsdf::app {
-namespace {
+namespace cli_script_test {
 
 using namespace cli;
+using cli::Call;  // a script has calls too
 using Scripts = Cli;
 
 TEST_F(Scripts, scriptsWorkOnTheCurrentField) {
@@ -138,5 +139,5 @@ TEST_F(Scripts, scriptMistakesAreRefused) {
   expectRefused({{"run"}}, "give a script's file");
 }
 
-}  // namespace
+}  // namespace cli_script_test
 }  // namespace hpsdf::app

@@ -9,7 +9,7 @@
 #include "hpsdf/error.h"
 
 namespace hpsdf::app {
-namespace {
+namespace expectation_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -74,5 +74,5 @@ TEST(Expectation, mistakesAreNamed) {
   EXPECT_THAT(refusal(""), HasSubstr("unknown figures ''"));
 }
 
-}  // namespace
+}  // namespace expectation_test
 }  // namespace hpsdf::app

@@ -20,7 +20,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace explorer_test {
 
 using ::testing::HasSubstr;
 
@@ -603,5 +603,5 @@ TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
     }
 }
 
-}  // namespace
+}  // namespace explorer_test
 }  // namespace hpsdf::app

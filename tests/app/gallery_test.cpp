@@ -11,7 +11,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace gallery_test {
 
 constexpr const char* kBunny = "/usr/share/glmark2/models/bunny.obj";
 
@@ -25,5 +25,5 @@ TEST(Gallery, PicturesAreWhatTheirScriptsMake) {
   EXPECT_EQ(outcome.status, kExitDone) << outcome.out << outcome.err;
 }
 
-}  // namespace
+}  // namespace gallery_test
 }  // namespace hpsdf::app

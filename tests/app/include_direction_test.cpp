@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-namespace {
+namespace include_direction_test {
 
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
@@ -461,4 +461,4 @@ TEST(IncludeDirection, namesFileLineAndInclude) {
   EXPECT_EQ(found, Lines{"core/src/field/build/build.cpp:3: hpsdf/render/view.h: core must not know render"});
 }
 
-}  // namespace
+}  // namespace include_direction_test

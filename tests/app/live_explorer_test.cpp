@@ -19,7 +19,7 @@
 #include "window/recording.h"
 
 namespace hpsdf::app {
-namespace {
+namespace live_explorer_test {
 
 using testing::HasSubstr;
 
@@ -285,5 +285,5 @@ TEST(Registry, theWindowIsForTheCommandLine) {
   }
 }
 
-}  // namespace
+}  // namespace live_explorer_test
 }  // namespace hpsdf::app

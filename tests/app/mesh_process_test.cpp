@@ -29,7 +29,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace mesh_process_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -542,5 +542,5 @@ TEST_F(MeshProcess, mutatedFilesAreMeshesOrErrorsOfOneLine) {
   EXPECT_GT(outcomes["refused"], count / 20);
 }
 
-}  // namespace
+}  // namespace mesh_process_test
 }  // namespace hpsdf::app

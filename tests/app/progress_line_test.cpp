@@ -13,7 +13,7 @@
 #include "text/text.h"
 
 namespace hpsdf::app {
-namespace {
+namespace progress_line_test {
 
 using started::lineCount;
 using testing::EndsWith;
@@ -88,5 +88,5 @@ TEST(Summaries, numbersAreReadable) {
   EXPECT_EQ(grouped(999), "999");
 }
 
-}  // namespace
+}  // namespace progress_line_test
 }  // namespace hpsdf::app

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-namespace {
+namespace readme_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -36,4 +36,4 @@ TEST(Readme, linksToFilesThatExist) {
   EXPECT_GT(links, 10u);
 }
 
-}  // namespace
+}  // namespace readme_test

@@ -19,7 +19,7 @@
 #include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
-namespace {
+namespace registry_test {
 
 using testing::HasSubstr;
 
@@ -375,5 +375,5 @@ TEST(Documentation, commandsPageIsUpToDate) {
       << "docs/commands.md is not up to date; write it with: hpsdf docs -o docs/commands.md";
 }
 
-}  // namespace
+}  // namespace registry_test
 }  // namespace hpsdf::app

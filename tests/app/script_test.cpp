@@ -13,7 +13,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace script_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -266,5 +266,5 @@ TEST(Variables, haveAFixedForm) {
   EXPECT_THROW(parseVariables({"a-b=1"}), Error);
 }
 
-}  // namespace
+}  // namespace script_test
 }  // namespace hpsdf::app

@@ -15,7 +15,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace simulate_test {
 
 using Json = nlohmann::ordered_json;
 using testing::HasSubstr;
@@ -331,5 +331,5 @@ TEST(Simulate, mistakesAreReportedInOneLine) {
   refused({"simulate", "poles", "--body", (folder / "flat.obj").string()}, "flat.obj: a body needs a closed surface");
 }
 
-}  // namespace
+}  // namespace simulate_test
 }  // namespace hpsdf::app

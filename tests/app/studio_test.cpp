@@ -13,7 +13,7 @@
 #include "simulate/coarse_mesh.h"
 
 namespace hpsdf::app {
-namespace {
+namespace studio_test {
 
 constexpr double kFieldsAreGood = 1e-5;  // τ
 
@@ -163,5 +163,5 @@ TEST(CoarseMesh, removesSmallDetailOnly) {
   }
 }
 
-}  // namespace
+}  // namespace studio_test
 }  // namespace hpsdf::app

@@ -18,7 +18,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace usage_test {
 
 namespace fs = std::filesystem;
 using ::testing::IsEmpty;
@@ -89,5 +89,5 @@ TEST(Usage, everyControlOfTheExplorerIsInACheckedScript) {
     EXPECT_TRUE(seen.contains(control)) << control;
 }
 
-}  // namespace
+}  // namespace usage_test
 }  // namespace hpsdf::app

@@ -26,7 +26,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::app {
-namespace {
+namespace window_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -347,5 +347,5 @@ TEST_F(WindowTest, aMissingDisplayIsAnError) {
   EXPECT_FALSE(fs::exists(file("session.hps")));
 }
 
-}  // namespace
+}  // namespace window_test
 }  // namespace hpsdf::app

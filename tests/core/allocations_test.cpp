@@ -12,7 +12,7 @@
 #include "support/count_allocations.h"
 
 namespace hpsdf {
-namespace {
+namespace allocations_test {
 
 using support::allocationsOf;
 
@@ -46,5 +46,5 @@ TEST(Allocations, queriesMakeNone) {
   EXPECT_TRUE(std::isfinite(sum));
 }
 
-}  // namespace
+}  // namespace allocations_test
 }  // namespace hpsdf

@@ -18,7 +18,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace blend_test {
 
 std::vector<Cell> cellsOf(const Field& field) {
   std::vector<Cell> cells;
@@ -421,5 +421,5 @@ TEST(Blend, keepsTheErrorOfAMeshsField) {
   EXPECT_LT(none.gradient, 1e-9);
 }
 
-}  // namespace
+}  // namespace blend_test
 }  // namespace hpsdf

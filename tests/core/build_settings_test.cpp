@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace hpsdf {
-namespace {
+namespace build_settings_test {
 
 TEST(BuildSettings, namesAreUniqueAndFound) {
   std::set<std::string_view> names;
@@ -73,5 +73,5 @@ TEST(BuildSettings, targetAndErrorsByDistanceExcludeEachOther) {
   EXPECT_TRUE(ErrorTarget(0).isNone());
 }
 
-}  // namespace
+}  // namespace build_settings_test
 }  // namespace hpsdf

@@ -20,7 +20,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace build_test {
 
 double sphere(const Vector3& x) { return x.norm() - 1; }
 double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
@@ -486,5 +486,5 @@ TEST(DomainAround, enlargesAsThePaperDoes) {
   EXPECT_THROW(domainAround(Box()), Error);
 }
 
-}  // namespace
+}  // namespace build_test
 }  // namespace hpsdf

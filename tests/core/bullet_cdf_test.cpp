@@ -16,7 +16,7 @@
 #include "support/one_leaf_field.h"
 
 namespace hpsdf {
-namespace {
+namespace bullet_cdf_test {
 
 constexpr bool kDouble = sizeof(btScalar) == 8;
 constexpr double kRounding = kDouble ? 1e-12 : 1e-4;  // of values and gradients of some tens
@@ -154,5 +154,5 @@ TEST(BulletCdf, aFieldIsACollisionShape) {
   }
 }
 
-}  // namespace
+}  // namespace bullet_cdf_test
 }  // namespace hpsdf

@@ -26,7 +26,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace checkpoint_test {
 
 namespace fs = std::filesystem;
 
@@ -424,5 +424,5 @@ TEST(OutputFile, aTakenTemporaryNameIsNoObstacle) {
   EXPECT_EQ(namesIn(folder.path()).size(), 4u);
 }
 
-}  // namespace
+}  // namespace checkpoint_test
 }  // namespace hpsdf

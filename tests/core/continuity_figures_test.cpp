@@ -14,7 +14,7 @@
 #include "support/test_mesh.h"
 
 namespace hpsdf {
-namespace {
+namespace continuity_figures_test {
 
 struct Figures {
   double jump, rms, bytes;
@@ -68,5 +68,5 @@ TEST(ContinuityFigures, bunny) {
   EXPECT_LT(enriched.bytes, 1.9 * before.bytes);
 }
 
-}  // namespace
+}  // namespace continuity_figures_test
 }  // namespace hpsdf

@@ -20,7 +20,7 @@
 #include "surface/exact_orientation.h"
 
 namespace hpsdf {
-namespace {
+namespace crossings_test {
 
 using IntegerPoint = std::array<std::int64_t, 3>;
 
@@ -240,5 +240,5 @@ TEST(Crossings, ofMeshFilesAreAsKnown) {
   EXPECT_FALSE(crossings("broken/self_intersectA.obj").found.empty());
 }
 
-}  // namespace
+}  // namespace crossings_test
 }  // namespace hpsdf

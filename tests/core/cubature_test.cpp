@@ -6,7 +6,7 @@
 #include <map>
 
 namespace hpsdf {
-namespace {
+namespace cubature_test {
 
 double integral(const basis::Cubature& rule, int i, int j, int k) {
   double sum = 0;
@@ -39,5 +39,5 @@ TEST(CompactCubature, integratesUpToItsOrderAndNoFurther) {
   EXPECT_FALSE(basis::compactCubature(14));
 }
 
-}  // namespace
+}  // namespace cubature_test
 }  // namespace hpsdf

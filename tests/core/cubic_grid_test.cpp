@@ -14,7 +14,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace cubic_grid_test {
 
 /// Reads numbers from the bytes of a file.
 class Reader {
@@ -202,5 +202,5 @@ TEST(CubicGrid, canBeCancelled) {
   EXPECT_THROW(writeCubicGrid(grid, out, cancelled), Cancelled);
 }
 
-}  // namespace
+}  // namespace cubic_grid_test
 }  // namespace hpsdf

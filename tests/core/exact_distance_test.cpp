@@ -27,7 +27,7 @@
 #include "support/test_mesh.h"
 
 namespace hpsdf {
-namespace {
+namespace exact_distance_test {
 
 using bvh::makeFrame;
 using bvh::TriangleFrame;
@@ -756,5 +756,5 @@ INSTANTIATE_TEST_SUITE_P(, ExactDistanceOfMeshes,
                            return name.substr(0, name.find('.'));
                          });
 
-}  // namespace
+}  // namespace exact_distance_test
 }  // namespace hpsdf

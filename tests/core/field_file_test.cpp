@@ -18,7 +18,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace field_file_test {
 
 double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
 
@@ -317,5 +317,5 @@ TEST(OutputFile, appearsWholeOrNotAtAll) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "later.txt"));
 }
 
-}  // namespace
+}  // namespace field_file_test
 }  // namespace hpsdf

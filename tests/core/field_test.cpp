@@ -15,7 +15,7 @@
 #include "hpsdf/error.h"
 
 namespace hpsdf {
-namespace {
+namespace field_test {
 
 double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
 
@@ -337,5 +337,5 @@ TEST(Field, refusesInvalidArrays) {
   refuses([](FieldData& d) { std::get<0>(d.coefficients)[3] = std::nan(""); });
 }
 
-}  // namespace
+}  // namespace field_test
 }  // namespace hpsdf

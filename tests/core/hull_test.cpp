@@ -22,7 +22,7 @@
 #include "support/made_meshes.h"
 
 namespace hpsdf {
-namespace {
+namespace hull_test {
 
 using support::boxBetween;
 using support::boxOfTwo;
@@ -259,5 +259,5 @@ TEST(OuterHull, reportsProgressAndCanBeCancelled) {
   }
 }
 
-}  // namespace
+}  // namespace hull_test
 }  // namespace hpsdf

@@ -17,7 +17,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf {
-namespace {
+namespace jumps_test {
 
 /// Makes a row of unit base cells along x. With `children`, one more base cell is added that is split once.
 FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<std::vector<double>>& children = {}) {
@@ -305,5 +305,5 @@ TEST(Jumps, canBeCancelled) {
   EXPECT_EQ(last, 1);
 }
 
-}  // namespace
+}  // namespace jumps_test
 }  // namespace hpsdf

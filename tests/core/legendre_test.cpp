@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace hpsdf {
-namespace {
+namespace legendre_test {
 
 TEST(Legendre, valuesMatchTheStandardLibrary) {
   double values[31];
@@ -47,5 +47,5 @@ TEST(GaussLegendre, integratesUpToItsDegreeAndNoFurther) {
   }
 }
 
-}  // namespace
+}  // namespace legendre_test
 }  // namespace hpsdf

@@ -12,7 +12,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf {
-namespace {
+namespace line_test {
 
 Vector3 pointAt(const Vector3& from, const Vector3& to, double t) { return from + t * (to - from); }
 
@@ -235,5 +235,5 @@ TEST(Line, refusesEqualAndInfiniteEnds) {
   EXPECT_EQ(cellsOf(piecesAlong(field, {-1e6, 0.5, 0.5}, {1e6, 0.5, 0.5})).size(), 2u);
 }
 
-}  // namespace
+}  // namespace line_test
 }  // namespace hpsdf

@@ -9,7 +9,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace machine_memory_test {
 
 class ControlGroups : public testing::Test {
  protected:
@@ -66,5 +66,5 @@ TEST(MachineMemory, isFiniteAndWithinTheGroupsLimit) {
   EXPECT_LE(detail::machineMemory(), detail::memoryOfControlGroups());
 }
 
-}  // namespace
+}  // namespace machine_memory_test
 }  // namespace hpsdf

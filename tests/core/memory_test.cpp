@@ -6,7 +6,7 @@
 #include "hpsdf/error.h"
 
 namespace hpsdf {
-namespace {
+namespace memory_test {
 
 TEST(Memory, bytesAreWrittenInASuitableUnit) {
   EXPECT_EQ(bytesText(0), "0 bytes");
@@ -28,5 +28,5 @@ TEST(Memory, requestsBeyondTheMachineAreRefused) {
   }
 }
 
-}  // namespace
+}  // namespace memory_test
 }  // namespace hpsdf

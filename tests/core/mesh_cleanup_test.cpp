@@ -16,7 +16,7 @@
 #include "support/made_meshes.h"
 
 namespace hpsdf {
-namespace {
+namespace mesh_cleanup_test {
 
 using support::joined;
 using support::reversed;
@@ -441,5 +441,5 @@ TEST(TriangleMesh, normalizedNeedsAnExtent) {
   EXPECT_THROW(normalized({{{0, 0, 0}, {nan, nan, nan}, {nan, 0, 0}}, {{0, 1, 2}}, "nan"}), Error);
 }
 
-}  // namespace
+}  // namespace mesh_cleanup_test
 }  // namespace hpsdf

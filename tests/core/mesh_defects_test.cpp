@@ -23,7 +23,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
-namespace {
+namespace mesh_defects_test {
 
 using support::boxBetween;
 using support::boxOfTwo;
@@ -383,5 +383,5 @@ TEST(MeshExport, refusesOtherFormats) {
   EXPECT_FALSE(std::filesystem::exists(file));
 }
 
-}  // namespace
+}  // namespace mesh_defects_test
 }  // namespace hpsdf

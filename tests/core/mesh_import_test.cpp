@@ -24,7 +24,7 @@
 #include "support/test_mesh.h"
 
 namespace hpsdf {
-namespace {
+namespace mesh_import_test {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
@@ -700,5 +700,5 @@ TEST_F(MeshImport, refusedMeshes) {
   EXPECT_THAT(errorOf(support::testMesh("broken/assimp_invalid.off")), HasSubstr("no face with an area"));
 }
 
-}  // namespace
+}  // namespace mesh_import_test
 }  // namespace hpsdf

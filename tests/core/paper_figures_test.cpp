@@ -16,7 +16,7 @@
 #include "support/test_mesh.h"
 
 namespace hpsdf {
-namespace {
+namespace paper_figures_test {
 
 Box paperDomain() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
 
@@ -105,5 +105,5 @@ TEST(PaperFigures, dragon) {
   EXPECT_NEAR(double(statistics(field).leaves), 298542, 0.02 * 298542);  // the paper: 299k
 }
 
-}  // namespace
+}  // namespace paper_figures_test
 }  // namespace hpsdf

@@ -10,7 +10,7 @@
 #include "field/query/evaluate.h"
 
 namespace hpsdf {
-namespace {
+namespace projection_test {
 
 std::vector<double> randomCoefficients(int degree, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -160,5 +160,5 @@ TEST(Evaluate, gradientMatchesCentralDifferences) {
   }
 }
 
-}  // namespace
+}  // namespace projection_test
 }  // namespace hpsdf

@@ -15,7 +15,7 @@
 #include "hpsdf/shapes.h"
 
 namespace hpsdf {
-namespace {
+namespace safe_distance_test {
 
 using Phi = std::function<double(const Vector3&)>;
 
@@ -186,5 +186,5 @@ TEST(SafeDistance, refusesFieldsWithoutBoundsAndBadArguments) {
   EXPECT_THROW(withBounds(field, [](const Vector3&) { return std::nan(""); }), Error);
 }
 
-}  // namespace
+}  // namespace safe_distance_test
 }  // namespace hpsdf

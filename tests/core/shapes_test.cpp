@@ -14,7 +14,7 @@
 #include "hpsdf/mesh_file.h"
 
 namespace hpsdf {
-namespace {
+namespace shapes_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -374,5 +374,5 @@ TEST(NearestName, countsEditedLetters) {
   EXPECT_EQ(editDistance("ABC", "abc"), 0u);
 }
 
-}  // namespace
+}  // namespace shapes_test
 }  // namespace hpsdf

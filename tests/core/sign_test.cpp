@@ -24,7 +24,7 @@
 #include "support/test_mesh.h"
 
 namespace hpsdf {
-namespace {
+namespace sign_test {
 
 using bvh::Hierarchy;
 using sign::BoundaryEdges;
@@ -443,5 +443,5 @@ TEST(InsideTest, ofMeshFilesEqualsTheWindingNumber) {
   }
 }
 
-}  // namespace
+}  // namespace sign_test
 }  // namespace hpsdf

@@ -12,7 +12,7 @@
 #include "hpsdf/error.h"
 
 namespace hpsdf {
-namespace {
+namespace steering_test {
 
 /// Two spheres, between which the distance has a kink.
 double spheres(const Vector3& x) {
@@ -304,5 +304,5 @@ TEST(Steering, refusesWhatDoesNotGoTogether) {
   EXPECT_NE(refusal(paper).find("children's samples"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace steering_test
 }  // namespace hpsdf

@@ -14,7 +14,7 @@
 #include "hpsdf/shapes.h"
 
 namespace hpsdf {
-namespace {
+namespace verify_test {
 
 double height(const Vector3& x) { return x.z(); }
 
@@ -248,5 +248,5 @@ TEST(Verify, measureErrorAgreesWithVerify) {
   EXPECT_EQ(measureError(field, {}).samples, 0u);
 }
 
-}  // namespace
+}  // namespace verify_test
 }  // namespace hpsdf

@@ -17,7 +17,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf {
-namespace {
+namespace weak_continuity_test {
 
 const std::vector<double>& coefficientsOf(const Field& field) {
   return std::get<std::vector<double>>(field.data().coefficients);
@@ -405,5 +405,5 @@ TEST(Build, appliesContinuityToEveryStage) {
   });
 }
 
-}  // namespace
+}  // namespace weak_continuity_test
 }  // namespace hpsdf

@@ -14,7 +14,7 @@
 #include "support/count_allocations.h"
 
 namespace hpsdf::physics {
-namespace {
+namespace allocations_test {
 
 using support::allocationsOf;
 
@@ -57,5 +57,5 @@ TEST_F(Allocations, OfManyPairsAreMadeOnce) {
   }
 }
 
-}  // namespace
+}  // namespace allocations_test
 }  // namespace hpsdf::physics

@@ -21,7 +21,7 @@
 #include "reduce_contacts.h"
 
 namespace hpsdf::physics {
-namespace {
+namespace bullet_test {
 
 /// A mesh with its field, samples and shape.
 struct Kind {
@@ -438,5 +438,5 @@ TEST(BulletField, ClothRestsOnABody) {
   EXPECT_LT(speed, 0.05);
 }
 
-}  // namespace
+}  // namespace bullet_test
 }  // namespace hpsdf::physics

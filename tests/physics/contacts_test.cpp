@@ -24,7 +24,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::physics {
-namespace {
+namespace contacts_test {
 
 bool operator==(const Contact& a, const Contact& b) {
   return a.sample == b.sample && a.depth == b.depth && a.position == b.position && a.normal == b.normal;
@@ -338,5 +338,5 @@ TEST_F(ContactsOfPairs, RefuseTransformsThatAreNotRigid) {
   EXPECT_FALSE(refused([](Eigen::Isometry3d& t) { t.linear() *= 1 + 1e-9; })) << "a long simulation's rounding";
 }
 
-}  // namespace
+}  // namespace contacts_test
 }  // namespace hpsdf::physics

@@ -14,7 +14,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::physics {
-namespace {
+namespace field_collider_test {
 
 Vector3 pointAround(const Box& box, std::mt19937_64& random, double beyond = 1.2) {
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -124,5 +124,5 @@ TEST(FieldCollider, KnowsThatFarAwayIsOutside) {
   EXPECT_GT(collider.lowerBoundAround({std::numeric_limits<double>::infinity(), 0, 0}), 1e200);
 }
 
-}  // namespace
+}  // namespace field_collider_test
 }  // namespace hpsdf::physics

@@ -16,7 +16,7 @@
 #include "hpsdf/shapes.h"
 
 namespace hpsdf::physics {
-namespace {
+namespace surface_samples_test {
 
 /// To the nearest other sample that faces the same way.
 std::vector<double> nearest(const SurfaceSamples& samples) {
@@ -208,5 +208,5 @@ TEST(SurfaceSamples, RefuseWhatGivesNone) {
   EXPECT_THAT(refusal(bad, {.count = 5}), testing::HasSubstr("no finite area"));
 }
 
-}  // namespace
+}  // namespace surface_samples_test
 }  // namespace hpsdf::physics

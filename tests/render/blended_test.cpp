@@ -16,7 +16,7 @@
 #include "view/surface_bounds.h"
 
 namespace hpsdf::render {
-namespace {
+namespace blended_test {
 
 constexpr int kWidth = 64, kHeight = 48;
 
@@ -231,5 +231,5 @@ TEST(BlendedField, hasNoCracks) {
   }
 }
 
-}  // namespace
+}  // namespace blended_test
 }  // namespace hpsdf::render

@@ -27,7 +27,7 @@
 #include "support/require_gl.h"
 
 namespace hpsdf::render {
-namespace {
+namespace bodies_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -748,5 +748,5 @@ TEST(BodyColors, differFromClayAndFromTheirNeighbours) {
   EXPECT_EQ(bodyColor(7), bodyColor(7));
 }
 
-}  // namespace
+}  // namespace bodies_test
 }  // namespace hpsdf::render

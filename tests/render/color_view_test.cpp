@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace hpsdf::render {
-namespace {
+namespace color_view_test {
 
 const LevelMap kMap(std::vector<int>{2, 3, 5});
 
@@ -297,5 +297,5 @@ TEST(Surface, keepsLevelColorsRecognisableUnderShading) {
     }
 }
 
-}  // namespace
+}  // namespace color_view_test
 }  // namespace hpsdf::render

@@ -10,7 +10,7 @@
 #include "picture/cracks.h"
 
 namespace hpsdf::render {
-namespace {
+namespace colormap_test {
 
 // How dichromats see a colour: the response of the missing cone is replaced by the combination of the other two that
 // leaves white and one more colour, which they see as others do, unchanged (after Viénot, Brettel & Mollon 1999).
@@ -197,5 +197,5 @@ TEST(DistanceScale, hasARangeOfFewDigitsAndAboutTwelveLines) {
   EXPECT_GT(distanceScale(0.5, 0.5).step, 0.01);
 }
 
-}  // namespace
+}  // namespace colormap_test
 }  // namespace hpsdf::render

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hpsdf::render {
-namespace {
+namespace compare_test {
 
 const Color kGrey = {100, 100, 100};
 
@@ -83,5 +83,5 @@ TEST(WorstPixels, areSortedAndApart) {
   EXPECT_TRUE(worstPixels(grey(), grey(), 10).empty());
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace hpsdf::render

@@ -8,7 +8,7 @@
 #include "view/view_buffers.h"
 
 namespace hpsdf::render {
-namespace {
+namespace cracks_test {
 
 constexpr Color kGrey = {90, 90, 90};
 
@@ -66,5 +66,5 @@ TEST(MarkedCracks, areAsBroadAsThePicturesLines) {
   EXPECT_EQ(picture.at(19, 15), kGrey);
 }
 
-}  // namespace
+}  // namespace cracks_test
 }  // namespace hpsdf::render

@@ -11,7 +11,7 @@
 #include "support/temporary_directory.h"
 
 namespace hpsdf::render {
-namespace {
+namespace image_test {
 
 using support::TemporaryDirectory;
 
@@ -84,5 +84,5 @@ TEST(Image, namesAFileThatIsNoWholePng) {
   EXPECT_FALSE(messageOf([&] { loadPng(directory.path()); }).empty());
 }
 
-}  // namespace
+}  // namespace image_test
 }  // namespace hpsdf::render

@@ -14,7 +14,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::render {
-namespace {
+namespace line_plot_test {
 
 /// f = 0 in x < 0, 1 from there on; two cells of degrees 0 and 1.
 Field stepField() {
@@ -193,5 +193,5 @@ TEST(Curve, hasItsStatedWidth) {
   EXPECT_EQ(cut.at(10, 10), (Color{255, 255, 255}));
 }
 
-}  // namespace
+}  // namespace line_plot_test
 }  // namespace hpsdf::render

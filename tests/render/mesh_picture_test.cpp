@@ -23,7 +23,7 @@
 #include "support/require_gl.h"
 
 namespace hpsdf::render {
-namespace {
+namespace mesh_picture_test {
 
 using support::boxOfTwo;
 using support::joined;
@@ -287,5 +287,5 @@ TEST(MeshPicture, rejectsSizesAndTargetsOutOfRange) {
               testing::ThrowsMessage<Error>(testing::HasSubstr("too far from the mesh")));
 }
 
-}  // namespace
+}  // namespace mesh_picture_test
 }  // namespace hpsdf::render

@@ -15,7 +15,7 @@
 #include "picture/legend.h"
 
 namespace hpsdf::render {
-namespace {
+namespace picture_test {
 
 constexpr double kPlane = 0.125;  // the surface of the test field: x = kPlane, inside below
 
@@ -774,5 +774,5 @@ TEST(Numbers, areFormattedAsReadersExpect) {
   EXPECT_EQ(formatShare(1), "100 %");
 }
 
-}  // namespace
+}  // namespace picture_test
 }  // namespace hpsdf::render

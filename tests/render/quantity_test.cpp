@@ -9,7 +9,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::render {
-namespace {
+namespace quantity_test {
 
 struct Seen {
   Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
@@ -127,5 +127,5 @@ TEST(ScaleOfAQuantity, isNotStretchedByManyTinyCells) {
   EXPECT_DOUBLE_EQ(colorScale({}, field, cells, {}).high(), 1);
 }
 
-}  // namespace
+}  // namespace quantity_test
 }  // namespace hpsdf::render

@@ -25,7 +25,7 @@
 #include "support/require_gl.h"
 
 namespace hpsdf::render {
-namespace {
+namespace renderer_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -992,5 +992,5 @@ TEST(GlHardware, isHardwareOrAnError) {
   }
 }
 
-}  // namespace
+}  // namespace renderer_test
 }  // namespace hpsdf::render

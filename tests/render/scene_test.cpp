@@ -22,7 +22,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::render {
-namespace {
+namespace scene_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -484,5 +484,5 @@ TEST(Arrows, areDarkInALightCasingAndStayWithinTheirRectangle) {
   }
 }
 
-}  // namespace
+}  // namespace scene_test
 }  // namespace hpsdf::render

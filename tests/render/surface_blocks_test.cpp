@@ -10,7 +10,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::render {
-namespace {
+namespace surface_blocks_test {
 
 constexpr int kWidth = 203;  // no multiple of a block
 constexpr int kHeight = 150;
@@ -145,5 +145,5 @@ TEST(SurfaceBlocks, areNoneWhereNothingIsVisible) {
   EXPECT_EQ(count({cameraOf({}, field.domain(), kWidth, kHeight), 5}), 0);
 }
 
-}  // namespace
+}  // namespace surface_blocks_test
 }  // namespace hpsdf::render

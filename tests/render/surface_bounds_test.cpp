@@ -11,7 +11,7 @@
 #include "support/random_field.h"
 
 namespace hpsdf::render {
-namespace {
+namespace surface_bounds_test {
 
 // L_i, L_i' and L_i'' for i = 0..degree.
 struct Legendre {
@@ -258,5 +258,5 @@ TEST(PackOutwards, keepsNumbersThatFit) {
   }
 }
 
-}  // namespace
+}  // namespace surface_bounds_test
 }  // namespace hpsdf::render

@@ -5,7 +5,7 @@
 #include <set>
 
 namespace hpsdf::render {
-namespace {
+namespace text_test {
 
 constexpr Color kPaper = {255, 255, 255};
 constexpr Color kInk = {0, 0, 0};
@@ -113,5 +113,5 @@ TEST(Text, fitsWithAnEllipsisAfterAWholeCharacter) {
   EXPECT_EQ(fitText(name, 15, 3), "");
 }
 
-}  // namespace
+}  // namespace text_test
 }  // namespace hpsdf::render

@@ -10,7 +10,7 @@
 #include "hpsdf/error.h"
 
 namespace hpsdf::render {
-namespace {
+namespace view_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -240,5 +240,5 @@ TEST(Camera, rejectsNumbersOutOfRange) {
   EXPECT_THROW(cameraOf({}, kBox, 0, 64), Error);
 }
 
-}  // namespace
+}  // namespace view_test
 }  // namespace hpsdf::render

@@ -45,7 +45,7 @@ namespace fs = std::filesystem;
 constexpr const char* kOwnFolder = ".batch";  // subfolder of the output for locks and records of finished fields
 constexpr auto kPollInterval = std::chrono::milliseconds(100);  // between checks while other processes build meshes
 
-/// The result of a mesh. All but `failed` mean that its field exists.
+/// How the work on one mesh of the batch ended. After every status but `failed` the mesh's field file exists.
 enum class Status : std::uint8_t {
   built,
   skipped,    ///< the field existed already
@@ -58,8 +58,8 @@ std::string statusName(Status status) {
   return kNames[std::size_t(status)];
 }
 
-/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so for
-/// glTF the mesh that was read is hashed instead. The result is "" where the file cannot be read.
+/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so
+/// for glTF the imported mesh is hashed instead. Returns "" if the file cannot be read.
 std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
@@ -77,7 +77,7 @@ std::string contentOf(const Console& console, const std::string& surface) {
   return file.eof() ? fmt::format("bytes {:016x}", hash) : std::string();
 }
 
-/// Returns the checksum at the end of a field file without verifying it; "" where the file is too short.
+/// Returns the checksum at the end of a field file without verifying it. Returns "" if the file is too short.
 std::string checksumOf(const fs::path& field) {
   constexpr int kBytes = 8;
   std::array<char, kBytes> bytes{};
@@ -88,8 +88,8 @@ std::string checksumOf(const fs::path& field) {
   return file ? text : std::string();
 }
 
-/// Lists the options that the caller wrote. An option counts even if it repeats its default, because it then
-/// overrides --paper.
+/// Lists the names of the options that the caller wrote. An option is listed even if its value is the
+/// default, because a written option overrides --paper.
 Json givenNames(const Arguments& arguments) {
   Json names = Json::array();
   for (const Parameter& parameter : buildParameters())
@@ -104,21 +104,23 @@ Json linesJson(const std::string& text) {
   return list;
 }
 
-/// To be called before `errno` changes.
+/// Returns the error for a file that cannot be written, with the reason from `errno`. The caller must not
+/// change `errno` before this call.
 Error cannotWrite(const fs::path& file) {
   return Error(ErrorKind::file, file.string(),
                fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
 }
 
-/// Divides numbered pieces of work among processes that share a file. A lock is a record lock on one byte of the file,
-/// whose offset follows from the number; the byte need not exist. The system releases the locks when a process ends,
-/// however it ends. The file is empty and must never be removed: processes that open its successor would not see the
-/// locks on it.
+/// Divides numbered pieces of work among processes that share a lock file. Each piece is locked by a record
+/// lock on one byte of the lock file. The byte's offset follows from the number of the piece, and the byte
+/// need not exist. The system releases a process's locks when the process ends in any way. The lock file is
+/// empty and must never be removed: processes that open a new file of the same name would not see the locks
+/// on the old one.
 class FileLocks {
  public:
-  /// Creates the file where it does not exist. Throws `Error` where it cannot be written. A process must create only
-  /// one object for each file: record locks belong to the whole process, which loses all of them when it closes the
-  /// file once.
+  /// Creates the lock file if it does not exist. Throws `Error` if the lock file cannot be written. A process
+  /// must create only one object for each lock file: record locks belong to the whole process, which loses all
+  /// its locks on a file as soon as it closes the file once.
   explicit FileLocks(fs::path file)
       : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
     if (descriptor_ < 0) throw cannotWrite(file_);
@@ -127,8 +129,8 @@ class FileLocks {
   FileLocks(const FileLocks&) = delete;
   FileLocks& operator=(const FileLocks&) = delete;
 
-  /// Returns false where another process has this piece of work. Throws `Error` where the file system does not support
-  /// locks.
+  /// Locks the piece of work of this number. Returns false if another process holds its lock. Throws `Error` if
+  /// the file system does not support locks.
   bool take(std::uint64_t number) const {
     if (change(number, F_WRLCK)) return true;
     if (errno == EACCES || errno == EAGAIN) return false;
@@ -159,7 +161,8 @@ class FileLocks {
 
 /// An empty file that exists while a process builds a field. If the process dies, the file remains.
 struct BuildMark {
-  /// Throws `Error` where the file cannot be written: without it, a process that dies would leave no trace.
+  /// Creates the empty file. Throws `Error` if the file cannot be written: without the file, a process that
+  /// dies during a construction would leave no trace.
   explicit BuildMark(fs::path path) : file(std::move(path)) {
     if (!std::ofstream(file)) throw cannotWrite(file);
   }
@@ -215,7 +218,8 @@ class Batch {
   fs::path markOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".begun"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
-  /// Builds the meshes in the order of the list. Those that other processes build are revisited until all are finished.
+  /// Builds the meshes in the order of the list. Meshes that other processes are building are tried again until
+  /// all meshes are finished.
   void workThrough() {
     std::vector<const BatchMesh*> remaining;
     for (const BatchMesh& mesh : meshes_) remaining.push_back(&mesh);
@@ -260,7 +264,8 @@ class Batch {
     }
   }
 
-  /// Returns the existing field if its record shows that a new construction would give the same field.
+  /// Returns the existing field of the mesh if its record shows that a new construction would give the same
+  /// field. Returns std::nullopt otherwise.
   std::optional<CurrentField> finished(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh), record = recordOf(mesh);
     if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
@@ -274,8 +279,9 @@ class Batch {
     }
   }
 
-  /// Removes files that a dead process left half-written. This process holds the lock, so that the author of a mark
-  /// has died, on whatever machine. Without a mark there are no such files, and the folder need not be searched.
+  /// Removes the half-written files that a dead process left for this mesh. This process holds the mesh's lock,
+  /// so a process that left a mark for the mesh has died, on whatever machine. If there is no mark, there are
+  /// no half-written files, and the folder need not be searched.
   void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
@@ -289,29 +295,31 @@ class Batch {
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
     const BuildMark mark(markOf(mesh));
-    // Hashing before reading the mesh lets the next run notice a change in between.
+    // The file is hashed before it is read as a mesh. If the file changes between the two, the next run notices
+    // it.
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // If the locks were lost, another process may have taken this one for dead and removed its unfinished files. That
-      // process may have finished the mesh. If it has not, it removes nothing more, and a second attempt to write
-      // succeeds.
+      // If the file system lost the locks, another process may have regarded this process as dead and removed its
+      // unfinished files. If that other process has finished the mesh, its field is used. Otherwise it removes no
+      // further files, and a second attempt to write succeeds.
       if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }
     return {Status::built, CurrentField{std::move(field), output.string(), fs::file_size(output)}};
   }
 
-  /// Saves the field, then the record of its origin.
+  /// Saves the field, then the record of the mesh and options from which it was built.
   void write(const BatchMesh& mesh, const Field& field, const std::string& content) const {
     save(field, outputOf(mesh));
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
   }
 
-  /// Returns the record that the present options would produce for the field in the folder. The record is kept
-  /// beside the field and compared as a whole; it contains the field's checksum, which ties it to the field.
+  /// Returns the record that the present options would produce for the mesh's field file. The record is stored
+  /// beside the field file and compared as a whole. It contains the checksum of the field file, so it matches
+  /// no other field.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
     return jsonText({{"program", versionText()},
                      {"mesh", mesh.surface},
@@ -331,7 +339,7 @@ class Batch {
                                   fieldLine(made.field->field), seconds);
     }
     console_.err << std::flush;
-    // One write keeps the lines of several processes from mixing.
+    // Each line of the output is written in one call, so that the lines of several processes do not mix.
     console_.out << lineOf(mesh, made, seconds).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"
                  << std::flush;
     requireWritten(console_.out);

@@ -16,7 +16,8 @@ namespace {
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255 for the name and the text after it
 
-/// Returns "torus_major_0.7" for builtin:torus,major=0.7 and "bunny" for scans/bunny.obj.
+/// Makes a readable file name of the name of a mesh: "torus_major_0.7" for builtin:torus,major=0.7, and
+/// "bunny" for scans/bunny.obj.
 std::string readableName(std::string surface) {
   std::ranges::replace(surface, ',', '_');  // `plainName` would end at the comma
   std::string name = plainName(surface).substr(0, kLongestReadable);

@@ -11,7 +11,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Reads two whole numbers. They are checked because nlohmann's JSON would silently convert other numbers.
+/// Reads the size of a baseline, an array of two whole numbers. The types are checked here because nlohmann's
+/// JSON would silently convert other numbers.
 std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
   if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))
@@ -19,7 +20,8 @@ std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   return json.get<std::array<std::size_t, 2>>();
 }
 
-/// Reads what `saveFacts` writes. Throws `Error`, or an exception of nlohmann's JSON, for anything else.
+/// Reads the facts about a baseline from JSON that `saveFacts` wrote. Throws `Error`, or an exception of
+/// nlohmann's JSON, for any other JSON.
 BaselineFacts factsOf(const std::string& file, const Json& json) {
   BaselineFacts facts;
   for (const auto& [key, value] : json.items()) {

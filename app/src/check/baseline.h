@@ -16,14 +16,16 @@ struct BaselineFacts {
   std::optional<double> bound = {};      ///< greatest difference of raw values that is accepted
 };
 
-/// The JSON file of a baseline: degree.json for degree.png, but values.csv.json for the raw values of values.csv.
+/// Returns the name of a baseline's JSON file: degree.json for degree.png, but values.csv.json for the raw
+/// values of values.csv.
 std::filesystem::path factsFile(const std::filesystem::path& baseline);
 
-/// Throws `Error` naming the JSON file if it is missing or malformed.
+/// Loads the facts from the baseline's JSON file. Throws `Error` naming the JSON file if it is missing or
+/// malformed.
 BaselineFacts loadFacts(const std::filesystem::path& baseline);
 void saveFacts(const BaselineFacts& facts, const std::filesystem::path& baseline);
 
-/// True for pictures and raw values, which the file's ending tells.
+/// True if the file's extension is that of a picture or of raw values.
 bool isComparable(const std::filesystem::path& file);
 
 }  // namespace hpsdf::app

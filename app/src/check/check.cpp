@@ -32,7 +32,7 @@ void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) 
   item.problem = problem;
 }
 
-/// Notes how many pixels or values differ, and the verdict unless `problem` is empty.
+/// Stores in the item how many pixels or values differ. If `problem` is not empty, also stores the verdict.
 void takeComparison(CheckedItem& item, const auto& comparison, bool sameShape, const std::string& problem) {
   item.compared = comparison.compared;
   item.differing = comparison.differing;
@@ -63,7 +63,7 @@ void judgeData(CheckedItem& item, double bound) {
                           fmt::format("{:.3g}", worst.difference)});
 }
 
-/// Compares an item's file with its baseline. Either may be missing.
+/// Compares an item's actual file with its baseline and sets the item's verdict. Either file may be missing.
 void judge(CheckedItem& item) {
   if (!fs::exists(item.actual))
     return setVerdict(item, Verdict::noPicture,
@@ -81,7 +81,8 @@ void judge(CheckedItem& item) {
   if (item.verdict != Verdict::differs || isDataFile(item.picture)) item.difference.clear();
 }
 
-/// Reverses the verdict of a negative control: it passes if its comparison failed as stated.
+/// Reverses the verdict of a negative control. The control passes if its comparison failed with the verdict
+/// `stated`.
 void reverseVerdict(CheckedItem& item, Verdict stated) {
   if (item.verdict == stated)
     setVerdict(item, Verdict::passed, "");
@@ -94,7 +95,8 @@ void reverseVerdict(CheckedItem& item, Verdict stated) {
 
 using NegativeControls = std::map<int, Verdict>;  ///< verdicts that negative controls must fail with, by their lines
 
-/// Turns comments "# wrong REASON: COMMAND" into commands. Lines and columns stay the same, for error messages.
+/// Turns the comments "# wrong REASON: COMMAND" of a script into commands. Every command keeps its line and
+/// column, so that error messages stay correct.
 NegativeControls enableControls(const std::string& file, std::string& text) {
   NegativeControls controls;
   std::size_t begin = 0;
@@ -118,7 +120,7 @@ NegativeControls enableControls(const std::string& file, std::string& text) {
   return controls;
 }
 
-/// The names of the folder's pictures and files of raw values, sorted.
+/// Returns the names of the folder's pictures and raw-value files, sorted.
 std::set<std::string> comparableFiles(const fs::path& folder) {
   std::set<std::string> names;
   if (!fs::is_directory(folder)) return names;
@@ -188,7 +190,7 @@ class ScriptCheck {
     }
   }
 
-  /// Remembers which command wrote which file.
+  /// Records for each picture or raw-value file which command of the script wrote it.
   void notePictures(const Session& session, const Call& call) {
     for (const std::string& picture : comparableFiles(actual_)) {
       const auto time = fs::last_write_time(actual_ / picture);
@@ -219,7 +221,8 @@ class ScriptCheck {
     }
   }
 
-  /// Compares the files that were written, and, if the script completed, those that have a baseline.
+  /// Compares the files that the script wrote with their baselines. If the script completed, also judges each
+  /// baseline whose file it did not write.
   void judgePictures(bool completed) {
     std::vector<CheckedItem> judged;
     std::set<std::string> pictures = comparableFiles(actual_);
@@ -258,7 +261,7 @@ std::vector<std::string> scriptNames(const fs::path& folder) {
   return names;
 }
 
-/// Throws `Error` for a name in `only` that no script has.
+/// Throws `Error` if `only` contains a name that is not the name of a script.
 void refuseUnknown(const std::vector<std::string>& names, const std::vector<std::string>& only) {
   for (const std::string& name : only) {
     if (std::ranges::find(names, name) != names.end()) continue;
@@ -267,7 +270,7 @@ void refuseUnknown(const std::vector<std::string>& names, const std::vector<std:
   }
 }
 
-/// The baselines whose script does not exist.
+/// Returns one item for each baseline that belongs to no existing script.
 std::vector<CheckedItem> strayBaselines(const CheckRequest& request, const std::vector<std::string>& scripts) {
   std::vector<CheckedItem> items;
   std::error_code ignored;

@@ -1,5 +1,6 @@
 #pragma once
-// Runs a folder's scripts and compares the files they write with the folder's baselines. docs/check.md is the manual.
+// Runs the scripts of a folder and compares the files that they write with the baselines in the folder.
+// docs/check.md is the manual.
 
 #include <cstdint>
 #include <filesystem>
@@ -34,7 +35,8 @@ struct WorstDifference {
   std::string difference;
 };
 
-/// A picture or a file of raw values, with its baseline; or a script that failed or wrote nothing.
+/// One result of a check: a picture or a raw-value file with its baseline, or a script that failed or wrote
+/// no files.
 struct CheckedItem {
   std::string script = {};
   std::string picture = {};  ///< file name; "" for a script
@@ -53,11 +55,12 @@ struct CheckedItem {
   std::filesystem::path difference = {};  ///< picture of the differences; "" without one
   std::vector<WorstDifference> worst = {};
 
-  /// The name of the item: "gallery/degree.png", or the script's name.
+  /// The name of the item: "gallery/degree.png", or the name of the script for a script's own item.
   std::string name() const { return picture.empty() ? script : script + "/" + picture; }
-  /// The picture's name: "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)".
+  /// The name of the picture: "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)"
+  /// if the item is a script.
   std::string pictureText() const;
-  /// The script followed by `pictureText`, or the script's name.
+  /// "SCRIPT/" followed by `pictureText()`, or only the script's name if the item is a script.
   std::string title() const { return picture.empty() ? script : script + "/" + pictureText(); }
 };
 
@@ -79,16 +82,16 @@ struct CheckOutcome {
 
 constexpr const char* kCheckResults = "results.json";
 
-/// Runs the scripts and writes pictures and differences into the output folder, from which it first removes the results
-/// of an earlier check. Throws `Error` for a folder without scripts, for an unknown name in `only`, and for an output
-/// folder that contains other files.
+/// Runs the scripts and writes their pictures and the pictures of differences into the output folder. Results
+/// of an earlier check are first removed from the output folder. Throws `Error` for a folder without scripts,
+/// for an unknown name in `only`, and for an output folder that contains other files.
 CheckOutcome check(const Registry& registry, const Console& console, const CheckRequest& request);
 
-/// A page with the results of all comparisons and the pictures of each failure, which are embedded in the page. It
-/// names the commands that repeat the check, and that accept a picture.
+/// Returns an HTML page with the results of all comparisons. The pictures of each failure are embedded in the
+/// page. The page names the command that repeats the check and the command that accepts a picture.
 std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request);
 
-/// JUnit XML with a test suite for each script and a test case for each picture.
+/// Returns the results as JUnit XML, with a test suite for each script and a test case for each picture.
 std::string junitXml(const CheckOutcome& outcome);
 
 }  // namespace hpsdf::app

@@ -21,10 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Identifies a folder, so that `accept` finds the results of the last check of the same folder.
+/// Returns a text that identifies a folder, so that `accept` finds the results of the last check of the same
+/// folder.
 std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folder).string(); }
 
-// The command `check`
+// The implementation of the command `check`.
 
 Json itemJson(const CheckedItem& item) {
   return {{"script", item.script},
@@ -100,7 +101,7 @@ void runCheck(Session& session, const Arguments& arguments) {
   throw Failed(summary);
 }
 
-// The command `accept`
+// The implementation of the command `accept`.
 
 Json lastResults(const fs::path& folder, const fs::path& from) {
   const std::string file = (from / kCheckResults).string();
@@ -118,7 +119,8 @@ std::string nameOf(const Json& item) {
   return item.at("script").get<std::string>() + "/" + item.at("picture").get<std::string>();
 }
 
-/// Returns the result of the last check's scripts that has this name, SCRIPT/PICTURE. Negative controls have none.
+/// Returns the result of the last check whose name is `name`, of the form SCRIPT/PICTURE. Results of negative
+/// controls are ignored. Throws `Error` if no result has this name.
 Json resultNamed(const std::string& name, const Json& results, const fs::path& from) {
   std::vector<std::string> names;
   for (const Json& item : results.at("items")) {

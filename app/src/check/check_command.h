@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds `check` and `accept`.
+/// Adds the commands `check` and `accept`.
 void addCheckCommands(Registry& registry);
 
 }  // namespace hpsdf::app

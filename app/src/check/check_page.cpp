@@ -31,7 +31,8 @@ i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; bo
           vertical-align: -.15em; }
 )";
 
-/// A script that makes each slider show the pictures above it, so that the page embeds every picture only once.
+/// JavaScript that makes each slider show the pictures above the slider. With the script, the page embeds
+/// every picture only once.
 constexpr std::string_view kScript = R"(<script>
 for (const slider of document.querySelectorAll('.slider')) {
   const [under, over] = slider.querySelectorAll('img');
@@ -95,7 +96,7 @@ std::string shareText(const CheckedItem& item) {
                      100 * double(item.differing) / double(item.compared), 100 * item.budget, item.largest);
 }
 
-/// The command that repeats the check, without --only.
+/// Returns the command line that repeats the check, without the option --only.
 std::string checkCommand(const CheckRequest& request) {
   std::string line = "hpsdf check " + shellWord(request.folder.string());
   for (const auto& [name, value] : request.variables) line += " " + shellWord(name + "=" + value);
@@ -135,7 +136,7 @@ std::string overview(const CheckOutcome& outcome) {
   return html + "</table>\n";
 }
 
-/// Escapes a text for XML, which allows no control characters and no invalid UTF-8.
+/// Escapes text for XML. Control characters and invalid UTF-8, which XML does not allow, are replaced.
 std::string xmlText(const std::string& text) {
   std::string printable = text;
   for (char& c : printable)

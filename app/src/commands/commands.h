@@ -7,7 +7,7 @@ namespace hpsdf::app {
 /// Returns the registry of all commands of the program.
 Registry makeRegistry();
 
-// Each of the following functions adds the commands of the file that has its name.
+// Each of the following functions adds the commands that are defined in the source file of the same name.
 void addExportCommand(Registry& registry);
 void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, query, load and save
 void addJumpsCommand(Registry& registry);
@@ -15,7 +15,8 @@ void addProbeCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, mesh, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
 
-/// Returns the command `mesh`, whose camera has the parameters of `render`, which must be in the registry.
+/// Returns the command `mesh`. It takes its camera parameters from the command `render`, which must be in the
+/// registry.
 Command meshCommand(const Registry& registry);
 
 }  // namespace hpsdf::app

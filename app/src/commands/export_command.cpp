@@ -41,7 +41,8 @@ struct Exported {
   CubicGridError error;
 };
 
-/// Samples, measures and writes the grid. The file gets its name when the caller commits it.
+/// Samples the field on a grid, measures the grid and writes it to `out`. The output file gets its final name
+/// only when the caller commits `out`.
 Exported exportGrid(const Session& session, const Arguments& arguments, OutputFile& out) {
   const Field& field = session.current().field;
   const GridResolution resolution = exportResolution(field.domain(), arguments);

@@ -42,15 +42,15 @@ void saveMade(Session& session, const Arguments& arguments) {
   if (arguments.has("output")) saveCurrent(session, arguments.text("output"));
 }
 
-/// Describes the resulting field and its file.
+/// Describes the current field and the file to which it was saved, as JSON.
 Json madeJson(const Session& session, const Arguments& arguments) {
   Json json = fieldJson(session.current());
   json["output"] = arguments.has("output") ? Json(arguments.text("output")) : Json();
   return json;
 }
 
-/// Replaces the current field by another form of it, saves that where an output is given, and reports it: with
-/// `figures` as JSON, else by the text that textOf(field) returns.
+/// Replaces the current field by another form of the same field, and saves the new form if an output is
+/// given. Reports it as JSON with the members of `figures`, or as the text that textOf(field) returns.
 void changeCurrent(Session& session, const Arguments& arguments, Field field, const Json& figures, const auto& textOf) {
   const CurrentField& before = session.current();
   session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});
@@ -70,7 +70,7 @@ std::string estimateText(const Field& field) {
                      unitText(field));
 }
 
-/// Returns the file of the checkpoint, or an empty path where none was asked for.
+/// Returns the path of the checkpoint file, or an empty path if the arguments ask for no checkpoint.
 std::filesystem::path checkpointFile(const Arguments& arguments) {
   return arguments.flag("checkpoint") ? checkpointOf(arguments.text("output")) : std::filesystem::path();
 }
@@ -98,8 +98,8 @@ BuiltField buildAndKeep(const Console& console, const std::string& surface, cons
   }
 }
 
-/// Removes the checkpoint of a finished construction, and temporary files of a process that was killed while it wrote
-/// the field.
+/// Removes the checkpoint of a finished construction. Also removes temporary files of processes that were
+/// killed while they wrote the field.
 void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
   std::error_code ignored;
   std::filesystem::remove(checkpoint, ignored);

@@ -45,7 +45,7 @@ struct Row {
   JumpBin bin;
 };
 
-/// Returns the bins of the histogram. A first row counts the interfaces without any jump, if there are some.
+/// Returns the bins of the histogram. If some interfaces have no jump at all, the first row counts them.
 std::vector<Row> histogramRows(const Jumps& jumps, JumpKind kind) {
   Row exact{"0", 0, {jumps.interfaces.size(), jumps.area}};
   std::vector<Row> rows;

@@ -40,7 +40,7 @@ constexpr std::array<KindNames, kDefectKinds> kKinds = {{{"boundary edges", "bou
                                                          {"pinched vertices", "pinched_vertices"},
                                                          {"self-intersections", "crossings"}}};
 
-/// The results of one call of the command.
+/// The results of one call of the command `mesh`.
 struct MeshResults {
   std::string surface;
   TriangleMesh mesh;
@@ -143,7 +143,8 @@ std::string positionText(const Defect& defect, const Box& mesh) {
   return isPoint(defect) ? from : from + " to " + vectorText(defect.ends[1], mesh);
 }
 
-/// Prints one row for each kind of defect that occurs, with its first positions.
+/// Returns a table with one row for each kind of defect that occurs. A row shows the positions of the first
+/// `limit` defects of its kind.
 std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t limit) {
   std::string text;
   for (std::size_t i = 0; i < kDefectKinds; ++i) {
@@ -198,7 +199,7 @@ std::string repairText(const RepairedMesh& repairedMesh, const std::string& file
   return text + summaryRow("written", printable(file) + ": " + closednessText(report));
 }
 
-/// Draws the mesh with its defects into the file of the argument `picture`.
+/// Draws the mesh and its defects into the file that the argument `picture` names.
 void drawPicture(Session& session, const Arguments& arguments, const MeshResults& found) {
   const render::SurfacePicture look = cameraPicture(arguments);
   render::MeshPicture picture{look.camera, look.width, look.height, look.samples, !arguments.given("camera")};

@@ -20,7 +20,8 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 
 bool isSeparator(char c) { return c == ',' || c == ';' || kBlanks.find(c) != std::string_view::npos; }
 
-/// Parses exactly three numbers, finite or not, separated by blanks and at most one comma or semicolon.
+/// Parses exactly three numbers, finite or not. They are separated by blanks and at most one comma or
+/// semicolon. Returns std::nullopt for any other text.
 std::optional<Vector3> parsePoint(std::string_view text) {
   Vector3 point;
   const char* next = text.data();
@@ -38,8 +39,8 @@ std::optional<Vector3> parsePoint(std::string_view text) {
   return next == end ? std::optional(point) : std::nullopt;
 }
 
-/// True for a line of column names, which begins with a letter or a quote and is not a point such as "nan nan
-/// nan".
+/// True for a header line of column names. A header begins with a letter or a quote and is not a point such
+/// as "nan nan nan".
 bool isHeader(std::string_view text) {
   return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
 }
@@ -77,7 +78,7 @@ class Query {
     if (points_.size() == kBatch) flush();
   }
 
-  /// JSON has no infinities and no NaN.
+  /// Formats a number for JSON. Infinities and NaN become null, because JSON has no text for them.
   static std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {

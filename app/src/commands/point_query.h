@@ -1,6 +1,6 @@
 #pragma once
-// Evaluates a field at points that are given as text, and writes distances and gradients as text. It works in
-// batches, so that millions of points need little memory.
+// Evaluates a field at points that are given as text, and writes distances and gradients as text. Points are
+// processed in batches, so that millions of points need little memory.
 
 #include <cstdint>
 #include <functional>
@@ -14,8 +14,8 @@ namespace hpsdf::app {
 
 enum class PointFormat : std::uint8_t { csv, json };
 
-/// Reads points from `in`, evaluates the field there and passes the answers to `write`. Returns the number of points.
-/// Throws `Error` "name:line: …" for a line that is not a point.
+/// Reads points from `in`, evaluates the field at them and passes the results to `write`. Returns the number
+/// of points. Throws `Error` "name:line: …" for a line that is not a point.
 std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                         const std::function<void(std::string_view)>& write);
 

@@ -40,7 +40,8 @@ Line lineOf(const Field& field, const Arguments& arguments) {
   return line;
 }
 
-/// Returns the exact distances at the line's samples; empty where the exact distance is unknown.
+/// Returns the exact distances at the samples of the line. Returns an empty vector if the exact distance is
+/// unknown.
 std::vector<double> exactValues(Session& session, const Arguments& arguments, const Line& line) {
   const std::string mesh = arguments.textOr("mesh", "");
   if (mesh.empty() && !session.knowsExact()) return {};
@@ -51,7 +52,8 @@ std::vector<double> exactValues(Session& session, const Arguments& arguments, co
   return values;
 }
 
-/// Writes one row for each sample. Columns of unknown values are empty.
+/// Writes a CSV file with one row for each sample of the line. The column of a value that is unknown stays
+/// empty.
 void writeTable(const Line& line, std::span<const double> exact, const std::string& file) {
   OutputFile out(file);
   out.write("t,s,x,y,z,cell,degree,depth,value,exact,error,gx,gy,gz,slope_along\n");

@@ -21,7 +21,8 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// Counts one more running script during its lifetime, and sets --json for the commands that the script runs.
+/// Increments the session's count of running scripts while the object lives. Also sets --json for the
+/// commands that the script runs.
 class ScriptScope {
  public:
   ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {
@@ -93,8 +94,8 @@ void runShapes(Session& session, const Arguments& arguments) {
   }
 }
 
-/// Tells for each instruction set beyond the baseline whether this processor has it. The object is empty on other
-/// architectures than x86.
+/// Returns for each instruction set beyond the baseline whether this processor supports it. Returns an empty
+/// object on architectures other than x86.
 Json simdOfCpu() {
 #if defined(__x86_64__) || defined(__i386__)
   __builtin_cpu_init();
@@ -123,7 +124,7 @@ std::string compilerText() {
 #endif
 }
 
-/// Facts about the machine and the build.
+/// Returns facts about the machine and about the build of the program.
 Json diagnosis(const Session& session, const Arguments& arguments) {
   Json renderer, problem;
   try {

@@ -31,7 +31,7 @@ struct Verified {
   double diagonal;  ///< length of the domain's diagonal
 };
 
-/// A figure that an option limits.
+/// A figure of the verification and the option that sets a limit for it.
 struct Threshold {
   const char* option;
   const char* figure;  ///< name of the figure in messages
@@ -168,7 +168,8 @@ Json verifiedJson(const Verified& verified, const std::vector<Judgement>& judgem
           {"thresholds", limits}};
 }
 
-/// The figures over uniform points and over those near the surface, side by side.
+/// Returns a table with two columns of figures: one over uniformly distributed points, one over points near
+/// the surface.
 std::string figureTable(const Verification& figures) {
   std::string text = "\n";
   const auto row = [&](const std::string& label, const std::string& uniform, const std::string& near) {
@@ -243,7 +244,8 @@ std::string verifiedText(const Verified& verified) {
   return text + worstText(figures.worst);
 }
 
-/// Writes a script that moves the explorer to each of the worst points and takes a picture of it.
+/// Returns the text of a script. The script moves the explorer to each of the worst points and takes a
+/// picture there.
 std::string worstScript(const Session& session, const Verified& verified, const std::filesystem::path& file) {
   const bool loaded = session.current().fileBytes.has_value();
   std::string text =

@@ -12,9 +12,11 @@ namespace hpsdf::app {
 class WorkListener {
  public:
   virtual ~WorkListener() = default;
-  /// Receives progress as `Progress::report` does: from any thread, one call at a time.
+  /// Receives the progress of the work, as `Progress::report` does. Any thread may call it, but only one call
+  /// runs at a time.
   virtual void report(std::string_view task, double fraction) = 0;
-  /// Is called often, from any thread; once it returns true, the work ends with `Cancelled`.
+  /// Tells whether the work should stop. Any thread may call it, and it is called often. Once it returns true,
+  /// the work ends with the exception `Cancelled`.
   virtual bool wantsCancel() = 0;
   /// Is called when the work has succeeded, failed or been cancelled.
   virtual void ended() = 0;
@@ -27,16 +29,18 @@ struct Console {
   std::ostream& err;             ///< progress, notes and warnings
   bool redrawsProgress = false;  ///< true where err is a terminal, on which one line of progress is redrawn
   WorkListener* listener = nullptr;
-  /// Program that reads mesh files in a process of its own (mesh_process.h); empty: this process reads them.
+  /// Program that reads mesh files in a separate process (mesh_process.h). If it is empty, this process reads
+  /// mesh files itself.
   std::filesystem::path meshReader = {};
   std::string work = {};  ///< prefix of progress messages: names the current piece of work among several
 };
 
-/// Writes one line to `err`. Control characters, which names from other people's files may contain, become blanks.
+/// Writes one line to the stream `err`. Control characters in `text`, for example from the names of foreign
+/// files, become blanks.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
 
-/// Throws `Error` where standard output could not be written.
+/// Throws `Error` if a write to `out`, the standard output, has failed.
 void requireWritten(const std::ostream& out);
 
 }  // namespace hpsdf::app

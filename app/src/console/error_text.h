@@ -5,8 +5,9 @@
 
 namespace hpsdf::app {
 
-/// Describes an exception for users. An `Error` has its own message. An error of the file system gets the file's
-/// name and a remedy, lack of memory gets a remedy. Any other exception is reported as a fault of the program.
+/// Describes an exception for users. The text for an `Error` is its own message. The text for a file system
+/// error names the file and a remedy, and the text for lack of memory names a remedy. Any other exception is
+/// reported as a fault of the program.
 std::string errorText(const std::exception& error);
 
 }  // namespace hpsdf::app

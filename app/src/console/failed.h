@@ -10,8 +10,8 @@ namespace hpsdf::app {
 constexpr int kExitFailed = 1;        ///< an expectation or a comparison failed
 constexpr int kExitPartlyFailed = 3;  ///< some meshes of a batch failed
 
-/// Thrown where the input was correct but the result is negative: a comparison failed, or some meshes of a batch
-/// did. The program then exits with `status`, and not with 2 as for bad input.
+/// Thrown if the input was correct but the result is negative: a comparison failed, or some meshes of a batch
+/// failed. The program then exits with `status` instead of status 2, which means bad input.
 class Failed : public Error {
  public:
   explicit Failed(const std::string& message, int status = kExitFailed) : Error(message), status_(status) {}
@@ -25,7 +25,7 @@ class Failed : public Error {
 class CancelledPartway : public Cancelled {
  public:
   explicit CancelledPartway(std::string kept) : kept_(std::move(kept)) {}
-  /// Describes what is kept, and how to continue.
+  /// Describes which results were kept, and how to continue the work.
   const std::string& kept() const { return kept_; }
 
  private:

@@ -2,12 +2,13 @@
 
 namespace hpsdf::app {
 
-/// Installs handlers of SIGINT, SIGTERM and SIGHUP. They remove unfinished files and end the process; while an
-/// `InterruptGuard` lives, the first signal only sets a flag. Signals that the caller ignores stay ignored.
+/// Installs handlers for SIGINT, SIGTERM and SIGHUP. The handlers remove unfinished files and end the
+/// process. While an `InterruptGuard` exists, the first signal only sets a flag. Signals that the parent
+/// process ignores stay ignored.
 void installInterruptHandlers();
 
-/// While a guard lives, the first interruption does not end the process, so that the work can end in order. Guards may
-/// be nested.
+/// While a guard exists, the first signal does not end the process, so that the work can stop in an orderly
+/// way. Guards may be nested.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -15,7 +16,7 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  /// True once a signal has arrived. Any thread may call it.
+  /// True after one of the handled signals has arrived. Any thread may call this function.
   static bool interrupted();
 };
 

@@ -11,8 +11,8 @@
 
 namespace hpsdf::app {
 
-/// Runs work(progress) with a progress line on the console and returns its result. Throws `Cancelled` after Ctrl-C or
-/// on request of the console's listener.
+/// Runs work(progress), shows its progress on the console, and returns its result. Throws `Cancelled` after
+/// Ctrl-C or if the console's listener asks for it.
 template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;

@@ -12,7 +12,8 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr double kRedrawSeconds = 0.1;
 constexpr double kQuietSeconds = 10;
-// Shorter work shows no progress. The limit is longer in logs, where lines are not erased.
+// Work that takes less than this time shows no progress. The time is longer for logs, where lines cannot be
+// erased.
 constexpr double kQuickSeconds = 0.3, kQuickSecondsInALog = 2;
 constexpr int kBarCells = 24;
 
@@ -44,7 +45,8 @@ void ProgressLine::report(std::string_view task, double fraction, Clock::time_po
   if (!due(fraction, now)) return;
   const double elapsed = Seconds(now - start_).count();
   std::string text = fmt::format("{} {:3.0f} %, {}", task, std::floor(100 * fraction), durationText(elapsed));
-  // An estimate from the first moments would vary too much.
+  // The remaining time is shown only after the first moments of the work. An earlier estimate would vary too
+  // much.
   if (elapsed > 1 && fraction > 0.02 && fraction < 1)
     text += fmt::format(", about {} left", durationText(elapsed * (1 - fraction) / fraction));
   if (redraws_) {

@@ -7,11 +7,11 @@
 
 namespace hpsdf::app {
 
-/// Erases the line of progress on a terminal, before a message is written.
+/// Control sequence that erases the progress line on a terminal. It is written before any message.
 constexpr std::string_view kEraseLine = "\r\x1b[K";
 
-/// Shows the progress of an operation that is not over at once. A terminal shows one line, which is redrawn and
-/// finally erased. A log gets one line at first, one after each quarter of the work, and one whenever ten seconds
+/// Shows the progress of a long operation. On a terminal it redraws one line, and erases the line at the end.
+/// In a log it writes one line at first, one after each quarter of the work, and one whenever ten seconds
 /// have passed without a line.
 class ProgressLine {
  public:

@@ -181,7 +181,8 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
       throw Error(fmt::format("domain {}: expected lower corner x0,y0,z0 below upper corner x1,y1,z1", shape));
     return domain;
   }
-  // This is exactly the paper's cube. A cube around the normalized mesh would contain the mesh's rounding errors.
+  // A normalized mesh gets exactly the cube of the paper. A cube around its bounding box would contain rounding
+  // errors of the mesh.
   if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
   return domainAround(surface, DomainShape::cube, margin);
 }

@@ -53,19 +53,19 @@ std::filesystem::path checkpointOf(const std::filesystem::path& output) { return
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&]() -> BuildInput {
-    // Find mistakes in the arguments before the long work starts.
+    // Convert the arguments to options first: this finds mistakes in the arguments before the long work starts.
     BuildOptions options = buildOptions(arguments);
     const DistanceOptions insideOptions = distanceOptions(arguments);
     refuseInsideTestOfAnalytic(surface, arguments);
 
-    // Load the surface and warn about it.
+    // Load the surface, check its domain, and warn if the domain cuts the surface off.
     const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     checkBuild(domain, options);
     warnOfCutSurface(console, box, domain);
 
-    // Make the surface's exact distance. The default memory limit holds for the octree alone, so the memory of the
-    // distance is added to it.
+    // Make the exact distance of the surface, and measure the time. The default memory limit covers the octree
+    // alone, so the memory of the exact distance is added to the limit.
     const auto start = std::chrono::steady_clock::now();
     auto exact = distanceTo(console, surface, prepared, insideOptions);
     if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();

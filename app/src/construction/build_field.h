@@ -1,5 +1,5 @@
 #pragma once
-// From a surface and the arguments of a command to a field.
+// Builds a field from a surface and the arguments of a command.
 
 #include <filesystem>
 #include <memory>
@@ -13,7 +13,8 @@
 
 namespace hpsdf::app {
 
-/// A distance function with everything else that a construction needs.
+/// The distance function of a surface, together with the domain, the options and the other inputs of a
+/// construction.
 struct BuildInput {
   std::shared_ptr<const DistanceFunction> exact;
   std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
@@ -22,7 +23,7 @@ struct BuildInput {
   double setUpSeconds = 0;  ///< time to make the distance
 };
 
-/// Loads a surface, warns about it and makes its exact distance. Throws `Error` naming `surface`.
+/// Loads a surface, warns about its flaws and makes its exact distance. Throws `Error` naming `surface`.
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
 
 struct BuiltField {
@@ -32,16 +33,18 @@ struct BuiltField {
   double seconds = 0;                             ///< time of construction and distance
 };
 
-/// Makes the input and constructs the field, with progress and warnings on the console's `err`. If the file
-/// `checkpoint` is given, the construction continues from the state in it, and `checkpointParameters` must be
-/// among the arguments. Throws `Error` naming `surface`, and `Cancelled` after Ctrl-C.
+/// Makes the input of the construction and builds the field. Progress and warnings go to the console's `err`.
+/// If `checkpoint` names a file, the construction continues from the state in this file, and the arguments
+/// must contain those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after
+/// Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 
-/// The file in which the construction of the field file `output` keeps its state.
+/// Returns the name of the checkpoint file, in which a construction saves its state. `output` is the name of
+/// the field file.
 std::filesystem::path checkpointOf(const std::filesystem::path& output);
 
-/// Warns that bounds do not hold near the mesh's holes, if the mesh has holes.
+/// If the mesh has holes, warns that error bounds do not hold near the holes.
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh);
 
 }  // namespace hpsdf::app

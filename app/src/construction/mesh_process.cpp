@@ -43,13 +43,15 @@ constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
 constexpr auto kTick = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
 constexpr double kSilentSeconds = 2;                   // no progress is shown earlier: processes may start slowly
 
-// An idle machine reads 20 MB/s and needs 4 to 9 bytes of memory for each byte of the file (docs/meshes.md).
+// Limits of time and memory for reading a file. An idle machine reads 20 MB/s and needs 4 to 9 bytes of
+// memory for each byte of the file (docs/meshes.md).
 constexpr double kSeconds = 60;
 constexpr double kBytesASecond = 2e6;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 constexpr std::uint64_t kMemoryAByte = 32;
 
-/// The number in an environment variable; nothing where it is unset. Throws `Error` for other texts.
+/// Returns the number in an environment variable, or std::nullopt if the variable is unset or empty. Throws
+/// `Error` if its text is not a number within the accepted range.
 std::optional<double> numberOf(const char* variable) {
   const char* text = std::getenv(variable);
   if (text == nullptr || *text == '\0') return std::nullopt;
@@ -59,7 +61,7 @@ std::optional<double> numberOf(const char* variable) {
   return number;
 }
 
-/// The pipe from the reading process.
+/// The pipe through which the reading process sends its reply to this process.
 struct Pipe {
   Pipe() {
     if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category());
@@ -90,7 +92,7 @@ std::string endText(int status) {
   return fmt::format("signal {}", WTERMSIG(status));
 }
 
-/// The reading of one file from the start of the process to its reply.
+/// One run of the reading process for one file, from the start of the process to its reply.
 class Reading {
  public:
   Reading(const fs::path& program, const fs::path& file, const ReadingLimits& limits, const Progress& progress)
@@ -138,7 +140,8 @@ class Reading {
     }
   }
 
-  /// Applies the limit of memory to this process too: a reply may be long although its sender needed little memory.
+  /// Reads the length of the reply from its header and reserves memory for it. The memory limit applies to this
+  /// process too: a reply may be long although the reading process needed little memory.
   void expectWhole() {
     expected_ = replyBytes(bytes_);
     if (expected_ > limits_.bytes) throw tooLarge();
@@ -173,7 +176,7 @@ class Reading {
   std::uint64_t expected_ = 0;  ///< length of the reply; 0 until its header has arrived
 };
 
-// The reading process
+// The following functions run in the reading process.
 
 void toStandardOutput(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -184,8 +187,8 @@ void toStandardOutput(std::span<const std::byte> bytes) {
   }
 }
 
-/// Ends the process at once. If bad_alloc were thrown instead, assimp would catch it and report damage, or
-/// continue.
+/// Ends the reading process at once when it runs out of memory. If bad_alloc were thrown instead, assimp
+/// would catch it and report damage, or continue.
 void onMemoryOut() {
   writeOutOfMemory(toStandardOutput);
   _exit(0);
@@ -258,7 +261,7 @@ int readForOtherProcess(std::span<const std::string> words) {
   if (!seconds || !bytes) return 2;
   confine(*seconds, *bytes);
   try {
-    // The stacks of threads would count as memory.
+    // The file is read with one thread, because the stacks of more threads would count towards the memory limit.
     writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
   } catch (const Error& error) {
     writeRefusal(error.subject() == words[1] ? error.problem() : error.what(), toStandardOutput);

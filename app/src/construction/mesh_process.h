@@ -1,6 +1,6 @@
 #pragma once
-// Mesh files are read in a separate process, which runs this program with another command. A file that crashes
-// assimp, or keeps it busy for too long, then causes only an error message of one line.
+// Mesh files are read in a separate process, which runs this same program with a hidden command. If a file
+// crashes assimp, or keeps it busy for too long, the only effect is an error message of one line.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,31 +12,34 @@
 
 namespace hpsdf::app {
 
-/// Time and memory that reading a file may take.
+/// The limits of time and memory for reading one mesh file.
 struct ReadingLimits {
   double seconds = 0;       ///< wall-clock time
   std::uint64_t bytes = 0;  ///< bytes of memory
 };
 
-/// The limits for a file. They follow from its size (docs/meshes.md), unless the environment variables
-/// HPSDF_IMPORT_SECONDS and HPSDF_IMPORT_BYTES set others. Throws `Error` where a variable is not a number above
-/// 0.
+/// Returns the limits for reading a file. They are computed from the size of the file (docs/meshes.md),
+/// unless the environment variables HPSDF_IMPORT_SECONDS and HPSDF_IMPORT_BYTES set other limits. Throws
+/// `Error` if one of these variables is not a number above 0.
 ReadingLimits readingLimits(const std::filesystem::path& file);
 
-/// The file of the running program; empty where the system does not tell it.
+/// Returns the path of the running program's executable file. Returns an empty path if the system does not
+/// tell it.
 std::filesystem::path ownProgram();
 
-/// Calls `importMesh` in a separate process of `program`, which must be of this same build. Throws `Error` naming the
-/// file, also when that process dies, sends a damaged reply or exceeds a limit, and `Cancelled`. No process is left
-/// behind.
+/// Calls `importMesh` in a separate process of `program`, which must come from the same build as this
+/// program. Throws `Error` naming the file if the file cannot be read, and if that process dies, sends a
+/// damaged reply or exceeds a limit. Throws `Cancelled` on cancellation. The separate process has always
+/// ended when the function returns or throws.
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 
-/// Tells whether the words of the command line start the reading process of `importInSubprocess`.
+/// Tells whether these command-line words are those with which `importInSubprocess` starts the reading
+/// process.
 bool asksForReading(std::span<const std::string> words);
 
-/// Runs the reading process: reads the mesh file that the words name, within their limits, and replies on standard
-/// output (mesh_reply.h). Returns the exit status.
+/// Runs the reading process. It reads the mesh file that the words name, within the limits that the words
+/// give, and writes its reply to standard output (mesh_reply.h). Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

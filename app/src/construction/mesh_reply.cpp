@@ -22,15 +22,15 @@ constexpr std::uint64_t kLongestText = 1 << 16;
 using Triangle = std::array<std::uint32_t, 3>;
 static_assert(sizeof(Vector3) == 3 * sizeof(double) && sizeof(Triangle) == 12, "arrays are sent as they lie in memory");
 
-/// The counts of a report that cannot be derived from the mesh.
+/// Those counts of a `MeshReport` that cannot be recomputed from the mesh.
 constexpr std::size_t MeshReport::*kCounts[] = {&MeshReport::components,           &MeshReport::boundaryEdges,
                                                 &MeshReport::nonManifoldEdges,     &MeshReport::inconsistentEdges,
                                                 &MeshReport::unbalancedEdges,      &MeshReport::weldedVertices,
                                                 &MeshReport::unreferencedVertices, &MeshReport::degenerateFaces,
                                                 &MeshReport::flippedFaces,         &MeshReport::duplicateFaces};
 
-/// The beginning of a reply; vertices, triangles and text follow. It needs neither a version nor a byte order, since
-/// one program on one machine writes and reads it.
+/// The header at the beginning of a reply. Vertices, triangles and text follow it. The header needs neither a
+/// version nor a byte order, since the same program on the same machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
   std::uint64_t checksum = 0;  ///< checksum of all bytes after it
@@ -38,7 +38,7 @@ struct Header {
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   std::uint64_t textBytes = 0;
-  // The following members are those of the report.
+  // The following members of the header hold members of the `MeshReport`.
   std::array<std::uint64_t, std::size(kCounts)> counts = {};
   std::array<double, 3> degeneratePosition = {};
   std::array<double, 3> duplicatePosition = {};
@@ -55,7 +55,8 @@ std::uint64_t checksumOf(std::uint64_t before, std::span<const std::byte> bytes)
   return XXH3_64bits_withSeed(bytes.data(), bytes.size(), before);
 }
 
-/// Computes the checksum piece by piece, so that the pieces need not be copied into one array.
+/// Computes the checksum of a reply from its parts one by one, so that the parts need not be copied into one
+/// array.
 std::uint64_t checksumOf(const Header& header, std::span<const std::byte> vertices,
                          std::span<const std::byte> triangles, std::span<const std::byte> text) {
   std::uint64_t sum = checksumOf(0, std::as_bytes(std::span(&header, 1)).subspan(kUnsummedBytes));

@@ -1,6 +1,7 @@
 #pragma once
-// The reply of the process that reads a mesh file, as bytes; docs/meshes.md explains why it is a separate process.
-// The reader of a reply trusts none of its bytes, since the file may have corrupted the process that wrote them.
+// The reply of the process that reads a mesh file, as bytes. docs/meshes.md explains why a separate process
+// reads the file. The code that parses a reply trusts none of its bytes, since the mesh file may have
+// corrupted the process that wrote them.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,27 +22,28 @@ struct MeshReply {
   std::string refusal;    ///< for `refusal`: the reason in one line
 };
 
-/// Thrown for bytes that are no reply. The message tells why.
+/// Thrown for bytes that are not a valid reply. The message gives the reason.
 class DamagedReply : public Error {
  public:
   using Error::Error;
 };
 
-/// Length of the header with which every reply begins.
+/// Length of the reply header in bytes. Every reply begins with this header.
 extern const std::size_t kReplyHeaderBytes;
 
-/// The length of the whole reply, read from at least the first `kReplyHeaderBytes` bytes of it. Throws
-/// `DamagedReply` for fewer bytes, and for bytes that are not a header.
+/// Returns the length of the whole reply in bytes, as its header states it. `beginning` holds at least the
+/// first `kReplyHeaderBytes` bytes of the reply. Throws `DamagedReply` for fewer bytes, and for bytes that
+/// are not a header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
-/// Parses a whole reply. It allocates memory only for elements that are there, and checks a mesh's indices,
-/// coordinates, box and checksum. Throws `DamagedReply`.
+/// Parses a whole reply. Memory is allocated only for elements that `bytes` really contains. The indices,
+/// coordinates, box and checksum of a mesh are checked. Throws `DamagedReply` if a check fails.
 MeshReply parseReply(std::span<const std::byte> bytes);
 
-/// Receives the bytes of a reply in pieces.
+/// A function that receives the bytes of a reply in pieces.
 using ReplySink = std::function<void(std::span<const std::byte>)>;
 
-/// Write a reply. They allocate no memory, so that they work when none is left.
+/// These functions write a reply. They allocate no memory, so that they work even when no memory is left.
 void writeMesh(const ImportedMesh& imported, const ReplySink& sink);
 void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< a very long reason is cut off
 void writeOutOfMemory(const ReplySink& sink);

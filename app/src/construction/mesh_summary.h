@@ -13,16 +13,16 @@ Json meshJson(const std::string& name, const MeshReport& report);
 
 std::string meshText(const std::string& name, const MeshReport& report);
 
-/// Lists faulty edges: "3 boundary, 1 non-manifold and 0 inconsistent edges".
+/// Returns the numbers of faulty edges as text: "3 boundary, 1 non-manifold and 0 inconsistent edges".
 std::string faultyEdges(const MeshReport& report);
 
 std::string closednessText(const MeshReport& report);
 
-/// The name of an inside test as `--sign` spells it; "unknown" for `automatic`.
+/// Returns the name of an inside test as the option --sign spells it. Returns "unknown" for `automatic`.
 std::string insideTestName(InsideTest sign);
 
-/// The reason for the choice with a position, as in "the mesh meets itself, as at (0, 1, 2)". `mesh` is the mesh's
-/// box.
+/// Returns the reason why an inside test was chosen, with a position: "the mesh meets itself, as at (0, 1,
+/// 2)". `mesh` is the bounding box of the mesh.
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh);
 
 }  // namespace hpsdf::app

@@ -12,8 +12,8 @@
 
 namespace hpsdf::app {
 
-/// A surface against which a field is measured, in the units of the field. The mesh of an analytic shape is that
-/// of the built-in shape of the same name, which hardly differs from it.
+/// A surface against which a field is measured, in the units of the field. For an analytic shape, `mesh` is
+/// the mesh of the built-in shape of the same name, which differs only slightly from the analytic shape.
 struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
   std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< see `VerifiedSurface`
@@ -22,16 +22,17 @@ struct ReferenceSurface {
   bool fieldIsMadeFromIt = false;
 };
 
-/// A mesh file or a shape in the units of a field that was made from `source`. Throws `Error` naming `surface`.
+/// Loads a mesh file or a shape, in the units of a field that was made from `source`. Throws `Error` naming
+/// `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
 
-/// The exact distance of a mesh file or a shape in the units of a field that was made from `source`. Warns if the
-/// field was made from another surface. Throws `Error` naming `surface`.
+/// Returns the exact distance of a mesh file or a shape, in the units of a field that was made from `source`.
+/// Warns if the field was made from another surface. Throws `Error` naming `surface`.
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source);
 
-/// The defects of a mesh file or a built-in shape in the units of a field that was made from `source`. Warns if
-/// the field was made from another surface. Throws `Error` naming `surface`.
+/// Returns the defects of a mesh file or a built-in shape, in the units of a field that was made from
+/// `source`. Warns if the field was made from another surface. Throws `Error` naming `surface`.
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);
 
 }  // namespace hpsdf::app

@@ -17,8 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Bytes of memory per face while a mesh's exact distance is made. The outer hull needs kBytesPerHullFace, and
-/// additional memory for the pieces of intersected faces, of which there are at most 250,000.
+/// Memory in bytes per mesh face that the making of an exact distance needs. The outer hull needs
+/// kBytesPerHullFace, and additional memory for at most 250,000 pieces of intersected faces.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
@@ -60,9 +60,9 @@ struct SharedDistance {
   std::size_t bytes() const { return exact->bytes(); }
 };
 
-/// Reports the inside test that was chosen, unless the mesh is closed and simple, so that the choice is as
-/// expected. The position in `choice` is in the units of the normalized mesh, that in `report` in the units of the
-/// file.
+/// Reports which inside test was chosen. A closed mesh without self-intersections needs no report, because
+/// the choice for it is the expected one. The position in `choice` is in the units of the normalized mesh.
+/// The position in `report` is in the units of the file.
 void tellInsideTest(const Console& console, const std::string& surface, const MeshReport& report,
                     InsideTestChoice choice, const Normalization& normalization) {
   if (choice.position) choice.position = *choice.position / normalization.scale + normalization.center;

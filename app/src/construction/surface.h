@@ -1,5 +1,5 @@
 #pragma once
-// From the name of a mesh file or a shape to a surface of which a field can be made.
+// Makes a surface, from which a field can be built, from the name of a mesh file or a shape.
 
 #include <memory>
 #include <optional>
@@ -13,16 +13,17 @@
 
 namespace hpsdf::app {
 
-/// The beginnings of the names of shapes: kBuiltin for shapes as meshes, kAnalytic for shapes in closed form.
+/// The prefixes of the names of shapes: kBuiltin for shapes given as meshes, kAnalytic for shapes in closed
+/// form.
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";
 
 /// Returns true for the name of a shape, builtin:… or analytic:…, and false for the name of a file.
 bool isShape(std::string_view surface);
 
-/// Reads a mesh file or makes a built-in shape; all commands obtain their meshes by this function. Files are read
-/// by the console's `meshReader`. Warns where coordinates lose digits because the reader keeps them as float.
-/// Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
+/// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. Files are
+/// read by the console's `meshReader`. Warns if coordinates lose digits because the file reader stores them
+/// as float. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// A surface in the units of the field: a mesh, or a distance in closed form.
@@ -35,25 +36,30 @@ struct PreparedSurface {
   Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
 };
 
-/// Loads a surface and, if asked, normalizes it. Throws `Error`, and `Cancelled` after Ctrl-C.
+/// Loads a surface and normalizes it if `normalizes` is true. Throws `Error` if the surface cannot be loaded,
+/// and `Cancelled` after Ctrl-C.
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes);
 
-/// Throws `Error` where the exact distance of the mesh does not fit in memory.
+/// Throws `Error` if making the exact distance of the mesh needs more memory than is available.
 void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);
 
-/// The exact distance of a mesh. Throws `Error`, also where it does not fit in memory, and `Cancelled` after Ctrl-C.
+/// Makes the exact distance of a mesh. Throws `Error`, also if the exact distance does not fit in memory, and
+/// `Cancelled` after Ctrl-C.
 std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
                                                 const DistanceOptions& options = {});
 
-/// A distance function that evaluates `exact`, with the normalization of the mesh recorded in its source.
+/// Returns a distance function that evaluates `exact`. The source of the distance function records the
+/// normalization of the mesh.
 std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
                                                           const Normalization& normalization);
 
-/// The distance of a prepared surface. Reports how inside is told from outside where that is not evident.
+/// Makes the distance function of a prepared surface. Reports which inside test is used if the choice is not
+/// evident.
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 
-/// Returns work(). The `Error`s that it throws get the surface as their subject, but those about `other` keep it.
+/// Calls work() and returns its result. An `Error` that work() throws gets the surface as its subject, but an
+/// `Error` about `other` keeps `other` as its subject.
 template <typename Work>
 auto namingSurface(const std::string& surface, const Work& work, const std::string& other = "") {
   try {

@@ -23,8 +23,9 @@ double rounded(double value, double step) { return std::round(value / step) * st
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
 
-/// The words of a line of script without their values. If two lines have the same kind, the second line alone has
-/// the effect of both. Empty for a line whose effect depends on the state before it.
+/// Returns the words of a line of script without their values, as the kind of the line. If two lines have the
+/// same kind, the second line alone has the effect of both. Returns "" for a line whose effect depends on the
+/// state that the explorer had before the line.
 std::string kindOf(const std::string& line) {
   constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
                                    "arrows", "color",  "panel",   "worst", "settings"};
@@ -39,7 +40,7 @@ std::string kindOf(const std::string& line) {
   return kind;
 }
 
-/// `view` with the frame's size and the renderer of `frame`.
+/// Returns `view` with the frame size and the renderer of the state `frame`.
 ViewState withFrameOf(const ViewState& frame, ViewState view) {
   view.width = frame.width;
   view.height = frame.height;
@@ -86,7 +87,8 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  // A line that replaces the previous one starts from the history before the gesture.
+  // A line of script that replaces the previous line of the same gesture starts from the history before the
+  // gesture.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
   undone_.resize(before_.undone);
   redone_ = before_.redone;
@@ -108,7 +110,8 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const Field& field = current.field;
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
-  // A field without target error was ended by another limit. The error that it reached then serves as the target.
+  // If a field has no target error, another limit ended its construction. The error that the field reached then
+  // serves as the target error.
   if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
@@ -130,7 +133,7 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   for (const BuildSetting& setting : buildSettings())
     if (settings_.contains(std::string(setting.name))) settings.erase(std::string(setting.exclusive));
   for (const auto& [name, value] : settings_) settings[name] = value;
-  // A kind of continuity that was chosen by name drops the parameters of the other kind.
+  // If the settings name the kind of continuity, the parameters of the other kind are dropped.
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
@@ -182,14 +185,16 @@ void Explorer::run(const std::string& line) {
 }
 
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
-  // Long work must not start within a frame of the panels, because its listener draws frames too.
+  // Jumps are measured before the frame is drawn. Long work must not start while the panels are being drawn,
+  // because the listener of long work draws the panels too.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
   if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
-/// Draws the panels until they show the present state: scroll positions, for instance, depend on the previous frame.
+/// Draws the panels several times, until they show the present state. Scroll positions, for instance, depend
+/// on the previous frame.
 void Explorer::settlePanels() {
   for (int i = 0; i < 3; ++i) {
     std::vector<std::string> ignored;  // commands to scroll back where a column became shorter
@@ -228,7 +233,7 @@ void Explorer::input(const Input& event) {
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
   for (const std::string& command : commands) run(command);
-  // An open list must be drawn once before it takes input.
+  // Draw the panels once more, because an open list must be drawn once before it takes input.
   std::vector<std::string> late;
   drawPanels(nullptr, late);
   for (const std::string& command : late) run(command);
@@ -240,8 +245,8 @@ const std::map<std::string, Widget>& Explorer::widgets() {
   return ui_.widgets();
 }
 
-/// The command that zooms the slice, or moves the camera, after the wheel was turned by `notches` away from the
-/// person.
+/// Returns the command for a turn of the mouse wheel by `notches` away from the person. The command zooms the
+/// slice or moves the camera.
 std::string Explorer::wheelCommand(double notches) const {
   if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, notches));
   const render::OrbitCamera& c = view_.camera;
@@ -249,7 +254,7 @@ std::string Explorer::wheelCommand(double notches) const {
                      c.distance * std::pow(1.15, -notches));
 }
 
-/// The command that changes the view after the mouse was dragged by dx and dy pixels.
+/// Returns the command that changes the view when the mouse has been dragged by dx and dy pixels.
 std::string Explorer::dragCommand(double dx, double dy) const {
   const UiRect canvas = layoutOf(view_).canvas;
   const double width = canvas.width(), height = canvas.height();
@@ -264,8 +269,8 @@ std::string Explorer::dragCommand(double dx, double dy) const {
   if (*dragged_ == 0)
     return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesPerPixel * dx, 0.1),
                        std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
-  // Any button except the left one moves the target with the mouse. `scale` is half the picture's extent in the
-  // plane of the target, in world units.
+  // A drag with any button except the left one moves the camera's target together with the mouse. `scale` is
+  // half the extent of the picture in the plane of the target, in world units.
   const auto camera = render::cameraOf(c, field.domain(), int(width), int(height));
   const double scale =
       c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
@@ -274,7 +279,8 @@ std::string Explorer::dragCommand(double dx, double dy) const {
   return "camera target=" + vectorWord(target);
 }
 
-/// The command for the mouse over the picture, or for a key that no text field takes.
+/// Returns the command for a mouse event over the picture, or for a key that no text field takes. Returns
+/// std::nullopt if there is no such command.
 std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
@@ -315,7 +321,8 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.scale = scale;
     return picture;
   };
-  // Plane and camera refer to the current field, so that both pictures show the same part of space.
+  // The plane and the camera are placed relative to the current field, even if `field` is the field beside it.
+  // Both pictures then show the same part of space.
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
                      : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), reference);
@@ -348,7 +355,8 @@ void Explorer::drawPicture(int shrink) {
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
   if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
-  // Either both pictures change or neither: after an error above, drawnFor_ still describes the old pair.
+  // The two pictures are replaced together. After an error in the code above, both are unchanged, and drawnFor_
+  // still describes them.
   picture_ = std::move(picture);
   beside_ = std::move(beside);
   shown_ = {picture_->image};

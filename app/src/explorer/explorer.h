@@ -15,14 +15,15 @@
 
 namespace hpsdf::app {
 
-/// The rectangles of a frame's parts, in pixels. A part is empty where it is closed or has no room.
+/// The rectangles of the parts of a frame, in pixels. The rectangle of a part is empty if the part is closed
+/// or has no room.
 struct Layout {
   UiRect bar, left, right, readout;
   UiRect canvas;  ///< the picture of the current field
   UiRect beside;  ///< the picture of the other field
 };
 
-/// The layout depends on the state alone.
+/// Computes the layout of a frame, which depends only on the state `view`.
 Layout layoutOf(const ViewState& view);
 
 class Explorer final : public SessionExtension {
@@ -30,82 +31,89 @@ class Explorer final : public SessionExtension {
   explicit Explorer(Session& session);
 
   const ViewState& view() const { return view_; }
-  /// Shows another state. `undo` returns to the state before, and counts the changes of one mouse gesture as one. Undo
-  /// never changes the frame's size and the renderer.
+  /// Makes `next` the explorer's state. `undo` returns to the previous state. Undo treats all changes of one
+  /// mouse gesture as one change, and never changes the frame size or the renderer.
   void change(ViewState next);
-  /// `undo` and `redo` return false when there is no state to go to.
+  /// Returns to the state before the last change. `undo` and `redo` return false if there is no state to return
+  /// to.
   bool undo() { return goBack(undone_, redone_); }
   bool redo() { return goBack(redone_, undone_); }
   bool canUndo() const { return !undone_.empty(); }
   bool canRedo() const { return !redone_.empty(); }
 
-  /// The settings of the next construction as texts, by the names of `build`'s parameters; `mesh` stands for the
-  /// surface.
+  /// The settings of the next construction as texts. The keys are the names of `build`'s parameters; the key
+  /// `mesh` stands for the surface.
   const std::map<std::string, std::string>& settings() const { return settings_; }
   void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
-  /// Builds the field again with `settings()`, and ends after `maxSteps` refinement steps where that is given.
-  /// Throws `Error` when neither the settings nor the field name a surface.
+  /// Builds the field again with `settings()`. If `maxSteps` is given, the construction ends after that many
+  /// refinement steps. Throws `Error` if neither the settings nor the field name a surface.
   void rebuild(std::optional<int> maxSteps);
-  /// The number of refinement steps of the complete construction, if known; the current field may have fewer.
+  /// The number of refinement steps of the complete construction, or std::nullopt if unknown. The current field
+  /// may result from fewer steps.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// Handles one event of mouse or keyboard: draws the panels, then runs the commands that their widgets ask for,
-  /// and passes on the exceptions of these commands. During long work the only effect of an event is to cancel the
-  /// work.
+  /// Handles one mouse or keyboard event: draws the panels, then runs the commands that their widgets ask for.
+  /// Exceptions of these commands are passed on to the caller. While long work runs, an event can only cancel
+  /// the work.
   void input(const Input& event);
   /// Ends everything that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and
   /// discards a text that is being typed. The pointer keeps its position. Errors of the commands that run because of
   /// this are ignored.
   void releaseInput();
 
-  /// The widgets of the present frame, by their paths.
+  /// Returns the widgets of the present frame. The keys are the paths of the widgets.
   const std::map<std::string, Widget>& widgets();
   const Ui& ui() const { return ui_; }
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
-  /// Draws the panels, and the picture if it has changed. `shrink` divides the picture's resolution along each axis, so
-  /// that it keeps up with a moving mouse. During long work the last picture is shown again.
+  /// Draws the panels, and draws the picture again if it has changed. `shrink` divides the picture's resolution
+  /// along each axis, so that drawing keeps up with a moving mouse. During long work the last picture is shown
+  /// again.
   render::Image frame(int shrink = 1);
-  /// True when the last picture was drawn with fewer pixels, or for another state than `view`.
+  /// True if the last picture was drawn at reduced resolution or for a state other than the present one, or if
+  /// there is no picture.
   bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
 
-  /// Runs one line of script, as widgets do.
+  /// Runs one line of script. Widgets act by calling this function.
   void run(const std::string& line);
-  /// Called after each line that `run` has run. `replaces` is true if the line alone has the same effect as the
-  /// previous line followed by it, as during one drag of a slider. A recording may then drop the previous line.
+  /// Called after each line of script that `run` has run. `replaces` is true if this line alone has the same
+  /// effect as the previous line followed by this line, as during a drag of a slider. A recording may then drop
+  /// the previous line.
   std::function<void(const std::string& line, bool replaces)> onCommand;
-  /// True while `run` runs a line.
+  /// True while `run` is running a line of script.
   bool running() const { return running_; }
 
   void fieldChanged() override;
 
-  /// Long work that is running. The panels show it, and only the button that cancels it takes input.
+  /// Long work that is now running. The panels show its progress. Only the button that cancels the work takes
+  /// input.
   struct Work {
     std::string task;
     double fraction = 0;  ///< done, 0 to 1
     bool cancellable = false;
   };
   std::optional<Work> work;
-  /// Set by the panels when a person cancels the work.
+  /// The panels set this to true when a person cancels the long work.
   bool cancelWanted = false;
 
   std::string message;  ///< error or result, shown in the readout panel until the next command
   Session& session() const { return session_; }
-  /// The last picture, without panels.
+  /// The last picture of the field, without the panels.
   const std::optional<render::Drawn>& picture() const { return picture_; }
-  /// Statistics of the current field, computed at the first call.
+  /// Returns statistics of the current field. They are computed at the first call for this field.
   const FieldStatistics& figures();
-  /// Indices of the interfaces with the greatest jumps, the greatest first: `count` of them or more, unless the field
-  /// has fewer.
+  /// Returns the indices of the interfaces with the greatest jumps, in descending order of the jump. Returns
+  /// `count` indices or more, unless the field has fewer interfaces.
   const std::vector<std::size_t>& worst(std::size_t count);
-  /// The values at the pointer, if it is over the field.
+  /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
 
  private:
-  /// Returns to the last state of `from`, and keeps the present one in `to`.
+  /// Returns to the last state in `from`, and appends the present state to `to`. Returns false if `from` is
+  /// empty.
   bool goBack(std::vector<ViewState>& from, std::vector<ViewState>& to);
   std::string pictureKey() const;
-  /// The parameters of `build` that made the current field, as far as its metadata record them.
+  /// Returns those parameters of `build` that made the current field and that the field's metadata record.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
@@ -123,7 +131,8 @@ class Explorer final : public SessionExtension {
   Ui ui_;
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
-  /// The state and the history before the gesture, to which a line that replaces the previous one returns.
+  /// The explorer's state and undo history before a mouse gesture. A line of script that replaces the previous
+  /// line of the gesture starts from them.
   struct History {
     ViewState view;
     std::size_t undone = 0;  ///< size of undone_
@@ -155,10 +164,11 @@ class Explorer final : public SessionExtension {
   ViewState viewAtPress_;
 };
 
-/// The session's explorer, which is made at the first call.
+/// Returns the session's explorer, which the first call creates.
 inline Explorer& explorerOf(Session& session) { return session.extension<Explorer>(); }
 
-/// Draws the panels and appends the lines of script that their widgets ask for. Called within `Ui::frame`.
+/// Draws the panels and appends to `commands` the lines of script that their widgets ask for. Must be called
+/// within `Ui::frame`.
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands);
 
 }  // namespace hpsdf::app

@@ -33,7 +33,7 @@ void changeWorst(ViewState& view, const Arguments& arguments, Session&) {
   if (arguments.given("page")) view.worstPage = arguments.whole("page") - 1;
 }
 
-/// A point to fly to.
+/// The point to which the command `fly` moves the camera or the slice.
 struct Destination {
   Vector3 point;
   double cellSize;  ///< edge length of a cell at the point, world units
@@ -44,8 +44,8 @@ double cellSize(const Field& field, int depth) {
   return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
 }
 
-/// The point of the largest jump of an interface. The slice is perpendicular to the interface, so that it shows both
-/// cells.
+/// Returns the point of the largest jump on the interface of this rank. The slice through the point is
+/// perpendicular to the interface, so that it shows the cells on both sides.
 Destination worstPoint(Session& session, std::size_t rank) {
   const auto& worst = explorerOf(session).worst(rank);
   if (rank > worst.size())
@@ -61,7 +61,8 @@ Destination destinationAt(Session& session, const Vector3& point) {
   return {point, cellSize(field, field.cellAt(point).depth), explorerOf(session).view().axis};
 }
 
-/// Brings the camera or the slice so close that the cell takes about a sixth of the picture.
+/// Moves the camera or the slice to the destination, so close that the cell at this point takes about a sixth
+/// of the picture.
 void runFly(Session& session, const Arguments& arguments) {
   Explorer& explorer = explorerOf(session);
   const Field& field = session.current().field;
@@ -77,7 +78,8 @@ void runFly(Session& session, const Arguments& arguments) {
   } else {
     view.camera.target = to.point;
     view.camera.distance = 10 * to.cellSize / field.domain().diagonal().norm();
-    // A point away from the surface may be hidden by it: a clip plane through the point removes what is in front.
+    // The surface may hide a point that does not lie on it. In that case a clip plane through the point removes
+    // the part in front of the point.
     view.clip.reset();
     if (std::abs(field.value(to.point) - view.surfaceOffset) > to.cellSize) {
       const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
@@ -139,7 +141,8 @@ void runShot(Session& session, const Arguments& arguments) {
   reportPicture(session, arguments, file, frame.width, frame.height, session.lastRenderer());
 }
 
-/// The parameters of `panel`: its parts, and how far the columns are scrolled.
+/// Returns the parameters of the command `panel`: which panels are open, and how far the columns are
+/// scrolled.
 std::vector<Parameter> panelParameters() {
   constexpr std::array kHelp = {"The buttons on top.",
                                 "What is shown.",

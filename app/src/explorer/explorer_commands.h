@@ -8,14 +8,15 @@
 
 namespace hpsdf::app {
 
-/// Adds all commands of the explorer except `ui`: show, camera, plane, color, panel, ….
+/// Adds all commands of the explorer (show, camera, plane, color, panel, …) except `ui`.
 void addExplorerCommands(Registry& registry);
 
-/// Adds `ui`, by which a script uses mouse and keyboard on the explorer.
+/// Adds the command `ui`, with which a script sends mouse and keyboard events to the explorer.
 void addUiCommand(Registry& registry);
 
-/// Returns the action of a command: it changes a copy of the explorer's state, which then replaces the state.
-/// `undo` reverts the whole change. If the change throws, the state stays as it was.
+/// Returns the action of a command that changes the explorer's state. The action applies `change` to a copy
+/// of the state, and the copy then replaces the state. `undo` reverts all changes of one action together. If
+/// `change` throws, the state stays as it was.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
 /// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.

@@ -9,13 +9,13 @@
 namespace hpsdf::app {
 namespace {
 
-/// The point that `target` names; nothing for the word center.
+/// Returns the point that the argument `target` gives. Returns std::nullopt for the word "center".
 std::optional<Vector3> targetOf(const Arguments& arguments) {
   if (arguments.text("target") == "center") return std::nullopt;
   return pointOf(arguments, "target");
 }
 
-/// The text of a parameter; empty for the word none.
+/// Returns the text of the parameter `name`. Returns "" if the text is the word "none".
 std::string textOrNone(const Arguments& arguments, const char* name) {
   return arguments.text(name) == "none" ? "" : arguments.text(name);
 }

@@ -1,11 +1,11 @@
-// The panels around the picture.
+// The panels around the explorer's picture.
 
 #include "explorer/panels.h"
 
 namespace hpsdf::app {
 namespace {
 
-/// Draws an open panel: its heading, with a button that closes it, and its content.
+/// Draws a panel if it is open: its heading with a button that closes the panel, and its content.
 template <typename Content>
 void section(const Controls& controls, const ViewState& view, Panel panel, const char* title, const Content& content) {
   if (!view.isOpen(panel)) return;
@@ -36,7 +36,7 @@ void drawBar(const Controls& controls, const Explorer& explorer) {
   controls.button("bar/copy-view", "copy view", "copy-view");
 }
 
-/// Draws the names of the two fields into their halves of the picture, and a line between the halves.
+/// Draws a line between the two halves of the picture, and the name of a field into each half.
 void drawFieldNames(const Explorer& explorer, const Layout& layout) {
   if (layout.beside.width() <= 0) return;
   ImDrawList& list = *ImGui::GetBackgroundDrawList();

@@ -17,10 +17,10 @@ namespace hpsdf::app {
 constexpr ImU32 kInk = IM_COL32(32, 34, 44, 255), kSoftInk = IM_COL32(98, 102, 116, 255);
 constexpr ImU32 kTick = IM_COL32(60, 64, 78, 255);
 
-/// Six digits suffice for a slider's value in a command.
+/// Formats a slider's value for a command. Six digits suffice.
 inline std::string number(double value) { return fmt::format("{:.6g}", value); }
 
-/// The name of a file without its folders, for which a panel has no room.
+/// Returns the name of a file without its folders, because a panel has no room for them.
 inline std::string fileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 inline ImU32 packed(const render::Color& c) { return IM_COL32(c[0], c[1], c[2], 255); }
@@ -32,8 +32,9 @@ inline void textAt(float x, float y, const std::string& text, ImU32 color) {
   ImGui::GetWindowDrawList()->AddText({std::round(x), std::round(y)}, color, text.c_str());
 }
 
-/// Controls that show a part of the state and append a command to `commands` when a person uses them. They change
-/// nothing themselves. A `command` is the beginning of a line, to which the chosen value is appended.
+/// The controls of the explorer's panels. Each control shows a part of the state. When a person uses a
+/// control, it appends a command to `commands` and does not change the state itself. The parameter `command`
+/// of a control is the beginning of a line of script, to which the control appends the chosen value.
 struct Controls {
   Ui& ui;
   std::vector<std::string>& commands;
@@ -59,7 +60,8 @@ struct Controls {
     if (const auto chosen = ui.combo(path, label, names, current)) commands.push_back(command + *chosen);
   }
 
-  /// A text field, whose text becomes one word of the command: "none" where it is empty and `orNone` is true.
+  /// A text field. Its text becomes one word of the command. If the text is empty and `orNone` is true, the
+  /// word is "none".
   void field(const std::string& path, const char* label, const std::string& value, const std::string& command,
              bool orNone = false) const {
     if (const auto text = ui.field(path, label, value))
@@ -67,14 +69,14 @@ struct Controls {
   }
 };
 
-/// Draws the controls of the camera or the plane, of the cells and of the colours.
+/// Draws the controls of the camera or of the slice plane, and those of the cells and colours.
 void drawViewPanel(const Controls& controls, Explorer& explorer);
 /// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
 void drawBuildPanel(const Controls& controls, Explorer& explorer);
 
-/// Draws the key to the colours of the present picture.
+/// Draws the colour legend of the present picture.
 void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture);
-/// Draws the shares of the domain's volume by degree and by depth.
+/// Draws two histograms: the shares of the domain's volume by degree and by depth of the cells.
 void drawHistograms(Ui& ui, Explorer& explorer);
 /// Draws figures of the whole field.
 void drawStatistics(Ui& ui, Explorer& explorer);

@@ -38,13 +38,13 @@ void blend(render::Color& pixel, const Channels& color, float coverage) {
         static_cast<std::uint8_t>(float(pixel[channel]) + (color[channel] - float(pixel[channel])) * alpha + 0.5F);
 }
 
-/// Twice the signed area of (a, b, p).
+/// Returns twice the signed area of the triangle (a, b, p).
 float edge(const ImVec2& a, const ImVec2& b, const ImVec2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-/// True for one of the two directions of an edge. Two triangles run along a shared edge in opposite directions, so that
-/// only one of them covers the pixels whose centres lie on it (top-left rule).
+/// Tells whether an edge with this direction covers the pixels whose centres lie on it (top-left rule). Two
+/// triangles traverse their shared edge in opposite directions, so exactly one of them covers these pixels.
 bool coversItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
 
 void paintTriangle(render::Image& image, const Coverage& texture, const Clip& clip, const ImDrawVert* a,

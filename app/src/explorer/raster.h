@@ -11,14 +11,16 @@
 
 namespace hpsdf::app {
 
-/// The only texture of the panels: the coverage of glyphs, lines and a white spot, 0 to 255.
+/// The only texture that the panels use. It holds the coverage, 0 to 255, of glyphs, of lines and of a white
+/// spot.
 struct Coverage {
   int width = 0, height = 0;
   std::vector<std::uint8_t> texels;
 };
 
-/// Blends the triangles over the picture in their order, as a graphics card does: a pixel belongs to the triangle that
-/// contains its centre; colours and texture coordinates are interpolated, and the texture is sampled bilinearly.
+/// Blends the triangles over the picture in their order, with the rules of a graphics card. A triangle covers
+/// the pixels whose centres it contains. Colours and texture coordinates are interpolated, and the texture is
+/// sampled bilinearly.
 void paint(render::Image& image, const ImDrawData& data, const Coverage& texture);
 
 }  // namespace hpsdf::app

@@ -1,4 +1,4 @@
-// The panels of the left column.
+// The panels of the explorer's left column.
 
 #include "explorer/panels.h"
 #include "hpsdf/continuity.h"
@@ -57,7 +57,8 @@ void drawPlane(const Controls& controls, const ViewState& view, const Box& domai
   controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1);
 }
 
-/// Draws the controls of what the surface's picture shows besides the surface: a plane and the octree's cells.
+/// Draws the controls of the two things that the picture of a surface can also show: a plane and the cells of
+/// the octree.
 void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Box& domain) {
   controls.checkbox("view/surface", "surface", view.surface, "surface shown=");
   ImGui::SameLine();
@@ -69,7 +70,8 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Bo
   controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
 }
 
-/// Draws the limits of the colour scale. `automatic` holds the limits of the present picture.
+/// Draws the controls of the limits of the colour scale. `automatic` holds the limits that the present
+/// picture uses.
 void drawColorRange(const Controls& controls, const Coloring& colors,
                     const std::optional<std::array<double, 2>>& automatic) {
   const auto pin = [&](const std::string& range) {
@@ -103,7 +105,8 @@ void drawColors(const Controls& controls, const ViewState& view, const std::opti
   drawColorRange(controls, colors, picture ? picture->scale.limits : std::nullopt);
 }
 
-/// The controls of `build`'s parameters: each shows what `settings` says, or else the current field's own value.
+/// The controls of the parameters of `build`. Each control shows the value in `settings`, or the value of the
+/// current field if `settings` has none.
 struct BuildControls {
   const Controls& controls;
   const std::map<std::string, std::string>& settings;
@@ -142,7 +145,8 @@ void drawContinuity(const BuildControls& build, const Field& field) {
     build.slider("blend-width", width > 0 ? width : kDefaultBlend, 0.01, kMaxBlend, "%.3f");
 }
 
-/// Draws the progress of the construction; the button that cancels it is the only control that takes input.
+/// Draws the progress of the construction. During the construction only the button that cancels it takes
+/// input.
 void drawProgress(Ui& ui, Explorer& explorer) {
   ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
   if (!explorer.work->cancellable) return;

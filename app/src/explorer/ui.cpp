@@ -119,7 +119,7 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.GetClipboardTextFn = [](void* clipboard) { return static_cast<std::string*>(clipboard)->c_str(); };
   setStyle();
 
-  // Glyphs: Latin, Greek, dashes, dots, arrows, ∇, −, ≤, ≥.
+  // Ranges of the characters that the font atlas contains: Latin, Greek, dashes, dots, arrows, ∇, −, ≤, ≥.
   static const ImWchar ranges[] = {0x20,   0x7e,   0xa0,   0xff,   0x391,  0x3c9,  0x2013, 0x2014, 0x2026, 0x2026,
                                    0x2190, 0x2193, 0x2207, 0x2207, 0x2212, 0x2212, 0x2264, 0x2265, 0};
   ImFontConfig config;

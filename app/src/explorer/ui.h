@@ -1,6 +1,6 @@
 #pragma once
-// The panels' widgets: Dear ImGui without a window. It takes its input as single events, and every widget has a path by
-// which scripts find it. Nothing depends on the clock.
+// The widgets of the panels, drawn with Dear ImGui without a window. Input arrives as single events. Every
+// widget has a path by which scripts find the widget. Nothing depends on the clock.
 
 #include <array>
 #include <functional>
@@ -20,7 +20,7 @@ namespace hpsdf::app {
 
 enum class Key : std::uint8_t { enter, escape, backspace, remove, left, right, home, end, tab, a, c, v, x, y, z };
 
-/// The names of all keys as scripts spell them: "enter", "escape", ….
+/// Returns the names of all keys as scripts spell them: "enter", "escape", ….
 std::vector<std::string> keyNames();
 std::optional<Key> keyNamed(std::string_view name);
 
@@ -44,7 +44,7 @@ struct UiRect {
   double height() const { return y1 - y0; }
 };
 
-/// A widget of the last frame.
+/// A widget of the last frame: its place and the input that it takes.
 struct Widget {
   UiRect rect;             ///< visible part: empty where the widget is scrolled out of its column
   bool enabled = true;     ///< false while the widget takes no input
@@ -61,52 +61,55 @@ class Ui {
   Ui(const Ui&) = delete;
   Ui& operator=(const Ui&) = delete;
 
-  /// Makes one frame of width × height pixels: takes `input`, if any, then calls `widgets`, which calls the functions
-  /// below. An exception of `widgets` is passed on after the frame has been ended.
+  /// Makes one frame of width × height pixels. Handles the event `input` unless it is null, then calls
+  /// `widgets`, which draws all widgets by calling the functions below. An exception that `widgets` throws is
+  /// passed on after the frame has been completed.
   void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
 
-  /// Paints the last frame over a picture of its size.
+  /// Paints the last frame over a picture of the same size.
   void paint(render::Image& image) const;
 
-  /// The widgets of the last frame, by their paths.
+  /// Returns the widgets of the last frame. The keys are the paths of the widgets.
   const std::map<std::string, Widget>& widgets() const { return widgets_; }
   std::array<double, 2> pointer() const { return pointer_; }
-  /// True when the pointer is over a panel, or a widget holds the mouse.
+  /// True if the mouse pointer is over a panel, or if a widget holds the mouse.
   bool wantsMouse() const;
-  /// True while a mouse button is down or a widget is being edited: changes then belong to one gesture.
+  /// True while a mouse button is down or a widget is being edited. All changes during this time belong to one
+  /// gesture.
   bool busy() const;
   bool holds(int button) const;
   bool editing() const;
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
-  // The following functions are called by `widgets`. A path is panel/name; a label may be empty. Each returns what the
-  // person changed in this frame.
+  // The function `widgets` that is passed to `frame` calls the following functions. A path has the form
+  // panel/name. A label may be empty. Each function returns the change that the person made in this frame.
 
-  /// Draws a panel's background and calls `content` within. `scroll` is the scroll position in pixels, or nothing for a
-  /// panel that never scrolls. Returns the new scroll position.
+  /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
+  /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.
   double column(const char* name, const UiRect& rect, std::optional<double> scroll,
                 const std::function<void()>& content);
   bool heading(const std::string& path, const char* label);
   bool button(const std::string& path, const char* label, bool pressed = false);
   std::optional<bool> checkbox(const std::string& path, const char* label, bool value);
-  /// A list of names, which shows the first where `current` is none of them.
+  /// Draws a list of the names `items`. If `current` is not one of these names, the list shows the first name.
   std::optional<std::string> combo(const std::string& path, const char* label, std::span<const std::string> items,
                                    const std::string& current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
                                const char* format = "%.4g", When when = When::moved);
-  /// A text field, which returns its text when Enter is pressed.
+  /// Draws a text field. Returns the text of the field when Enter is pressed, and std::nullopt otherwise.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
   bool row(const std::string& path, std::span<const std::string> cells, double cellWidth);
   void text(const std::string& line, bool soft = false);
   void facts(std::span<const std::pair<std::string, std::string>> rows);
   void progress(const std::string& path, const std::string& task, double fraction);
-  /// Enables or disables the widgets that follow.
+  /// Enables or disables all widgets that are drawn after this call.
   void enable(bool enabled);
-  /// While frozen, `enable` cannot enable widgets.
+  /// While `frozen` is true, `enable` cannot enable any widgets.
   void freeze(bool frozen);
 
-  /// Adds a widget for a rectangle that no widget draws, such as the picture, so that it has a path.
+  /// Registers a rectangle that no function of this class draws, such as the picture, as a widget, so that
+  /// scripts find it by its path.
   void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:

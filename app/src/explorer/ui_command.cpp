@@ -12,7 +12,7 @@ constexpr int kDragSteps = 4;
 
 using Point = std::array<double, 2>;
 
-/// The numbers of "X,Y".
+/// Parses two numbers of the form "X,Y". Returns std::nullopt for any other text.
 std::optional<Point> parsePoint(const std::string& text) {
   const std::size_t comma = text.find(',');
   if (comma == std::string::npos) return std::nullopt;
@@ -21,8 +21,8 @@ std::optional<Point> parsePoint(const std::string& text) {
   return Point{*x, *y};
 }
 
-/// The pixel that `target` names: X,Y, or the middle of a widget. Throws `Error` for a widget that takes no input
-/// and, if `types` is true, for a widget that takes no text.
+/// Returns the pixel that `target` names: the pixel X,Y, or the centre of a widget. Throws `Error` for a
+/// widget that takes no input. If `types` is true, also throws `Error` for a widget that takes no text.
 Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
   if (const auto pixel = parsePoint(target)) return *pixel;
   const auto& widgets = explorer.widgets();
@@ -54,7 +54,8 @@ void runUi(Session& session, const Arguments& arguments) {
   try {
     explorer.frame();  // the readout and the colour panel need the picture
   } catch (const Error&) {
-    // The widgets work without a picture, and may be needed to make it drawable. `shot` reports the error.
+    // An error of the picture is ignored here, because the widgets work without a picture and may be needed to
+    // correct its settings. The command `shot` reports the error.
   }
   if (action == "list") {
     for (const auto& [path, widget] : explorer.widgets())
@@ -83,7 +84,8 @@ void runUi(Session& session, const Arguments& arguments) {
     release();
   }
   if (action != "type") return;
-  // The Ctrl+click has turned the slider into a text field and selected its number, which the typed text replaces.
+  // The Ctrl+click has turned the slider into a text field and selected its number. The text typed here
+  // replaces the number.
   explorer.input({.kind = Input::Kind::type, .text = value});
   explorer.input({.kind = Input::Kind::key, .key = Key::enter});
 }

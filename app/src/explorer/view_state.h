@@ -1,5 +1,5 @@
 #pragma once
-// The state of the explorer. Equal states of equal fields draw equal frames.
+// The state of the explorer. If two states are equal and the two fields are equal, the frames are equal.
 
 #include <array>
 #include <optional>
@@ -12,12 +12,12 @@
 
 namespace hpsdf::app {
 
-/// The parts of the explorer's frame around its picture, each of which may be closed.
+/// The parts of the explorer's frame that surround its picture. Each part can be closed.
 enum class Panel : std::uint8_t { bar, view, build, legend, histograms, statistics, worst, readout };
 constexpr std::array kPanelNames = {"bar", "view", "build", "legend", "histograms", "statistics", "worst", "readout"};
 constexpr std::size_t kPanels = kPanelNames.size();
 
-/// The quantity that the colours show, and its scale.
+/// The quantity that the picture's colours show, and the colour scale.
 struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
@@ -62,25 +62,27 @@ struct ViewState {
   const Coloring& colors() const { return slice ? sliceColors : surfaceColors; }
 };
 
-/// The state as the renderer's settings, without size and samples.
+/// Converts the explorer's state into the renderer's settings, without the picture's size and number of
+/// samples.
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
 render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
 
-/// "2,4" for a list of levels, "all" for an empty one.
+/// Returns a list of levels as text: "2,4", or "all" for an empty list.
 std::string levelText(const std::vector<int>& levels);
 
-/// Lines of script, each ending in a newline, that set every part of the state.
+/// Returns a script that sets every part of the state. Each line of the script ends in a newline.
 std::string scriptOf(const ViewState& view);
 
-/// Compares two states by their scripts, which set every part of a state.
+/// Compares two states by the scripts that `scriptOf` makes of them. A script sets every part of a state.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
-/// The renderer as an argument of `show`: "cpu=true" or "gl=software", for instance.
+/// Returns the choice of a renderer as an argument of the command `show`, for instance "cpu=true" or
+/// "gl=software".
 std::string backendText(const Backend& backend);
 
-/// A word as a script spells it, with quotes where it needs them.
+/// Returns a word as it must be spelled in a script, in quotes if necessary.
 std::string scriptWord(const std::string& word);
-/// The word as a script spells it, or "none" for an empty word.
+/// Returns a word as it must be spelled in a script. Returns "none" for an empty word.
 std::string wordOrNone(const std::string& word);
 
 }  // namespace hpsdf::app

@@ -17,7 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Parses the numbers of a line, NaN and infinity included. Returns nothing where a cell is not a number.
+/// Parses the numbers of a line of comma-separated values, NaN and infinity included. Returns std::nullopt if
+/// a cell is not a number.
 std::optional<std::vector<double>> numbersOf(const std::string& line) {
   std::vector<double> numbers;
   for (const char* cell = line.data();; ++cell) {
@@ -60,7 +61,8 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   double scale = 0;
   stream >> kind >> table.columns >> table.rows >> scale;
   const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
-  // A number of rows or columns beyond the number of bytes is wrong, and might make the product below overflow.
+  // If the number of rows or columns exceeds the number of bytes, it is wrong. The product of such numbers,
+  // computed below, might overflow.
   const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
   const std::size_t count = table.columns * table.rows;
   if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||
@@ -75,7 +77,8 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   return table;
 }
 
-/// Returns |a − b|. Two NaN count as equal, and so do equal infinities; NaN and a number differ infinitely.
+/// Returns |a − b|. The difference is 0 for two NaN and for two equal infinities. It is infinite between NaN
+/// and a number.
 double difference(double a, double b) {
   if (a == b || (std::isnan(a) && std::isnan(b))) return 0;
   const double distance = std::abs(a - b);

@@ -1,5 +1,5 @@
 #pragma once
-// Reads raw values from .csv and .pfm files, which commands write, and compares them.
+// Reads raw values from .csv and .pfm files that commands of the program have written, and compares them.
 
 #include <cstddef>
 #include <filesystem>
@@ -17,8 +17,8 @@ struct DataTable {
 
 bool isDataFile(const std::filesystem::path& file);
 
-/// Reads a .csv of numbers, with or without names of columns in its first line, or a .pfm of one channel. Throws
-/// `Error` naming the file.
+/// Reads a .csv file of numbers, whose first line may hold the names of the columns, or a .pfm file with one
+/// channel. Throws `Error` naming the file.
 DataTable loadData(const std::filesystem::path& file);
 
 struct DataDifference {
@@ -37,14 +37,15 @@ struct DataComparison {
   std::vector<DataDifference> worst = {};  ///< largest differences in descending order, at most `kWorstData`
 };
 
-/// Default bound of a difference: the value of the two or three lowest bits of a float near 1.
+/// Default bound for the difference between two values. It is the value of the two or three lowest bits of a
+/// float near 1.
 constexpr double kDataBound = 1e-6;
 constexpr std::size_t kWorstData = 10;
 
 DataComparison compare(const DataTable& baseline, const DataTable& actual, double bound);
 
-/// Describes the failed comparison in one line. The result is empty where the shapes agree and at most the share
-/// `budget` of the values differs.
+/// Describes a failed comparison in one line. Returns "" if the two tables have the same shape and at most
+/// the share `budget` of the values differs.
 std::string problem(const DataComparison& comparison, double bound, double budget);
 
 }  // namespace hpsdf::app

@@ -58,7 +58,8 @@ void Film::add(const render::Image& image, Json figures) {
 void Film::encode(double framesPerSecond, const Progress& progress) {
   if (folder_) return;
   if (progress.report) progress.report("encoding", 0);
-  // Every player supports 4:2:0 colours; they require even numbers of pixels.
+  // Encode with 4:2:0 colours, which every player supports. They require an even width and height, so odd
+  // pictures are padded.
   const std::string problem =
       runOtherProgram(ffmpeg_,
                       {"-hide_banner", "-loglevel", "error", "-y", "-framerate", fmt::format("{}", framesPerSecond),

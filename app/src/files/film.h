@@ -13,26 +13,29 @@
 
 namespace hpsdf::app {
 
-/// A sequence of pictures, written to a folder as frame-0000.png, frame-0001.png … or encoded as an MP4 by ffmpeg.
-/// The output is not touched before `publish`, so that an older film stays intact until then.
+/// A film: a sequence of pictures. It is written to a folder as frame-0000.png, frame-0001.png, …, or encoded
+/// as an MP4 file by ffmpeg. The output is not touched before `publish` is called, so that an older film
+/// there stays intact until then.
 class Film {
  public:
-  /// `output` is an MP4 where it ends in .mp4, else a folder. Throws `Error` where it cannot be written, where the
-  /// folder holds files that are not an earlier film, or where an MP4 is wanted and ffmpeg is not installed.
+  /// The output is an MP4 file if `output` ends in .mp4, and otherwise a folder. Throws `Error` if the output
+  /// cannot be written, if the folder holds files that are not an earlier film, or if an MP4 file is wanted and
+  /// ffmpeg is not installed.
   explicit Film(const std::string& output);
 
-  /// Adds a frame with its figures, an object for frames.json.
+  /// Adds a frame. `figures` is the JSON object that describes the frame in frames.json.
   void add(const render::Image& image, Json figures);
   std::size_t frames() const { return rows_.size(); }
 
-  /// Encodes the MP4 after the last frame; does nothing for a folder. Throws `Error` with ffmpeg's last line on
-  /// failure.
+  /// Encodes the MP4 file. Call it after the last frame. Does nothing if the output is a folder. Throws `Error`
+  /// with the last line that ffmpeg wrote if ffmpeg fails.
   void encode(double framesPerSecond, const Progress& progress);
 
-  /// Moves the film to its output, and returns its description, which a folder also receives as frames.json.
+  /// Moves the finished film to its output. Returns a description of the film, which is also written as
+  /// frames.json if the output is a folder.
   Json publish(const std::string& renderer);
 
-  /// Describes the film in one line, from the result of `publish`.
+  /// Describes the film in one line. `about` is the result of `publish`.
   static std::string line(const Json& about);
 
  private:

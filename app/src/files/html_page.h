@@ -1,5 +1,6 @@
 #pragma once
-// The page of a report: one HTML file beside its pictures, without scripts and without network access.
+// Writes the page of a report: one HTML file beside its pictures, without JavaScript and without network
+// access.
 
 #include <map>
 #include <string>
@@ -29,14 +30,16 @@ struct ReportPage {
 
 std::string reportHtml(const ReportPage& page);
 
-/// The beginning and the end of a page. `moreStyle` is CSS that is added to the CSS of reports.
+/// Returns the beginning, or the end, of an HTML page. `moreStyle` is CSS that is added to the CSS of
+/// reports.
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
 
-/// A row of a table: a name and its value, both of which it escapes.
+/// Returns a row of an HTML table with a name and its value. Both texts are escaped here.
 std::string htmlFact(const std::string& name, const std::string& value);
 
-/// Encodes a PNG file as the source of an <img>, so that the page contains it.
+/// Encodes the bytes of a PNG file as the source of an <img> element, so that the HTML page contains the
+/// picture.
 std::string htmlPng(std::string_view bytes);
 
 /// Escapes text for use between tags and in quoted attributes.

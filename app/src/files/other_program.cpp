@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Calls waitpid, again where a signal interrupts it.
+/// Calls waitpid, and calls it again if a signal has interrupted the call.
 pid_t waitForProcess(pid_t id, int& status, int options) {
   for (;;) {
     const pid_t ended = waitpid(id, &status, options);
@@ -32,7 +32,7 @@ pid_t waitForProcess(pid_t id, int& status, int options) {
   }
 }
 
-/// Returns the last line that is not empty; "" where there is none.
+/// Returns the last line of the text that is not empty. Returns "" if there is no such line.
 std::string lastLine(const std::string& text) {
   std::istringstream lines(text);
   std::string last;

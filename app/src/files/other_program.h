@@ -11,10 +11,10 @@
 
 namespace hpsdf::app {
 
-/// Searches PATH for an executable file of this name.
+/// Searches PATH for an executable file of this name. Returns std::nullopt if there is none.
 std::optional<std::filesystem::path> findProgram(const std::string& name);
 
-/// How a process is started. Its standard input is empty.
+/// Describes how to start a process. The standard input of the process is empty.
 struct ProcessStart {
   std::filesystem::path program;
   std::vector<std::string> arguments;
@@ -23,16 +23,17 @@ struct ProcessStart {
   std::filesystem::path folder = {};  ///< in which it runs; empty for that of this process
 };
 
-/// A process of another program. The destructor kills it if it still runs.
+/// A process that runs another program. The destructor kills the process if it is still running.
 class OtherProcess {
  public:
-  /// Throws std::system_error where the process cannot be started.
+  /// Starts the process. Throws std::system_error if the process cannot be started.
   explicit OtherProcess(const ProcessStart& start);
   ~OtherProcess();
   OtherProcess(const OtherProcess&) = delete;
   OtherProcess& operator=(const OtherProcess&) = delete;
 
-  /// Returns the status that waitpid tells; nothing while the process runs.
+  /// Returns the exit status of the process as waitpid reports it. Returns std::nullopt while the process is
+  /// running.
   std::optional<int> ended();
 
  private:
@@ -40,9 +41,9 @@ class OtherProcess {
   bool running_ = true;
 };
 
-/// Runs the program in `folder`, where it is to write the file `result`. Returns "" or what went wrong: "gnuplot failed
-/// with status 1 (the last line that it wrote)". Throws `Error` where the program cannot be started, and `Cancelled`
-/// after ending it once `cancelled` returns true.
+/// Runs the program in `folder`. The program must write the file `result` there. Returns "" on success, and
+/// otherwise what went wrong: "gnuplot failed with status 1 (the last line that it wrote)". Throws `Error` if
+/// the program cannot be started. If `cancelled` returns true, ends the program and throws `Cancelled`.
 std::string runOtherProgram(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                             const std::filesystem::path& folder, const std::string& result,
                             const std::function<bool()>& cancelled);

@@ -43,7 +43,7 @@ void OutputFolder::commit() {
   keep();
 }
 
-/// Removes the created folders that are empty.
+/// Removes those folders that the constructor created and that are empty.
 void OutputFolder::removeCreated() {
   std::error_code ignored;
   for (const fs::path& part : created_) fs::remove(part, ignored);

@@ -11,11 +11,12 @@
 
 namespace hpsdf::app {
 
-/// A folder for results. The constructor creates it with its parents where they do not exist. The destructor removes
-/// the folders that it created and that are empty, unless `keep` was called; other folders and files are never removed.
+/// A folder for results. If the folder or its parents do not exist, the constructor creates them. Unless
+/// `keep` was called, the destructor removes those folders that the constructor created and that are empty.
+/// Other folders and files are never removed by the destructor.
 class OutputFolder {
  public:
-  /// Throws `Error` naming the folder where it cannot be created.
+  /// Creates the folder if it does not exist. Throws `Error` naming the folder if it cannot be created.
   explicit OutputFolder(const std::filesystem::path& folder);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
@@ -23,20 +24,21 @@ class OutputFolder {
 
   void keep() { created_.clear(); }
 
-  /// Writes a file under a temporary name. `commit` gives all such files their names and keeps the folder. Without
-  /// `commit` the files are removed, and older files of the same names stay. Both functions throw `Error` as
-  /// `OutputFile` does.
+  /// Writes a file under a temporary name. `commit` renames all files written in this way to their final names
+  /// and keeps the folder. Without `commit` the files are removed, and older files of the same names stay.
+  /// `write` and `commit` throw `Error` as `OutputFile` does.
   void write(const std::string& name, std::string_view bytes);
   void commit();
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Throws `Error` where the folder holds files but no file `marker`, by which a folder of earlier results is
-  /// recognized.
+  /// Throws `Error` if the folder holds files but not the file `marker`, which identifies a folder of earlier
+  /// results.
   void requireOwn(const std::string& marker) const;
 
-  /// Writes an empty marker, so that a folder of incomplete results is recognized too, and removes the results of
-  /// earlier runs, which are the files whose names `isResult` accepts. Call `requireOwn` first.
+  /// Writes the file `marker` without results, so that a folder of incomplete results is recognized too. Then
+  /// removes the results of earlier runs, which are the files whose names `isResult` accepts. Call `requireOwn`
+  /// first.
   void startAnew(const std::string& marker, const std::function<bool(const std::string&)>& isResult) const;
 
  private:
@@ -47,7 +49,8 @@ class OutputFolder {
   std::vector<std::unique_ptr<OutputFile>> files_;
 };
 
-/// A new folder in the system's folder for temporary files. The destructor removes it with its contents.
+/// A new folder inside the system's folder for temporary files. The destructor removes the new folder and its
+/// contents.
 class TemporaryFolder {
  public:
   TemporaryFolder();

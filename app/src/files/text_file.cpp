@@ -13,7 +13,7 @@ namespace hpsdf::app {
 
 namespace {
 
-/// Refuses devices, which might have no end.
+/// Opens a file for reading. Throws `Error` for a device, because reading a device might never end.
 std::ifstream openFiniteFile(const std::string& file) {
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);

@@ -20,7 +20,7 @@ struct Source {
 };
 constexpr Source kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};
 
-/// Reads the text from left to right.
+/// Reads the text of an expectation from left to right.
 class Reader {
  public:
   explicit Reader(std::string_view text) : text_(text) {}
@@ -37,7 +37,7 @@ class Reader {
     return true;
   }
 
-  /// Reads letters, digits, _ and -. The name may be empty.
+  /// Reads a name of letters, digits, _ and - at the present position of the text. The name may be empty.
   std::string name() {
     skipBlanks();
     const std::size_t begin = position_;

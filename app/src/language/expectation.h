@@ -1,5 +1,6 @@
 #pragma once
-// Expectations compare a number with a limit: "stats.leaves < 60000", "pick(640,360).degree == 4".
+// Expectations compare a number that a command reports with a limit: "stats.leaves < 60000",
+// "pick(640,360).degree == 4".
 
 #include <string>
 #include <string_view>
@@ -19,8 +20,8 @@ struct Expectation {
   bool holds(double found) const;
 };
 
-/// Throws `Error` for text that is not an expectation. If its source is unknown, the message names the nearest
-/// known one.
+/// Parses an expectation. Throws `Error` for any other text. If the source is unknown, the message names the
+/// most similar known source.
 Expectation parseExpectation(std::string_view text);
 
 }  // namespace hpsdf::app

@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kWidth = 96;
 
-/// Breaks `text` into lines of at most kWidth bytes, each line indented. Empty lines separate paragraphs.
+/// Breaks `text` into lines of at most kWidth bytes and indents each line by `indent` blanks. Empty lines in
+/// `text` separate paragraphs.
 std::string wrapped(const std::string& text, std::size_t indent) {
   const std::string margin(indent, ' ');
   std::istringstream lines(text);
@@ -62,7 +63,7 @@ std::string valueName(const Parameter& parameter) {
   return typeName(parameter.type);
 }
 
-/// Spells a parameter as "-o, --output FILE".
+/// Returns a parameter with its option letter, name and value, as in "-o, --output FILE".
 std::string spelling(const Parameter& parameter) {
   if (parameter.isPositional) return valueName(parameter);
   const std::string alias = parameter.letter == 0 ? "" : fmt::format("-{}, ", parameter.letter);
@@ -71,7 +72,8 @@ std::string spelling(const Parameter& parameter) {
                      value.empty() ? "" : " ", value);
 }
 
-/// Lists range, unit, default and further spelling in parentheses, so that the help text need not contain them.
+/// Returns the range, unit, default and second spelling of a parameter in parentheses, so that its help text
+/// need not repeat them.
 std::string facts(const Parameter& parameter) {
   std::vector<std::string> parts;
   const bool hasRange = parameter.minimum || parameter.maximum;
@@ -111,7 +113,8 @@ struct Group {
   std::vector<const Parameter*> parameters = {};
 };
 
-/// Collects parameters under their headings, in the order in which the headings first appear; `kGeneral` is last.
+/// Groups parameters by their headings. The groups appear in the order in which their headings first occur;
+/// the group `kGeneral` comes last.
 std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
   std::vector<Group> groups;
   for (const Parameter& parameter : parameters) {
@@ -124,8 +127,8 @@ std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
   return groups;
 }
 
-/// Where the page docs/commands.md describes an option: with its command, with `build`, or with the shared
-/// options.
+/// The place in docs/commands.md where an option of a command is described: with this command, with the
+/// command `build`, or in the section of shared options.
 enum class DescribedAt : std::uint8_t { here, build, sharedOptions };
 
 bool isSameOption(const Parameter& a, const Parameter& b) { return a.name == b.name && a.help == b.help; }
@@ -163,7 +166,8 @@ std::string markdownNames(const std::vector<const Parameter*>& parameters) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Describes the command's own parameters by group and refers to the descriptions of those that it shares.
+/// Describes the parameters that only this command has, by group. For the parameters that it shares with
+/// other commands, refers to their descriptions.
 std::string markdownParameters(const Registry& registry, const Command& command) {
   std::string text;
   std::vector<const Parameter*> shared;

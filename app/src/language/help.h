@@ -1,5 +1,5 @@
 #pragma once
-// Help texts and docs/commands.md, made from the registry.
+// Makes the help texts and the page docs/commands.md from the registry.
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -14,14 +14,15 @@ enum class HelpDetail : std::uint8_t {
   all,
 };
 
-/// Describes the program, a first session and all commands.
+/// Returns a description of the program, with a first session and a list of all commands.
 std::string overviewHelp(const Registry& registry);
 
 /// Describes one command: usage, purpose, examples, and its parameters by group.
 std::string commandHelp(const Command& command, HelpDetail detail);
 
-/// Returns the page docs/commands.md. An option that several commands share is described once: with `build` where it
-/// belongs to the construction, else in the section "Shared options".
+/// Returns the text of the page docs/commands.md. An option that several commands share is described only
+/// once: with the command `build` if it is an option of the construction, and otherwise in the section
+/// "Shared options".
 std::string commandsMarkdown(const Registry& registry);
 
 /// Returns commands and parameters as JSON.

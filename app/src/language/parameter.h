@@ -1,5 +1,6 @@
 #pragma once
-// What a command takes, described as rows of a table: name, kind and help text, for example
+// Describes the parameters of commands as rows of a table. A row holds a name, a kind and a help text, for
+// example
 //   {"zoom", number().above(0).byDefault("1"), "Magnification; 1 shows the whole section."}
 
 #include <cstdint>
@@ -24,15 +25,15 @@ enum class ParameterType : std::uint8_t {
   size,  ///< WIDTHxHEIGHT
 };
 
-/// When a parameter is required. A script can use the current field instead, but the command line starts without a
-/// field.
+/// Tells when a parameter is required. `onCommandLine` is for a field: a script can use the current field
+/// instead, but a command line starts without a current field.
 enum class Need : std::uint8_t { optional, onCommandLine, always };
 
-/// Headings of parameters that several commands have. Help texts show the general ones last.
+/// Headings for parameters that several commands have. In help texts the heading `kGeneral` comes last.
 constexpr std::string_view kGeneral = "General", kFiles = "Files", kCamera = "Camera", kColours = "Colours",
                            kDrawn = "What is drawn", kPicture = "Picture";
 
-/// What a parameter accepts, and where help texts show it.
+/// The values that a parameter accepts, and the place where help texts show the parameter.
 struct ParameterKind {
   ParameterType type = ParameterType::text;
   std::string valueName = {};             ///< name of the value in help texts, e.g. "FILE"; "" for the name of its type
@@ -100,11 +101,12 @@ inline ParameterKind wholeNumbers(std::string valueName, std::vector<std::size_t
   return {ParameterType::numbers, std::move(valueName), {}, std::move(counts), true};
 }
 inline ParameterKind choice(std::vector<std::string> words) { return {ParameterType::choice, "", std::move(words)}; }
-/// A flag that is off by default, or has another default: "" where it is left as it was.
+/// A flag. Its default is "false" unless `byDefault` says otherwise. The default "" means that a command
+/// leaves the present setting unchanged.
 inline ParameterKind flag(std::string byDefault = "false") {
   return {ParameterType::flag, "", {}, {}, false, std::move(byDefault)};
 }
-/// A size in pixels, each side from `least` to `most`.
+/// A size in pixels. Width and height must each lie between `least` and `most`.
 inline ParameterKind size(double least, double most) {
   return {ParameterType::size, "", {}, {2}, true, "", "pixels", least, most};
 }
@@ -112,13 +114,13 @@ inline ParameterKind size(double least, double most) {
 /// Concatenates tables of parameters.
 std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
 
-/// Puts the parameters under a heading of help texts.
+/// Puts the parameters under the heading `heading` in help texts.
 std::vector<Parameter> under(std::string_view heading, std::vector<Parameter> parameters);
 
-/// Returns the parameters but those of these names.
+/// Returns the parameters except those whose names are in `names`.
 std::vector<Parameter> without(const std::vector<std::string>& names, std::vector<Parameter> parameters);
 
-/// Returns the parameter of this name. Throws std::logic_error where there is none.
+/// Returns the parameter of this name. Throws std::logic_error if no parameter has this name.
 Parameter& parameterNamed(std::string_view name, std::vector<Parameter>& parameters);
 
 }  // namespace hpsdf::app

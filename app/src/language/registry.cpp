@@ -66,8 +66,8 @@ std::optional<bool> parseFlag(std::string_view text) {
   return std::nullopt;
 }
 
-/// Describes each accepted count of numbers: "a number", "3 numbers with commas between them". Consecutive counts share
-/// one description.
+/// Describes the numbers of values that a parameter accepts: "a number", "3 numbers with commas between
+/// them". Consecutive numbers of values share one description, such as "2 to 4 numbers".
 std::vector<std::string> countForms(const Parameter& parameter) {
   const char* kind = parameter.whole ? "whole number" : "number";
   std::vector<std::string> forms;
@@ -85,7 +85,7 @@ std::vector<std::string> countForms(const Parameter& parameter) {
   return forms;
 }
 
-/// Parses the numbers of a value; nothing where the parameter does not accept them.
+/// Parses the text of a value as numbers. Returns std::nullopt if the parameter does not accept the text.
 std::optional<std::vector<double>> parseNumbers(const Parameter& parameter, std::string_view text) {
   const bool whole = parameter.whole || parameter.type == ParameterType::wholeNumber;
   std::vector<double> numbers;
@@ -194,7 +194,8 @@ const Command& Registry::command(std::string_view name) const {
       fmt::format("unknown command '{}'; {}", name, didYouMean(name, namesOf(commands_), "'hpsdf --help' lists them")));
 }
 
-/// Builds the `Arguments` of one call. CLI11 separates options, their values and positional words.
+/// Builds the `Arguments` of one call of a command. The library CLI11 separates options, their values and
+/// positional words.
 class ArgumentReader {
  public:
   ArgumentReader(const Command& command, std::span<const Word> words, Origin origin)
@@ -230,12 +231,13 @@ class ArgumentReader {
     if (parameter.isPositional) names += "," + parameter.name;
     CLI::Option* option = parser.add_option(names);
     if (parameter.isRepeatable) option->expected(1, CLI::detail::expected_max_vector_size);
-    // Each occurrence takes one value: in `-e A B` the word B remains a positional word.
+    // Each occurrence of an option takes only one value: in `-e A B` the word B remains a positional word.
     option->allow_extra_args(parameter.isRepeatable && parameter.isPositional);
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
-  /// Converts the script spelling name=value to --name=value. Values are passed on as one word, with their blanks.
+  /// Converts the words of a script from the spelling name=value to --name=value. A value with blanks stays
+  /// part of one word.
   std::vector<std::string> normalizedWords() const {
     std::vector<std::string> result;
     for (std::size_t i = 0; i < words_.size(); ++i) {
@@ -266,7 +268,8 @@ class ArgumentReader {
   }
 
   void refuseUnknown(const std::vector<std::string>& extras) const {
-    // The value of an unknown option remains as a positional word too, so the error must name the option itself.
+    // Find the word that is the unknown option. The value of this option is left over as a positional word too,
+    // but the error must name the option itself.
     const auto option = std::ranges::find_if(extras, [](const std::string& word) { return word.starts_with('-'); });
     if (option != extras.end()) {
       const std::string written = option->substr(0, option->find('='));
@@ -284,8 +287,8 @@ class ArgumentReader {
     return found == words_.end() ? 0 : static_cast<std::size_t>(found - words_.begin());
   }
 
-  /// Returns the index of the last word that sets this parameter. An error message about its value points to this
-  /// word.
+  /// Returns the index of the last word that sets the parameter. Error messages about the parameter's value
+  /// point to this word.
   std::size_t wordOf(const Parameter& parameter, std::string_view value) const {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;
@@ -297,7 +300,7 @@ class ArgumentReader {
     return 0;
   }
 
-  /// True for `name=value`, `--name` and `--name=value`.
+  /// True if the word sets the option `name`, as `name=value`, `--name` or `--name=value`.
   static bool sets(const Word& word, const std::string& name) {
     const std::string_view text = word.text;
     const std::string option = "--" + name;

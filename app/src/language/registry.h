@@ -1,6 +1,7 @@
 #pragma once
-// The registry describes every command of the program once: parameters with types, ranges, defaults and help texts.
-// Scripts, the command line, the help and docs/commands.md are all derived from it.
+// The registry describes every command of the program once: its parameters with their types, ranges, defaults
+// and help texts. The script language, the command line, the help and docs/commands.md are all derived from
+// the registry.
 
 #include <array>
 #include <cstdint>
@@ -19,16 +20,16 @@ namespace hpsdf::app {
 
 class Session;
 
-/// The validated values of one call.
+/// The validated argument values of one call of a command.
 class Arguments {
  public:
-  /// True where the caller wrote the parameter; false where its default applies.
+  /// True if the caller wrote the parameter. False if the parameter has its default or no value.
   bool given(std::string_view name) const;
-  /// True where the parameter has a value, written by the caller or by default.
+  /// True if the parameter has a value, whether the caller wrote the value or it is the default.
   bool has(std::string_view name) const;
 
   std::string text(std::string_view name) const;
-  /// Returns `fallback` where the parameter has no value.
+  /// Returns the text of the parameter, or `fallback` if the parameter has no value.
   std::string textOr(std::string_view name, std::string fallback) const;
   std::vector<std::string> texts(std::string_view name) const;
   double number(std::string_view name) const;
@@ -60,7 +61,8 @@ struct Command {
   std::vector<std::string> examples = {};  ///< shell commands; script lines where the command is for scripts only
   std::vector<Parameter> parameters = {};
   std::function<void(Session&, const Arguments&)> action = {};
-  /// Throws `Error` for arguments that do not fit each other. A script is checked before its first command runs.
+  /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
+  /// first command runs.
   std::function<void(const Arguments&)> check = {};
   bool scriptOnly = false;
   bool commandLineOnly = false;
@@ -71,57 +73,59 @@ struct Command {
 
 class Registry {
  public:
-  /// Adds the command, and to it the parameter `json`, which every command has. Throws std::logic_error where a command
-  /// of that name exists.
+  /// Adds the command to the registry. The command also gets the parameter `json`, which every command has.
+  /// Throws std::logic_error if the registry already has a command of this name.
   void add(Command command);
-  /// Does the same with a command that the command line does not have.
+  /// Adds a command as `add` does, but the command is available only in scripts and not on the command line.
   void addForScripts(Command command);
   const std::vector<Command>& commands() const { return commands_; }
-  /// Throws `Error` with the nearest known name where there is no such command.
+  /// Returns the command of this name. If there is none, throws `Error` with the most similar known name.
   const Command& command(std::string_view name) const;
 
  private:
   std::vector<Command> commands_;
 };
 
-/// Returns the parameter that has this name or synonym, or null.
+/// Returns the parameter of the command that has this name or synonym. Returns nullptr if there is none.
 const Parameter* findParameter(const Command& command, std::string_view name);
 
-/// Joins the lines of each paragraph of a text, in which empty lines separate the paragraphs.
+/// Joins the lines of each paragraph of a text into one line. Empty lines separate the paragraphs.
 std::string paragraphs(std::string_view text);
 
-/// One word of a call with its position.
+/// One word of a call of a command, with its column in the line.
 struct Word {
   std::string text = {};
   int column = 0;  ///< column of the first character, from 1
-  /// Index of the `=` that makes the word `name=value` in a script; npos where there is none or it was quoted.
+  /// Index of the `=` if the word has the form `name=value` in a script. npos if the word has no `=` or if the
+  /// `=` was quoted.
   std::size_t equals = std::string::npos;
 };
 
 enum class Origin : std::uint8_t { commandLine, script };
 
-/// Thrown for a word of a call that is not accepted.
+/// Thrown if a word of a call is not accepted or is missing.
 class ArgumentError : public Error {
  public:
   ArgumentError(const std::string& message, std::size_t word) : Error(message), word_(word) {}
-  /// Index of the word, or the number of words where one is missing.
+  /// Index of the word that is not accepted. If a word is missing, the number of words.
   std::size_t word() const { return word_; }
 
  private:
   std::size_t word_;
 };
 
-/// Parses and checks the words that follow a verb: `--name value`, `--name=value`, `-o value`, positional values, and
-/// `name=value` in a script. Throws `ArgumentError`.
+/// Parses and checks the words that follow the name of a command: `--name value`, `--name=value`, `-o value`,
+/// positional values, and `name=value` in a script. Throws `ArgumentError` for words that the command does
+/// not accept.
 Arguments parseArguments(const Command& command, std::span<const Word> words, Origin origin);
 
-/// Runs the command. Throws `Error` before any work where an output is also one of the inputs.
+/// Runs the command. Throws `Error` before any work starts if an output file is also one of the input files.
 void perform(const Command& command, Session& session, const Arguments& arguments);
 
 /// Describes the accepted values of a parameter, e.g. "a whole number from 1 to 30".
 std::string expectedValue(const Parameter& parameter);
 
-/// Parses `text` as one finite number; nothing where any of it is left over.
+/// Parses the whole `text` as one finite number. Returns std::nullopt if `text` is anything else.
 std::optional<double> parseNumber(std::string_view text);
 
 }  // namespace hpsdf::app

@@ -16,19 +16,19 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::size_t kDeepestInclude = 16;  // the same limit as for scripts that run each other
-// A few lines can require any amount of memory, by variables that contain variables and by files that include
-// another file twice. The limits below stop such scripts.
+// Limits on the size of a script. Variables that contain variables, and files that include another file
+// twice, let a few lines of script require any amount of memory. These limits stop such scripts.
 constexpr std::size_t kMostCalls = 100'000;
 constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // sum over all replacements of $name
 
-/// True for a name of a variable: letters, digits and _, not starting with a digit.
+/// True if `name` is a valid name of a variable: letters, digits and _, with no digit at the start.
 bool isIdentifier(std::string_view name) {
   return !name.empty() && isLetter(name[0]) &&
          std::ranges::all_of(name, [](char c) { return isLetter(c) || isDigit(c); });
 }
 
-/// Returns the index of the `=` that ends the name of an option or a variable; npos for any other word, such as
-/// builtin:torus,major=0.7.
+/// Returns the index of the `=` that follows the name of an option or variable at the start of the word.
+/// Returns npos for any other word, such as builtin:torus,major=0.7.
 std::size_t equalsAfterName(std::string_view word) {
   const std::size_t equals = word.find('=');
   if (equals == std::string_view::npos || equals == 0) return std::string_view::npos;
@@ -43,14 +43,15 @@ struct Statement {
   std::vector<Word> words;
 };
 
-/// Splits a script into statements and words.
+/// Splits the text of a script into statements and the statements into words.
 class Scanner {
  public:
-  /// `includedFrom` is appended to every message (see `Call`). `variableBytes` sums the lengths of replaced variables.
+  /// `includedFrom` is appended to every error message (see `Call`). The lengths of all variable values that
+  /// are substituted are added to `variableBytes`.
   Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
       : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 
-  /// Returns the next statement that has words, or an empty one at the end of the text.
+  /// Returns the next statement that is not empty. Returns an empty statement at the end of the text.
   Statement statement(const Variables& variables) {
     Statement read{line_, {}};
     while (!atEnd()) {
@@ -77,7 +78,7 @@ class Scanner {
 
  private:
   bool atEnd() const { return position_ == text_.size(); }
-  /// The character that `advance` will pass; a zero byte at the end of the text.
+  /// Returns the next character to be read, without advancing. Returns a zero byte at the end of the text.
   char next() const { return atEnd() ? '\0' : text_[position_]; }
 
   void advance() {
@@ -172,7 +173,7 @@ class Scanner {
   int column_ = 1;
 };
 
-/// Reads a script; the lines of an included script replace its `include`.
+/// Reads a script. The lines of an included script take the place of the command `include`.
 class ScriptReader {
  public:
   ScriptReader(const Registry& registry, Variables variables) : registry_(registry), variables_(std::move(variables)) {}
@@ -183,7 +184,8 @@ class ScriptReader {
   }
 
  private:
-  /// A script that is being read, with the position of its `include` that is being followed.
+  /// A script that is being read. If it is including another script, `where` and `line` hold the position of
+  /// that `include` command.
   struct Open {
     std::string name;
     std::string where = {};
@@ -207,7 +209,8 @@ class ScriptReader {
     std::string name, text;
   };
 
-  /// Checks the statement and appends its call. Returns the script that it includes, if it includes one.
+  /// Checks a statement and appends its call to the list of calls. If the statement includes another script,
+  /// returns that script, and otherwise std::nullopt.
   std::optional<Included> addCall(const Scanner& scanner, const Statement& statement, const std::string& includedFrom) {
     const Word& verb = statement.words.front();
     const auto rest = std::span(statement.words).subspan(1);
@@ -233,7 +236,7 @@ class ScriptReader {
     return included;
   }
 
-  /// Relative names start at the folder of the including script.
+  /// Reads an included script. Relative file names are searched in the folder of the including script.
   Included readIncluded(const std::string& file) const {
     const auto path = (std::filesystem::path(open_.back().name).parent_path() / file).lexically_normal();
     const auto isThat = [&](const Open& other) {

@@ -16,7 +16,7 @@ namespace hpsdf::app {
 
 using Variables = std::map<std::string, std::string, std::less<>>;
 
-/// A checked command of a script, ready to run.
+/// One command of a script with its checked arguments, ready to run.
 struct Call {
   const Command* command;
   Arguments arguments;
@@ -25,13 +25,15 @@ struct Call {
   int line;                  ///< line in the outermost script; for an included call the line of its `include`
 };
 
-/// Reads and checks a whole script, so that a mistake in the last line is found before the first line runs. `name` is
-/// the script's file: messages begin with it, and included files are searched in its folder. `variables` replace $name.
-/// The calls refer to commands of the registry. Throws `Error` "file:line:column: …".
+/// Reads and checks a whole script, so that a mistake in the last line is found before the first line runs.
+/// `name` is the file name of the script: messages begin with it, and included files are searched in its
+/// folder. Words of the form $name are replaced by the values in `variables`. The calls refer to commands of
+/// the registry, which must outlive them. Throws `Error` "file:line:column: …".
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables);
 
-/// Runs the calls in order. An error ends the script; its message then begins with the position of the call.
+/// Runs the calls in order. The first error ends the script; the error message then begins with the position
+/// of the failed call.
 void runScript(Session& session, std::span<const Call> calls);
 
 /// Parses words of the form name=value. Throws `Error` for any other word.

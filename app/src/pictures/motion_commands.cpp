@@ -26,12 +26,12 @@ std::vector<Parameter> filmParameters(const std::string& frames, const std::stri
           {"fps", number().within(0.1, 240).byDefault("12"), "Frames a second of an .mp4."}};
 }
 
-/// The parameters of a command that draws, without those of its files.
+/// Returns the parameters of a command that draws, without the parameters for its files and for JSON.
 std::vector<Parameter> drawingParameters(const Registry& registry, std::string_view command) {
   return without({"field", "output", "json"}, registry.command(command).parameters);
 }
 
-/// Publishes the film and reports it.
+/// Moves the finished film to its output and reports it to the user.
 void publish(Session& session, const Arguments& arguments, Film& film) {
   const Json about = film.publish(session.lastRenderer());
   if (session.wantsJson(arguments)) return printJson(session.console().out, about);
@@ -67,7 +67,8 @@ void runTurntable(Session& session, const Arguments& arguments) {
   publish(session, arguments, film);
 }
 
-/// The commands that the option --of accepts: `slice` and `render` without the parameters field and output.
+/// Returns the commands that the option --of accepts: `slice` and `render` without their parameters for files
+/// and for JSON.
 Registry drawingCommands(const Registry& registry) {
   Registry result;
   for (const char* name : {"slice", "render"}) {
@@ -78,7 +79,7 @@ Registry drawingCommands(const Registry& registry) {
   return result;
 }
 
-/// The command in the option --of. Throws `Error` "of:line:column: …".
+/// Parses the command in the argument of the option --of. Throws `Error` "of:line:column: …".
 Call drawingCall(const Registry& commands, const Arguments& arguments) {
   std::vector<Call> calls = parseScript(commands, "of", arguments.text("of"), {});
   if (calls.size() != 1) throw Error("of: expected one command, slice or render");
@@ -97,7 +98,8 @@ void checkFrames(const Registry& commands, const Arguments& arguments) {
   backend(call.arguments);
 }
 
-/// Draws the session's current field, with the given scale if there is one.
+/// Draws the session's current field with the command `call`. If `scale` is given, it replaces the colour
+/// scale of the picture.
 render::Drawn drawFrame(Session& session, const Call& call, const std::optional<render::ScaleOptions>& scale) {
   const Arguments& arguments = call.arguments;
   const auto drawn = [&](auto picture, auto draw) {
@@ -110,8 +112,8 @@ render::Drawn drawFrame(Session& session, const Call& call, const std::optional<
   return drawn(slicePicture(arguments, domain), render::drawSlice);
 }
 
-/// The numbers of steps after which a frame is drawn: 0, then a geometric sequence from 1 to `all`, strictly ascending.
-/// There are `frames` numbers, or all + 1 if that is less.
+/// Returns the numbers of refinement steps after which a frame is drawn, strictly ascending: 0, then a
+/// geometric sequence from 1 to `all`. The result has `frames` elements, or all + 1 elements if that is less.
 std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   frames = std::min<std::uint64_t>(frames, all + 1);
   std::vector<std::uint64_t> steps = {0};
@@ -123,8 +125,8 @@ std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   return steps;
 }
 
-/// Extends the scale to all levels that a frame can have: from the lowest of the base cells to the highest of the
-/// finished field.
+/// Extends the colour scale to all levels that can occur in a frame: from the lowest level of the base cells
+/// to the highest level of the finished field.
 void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);

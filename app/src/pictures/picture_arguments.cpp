@@ -1,6 +1,7 @@
 #include "pictures/picture_arguments.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,11 +17,34 @@ namespace {
 
 using render::ColorBy;
 
-constexpr std::pair<std::string_view, ColorBy> kColors[] = {
-    {"normal", ColorBy::normal},       {"degree", ColorBy::degree},        {"depth", ColorBy::depth},
-    {"distance", ColorBy::distance},   {"value-jump", ColorBy::valueJump}, {"gradient-jump", ColorBy::gradientJump},
-    {"slope", ColorBy::slope},         {"error", ColorBy::error},          {"difference", ColorBy::difference},
-    {"cell-error", ColorBy::cellError}};
+/// A colour of pictures by the word that commands use. `explanation` is its part of the sentence that explains the
+/// quantities in the help of `color`.
+struct NamedColor {
+  std::string_view name;
+  ColorBy color;
+  std::string_view explanation = "";
+};
+constexpr NamedColor kColors[] = {
+    {"normal", ColorBy::normal},
+    {"degree", ColorBy::degree},
+    {"depth", ColorBy::depth},
+    {"distance", ColorBy::distance},
+    {"value-jump", ColorBy::valueJump, "value-jump and gradient-jump show the greatest jump at a cell's faces"},
+    {"gradient-jump", ColorBy::gradientJump},
+    {"slope", ColorBy::slope, "slope the difference of the gradient's length from 1"},
+    {"error", ColorBy::error, "error the difference from the exact distance"},
+    {"difference", ColorBy::difference, "difference the difference from another field"},
+    {"cell-error", ColorBy::cellError, "cell-error the estimated RMS error of a cell"}};
+
+/// Returns the words of all quantities, as in "slope, error and difference".
+std::string quantityNames() {
+  std::vector<std::string_view> names;
+  for (const NamedColor& named : kColors)
+    if (render::isQuantity(named.color)) names.push_back(named.name);
+  const std::string_view last = names.back();
+  names.pop_back();
+  return fmt::format("{} and {}", fmt::join(names, ", "), last);
+}
 
 struct NamedView {
   std::string_view name;
@@ -41,9 +65,7 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
     if (arguments.given(name) && !render::isQuantity(color) &&
         !(color == ColorBy::distance && name == std::string_view("range")))
       throw Error(
-          fmt::format("{}: the colours of {} have none; it is for value-jump, gradient-jump, slope, error, "
-                      "difference and cell-error",
-                      name, arguments.text("color")));
+          fmt::format("{}: the colours of {} have none; it is for {}", name, arguments.text("color"), quantityNames()));
   if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
     throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
   if (arguments.given("mesh") && color != ColorBy::error)
@@ -89,7 +111,8 @@ void setPixels(Picture& picture, const Arguments& arguments) {
   picture.samples = arguments.whole("samples");
 }
 
-/// The plane that `render` draws: six numbers, or an axis with an offset.
+/// Returns the plane that `render` draws, given by six numbers or by an axis with an offset. Returns
+/// std::nullopt if no plane is given.
 std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& domain) {
   if (!arguments.given("plane")) {
     if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
@@ -126,19 +149,23 @@ std::string viewName(const render::OrbitCamera& camera) {
 
 std::vector<std::string> colorNames(std::optional<ColorBy> without) {
   std::vector<std::string> names;
-  for (const auto& [name, color] : kColors)
-    if (color != without) names.emplace_back(name);
+  for (const NamedColor& named : kColors)
+    if (named.color != without) names.emplace_back(named.name);
   return names;
 }
 
-std::string_view colorName(ColorBy color) {
-  return std::ranges::find(kColors, color, [](auto& c) { return c.second; })->first;
+std::string quantityHelp() {
+  std::vector<std::string_view> explanations;
+  for (const NamedColor& named : kColors)
+    if (!named.explanation.empty()) explanations.push_back(named.explanation);
+  return fmt::format("{}.", fmt::join(explanations, ", "));
 }
 
-/// Always finds a colour, because the registry accepts only the names above.
-ColorBy colorNamed(std::string_view name) {
-  return std::ranges::find(kColors, name, [](auto& c) { return c.first; })->second;
-}
+std::string_view colorName(ColorBy color) { return std::ranges::find(kColors, color, &NamedColor::color)->name; }
+
+/// Returns the colouring of this name. The search always succeeds, because the registry accepts only the
+/// names in kColors.
+ColorBy colorNamed(std::string_view name) { return std::ranges::find(kColors, name, &NamedColor::name)->color; }
 
 render::CellStyle cellStyle(std::string_view name) {
   return name == "lines"   ? render::CellStyle::lines

@@ -1,5 +1,6 @@
 #pragma once
-// Converts validated arguments, and names as commands spell them, into the renderer's settings.
+// Converts validated arguments of commands, and names of settings as commands spell them, into the renderer's
+// settings.
 
 #include <array>
 #include <memory>
@@ -15,66 +16,74 @@
 
 namespace hpsdf::app {
 
-/// Names of the quantities that colours show: degree, depth, distance, ….
+/// Returns the name of a quantity that colours can show: degree, depth, distance, ….
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
+
+/// Returns the sentence of help texts that explains the quantities among the colours.
+std::string quantityHelp();
 render::ColorBy colorNamed(std::string_view name);
 
-/// Names of a camera's directions: front, back, ….
+/// Returns the names of the camera directions: front, back, ….
 std::vector<std::string> viewNames();
-/// Turns the camera into a direction that `viewNames` contains.
+/// Turns the camera to the direction of the name `view`, which must be one of `viewNames`.
 void turnTo(render::OrbitCamera& camera, std::string_view view);
-/// The name of the camera's direction; "" if it has none.
+/// Returns the name of the camera's direction, or "" if the direction has no name.
 std::string viewName(const render::OrbitCamera& camera);
 
-/// The names are none, lines and boxes.
+/// Returns the cell style of this name. The names are none, lines and boxes.
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);
 
-/// The levels in a list such as "2,4-6", each from 0 to `most`; none for "". Throws `Error` naming the parameter.
+/// Parses a list of levels such as "2,4-6". Each level must lie between 0 and `most`. Returns an empty list
+/// for "". Throws `Error` naming the parameter `name` for any other text.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 
-/// The point that a parameter of three numbers holds, which must have been given.
+/// Returns the value of a parameter of three numbers as a point. The parameter must have a value.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// Stands for the domain of a field that is not loaded yet, when arguments are checked.
+/// A placeholder for the domain of the field, for checking arguments before the field is loaded.
 inline const Box kAnyDomain(Vector3::Constant(-1), Vector3::Constant(1));
 
-/// The settings of `slice`. Without an offset the plane is at `defaultOffset`. Throws `Error` when plane and axis are
-/// both given.
+/// Returns the settings of a picture from the arguments of `slice`. If no offset is given, the plane is at
+/// `defaultOffset`. Throws `Error` if both a plane and an axis are given.
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
-/// The parameters of `render` that every picture with a camera takes.
+/// Names of those parameters of `render` that every command with a camera takes.
 inline constexpr std::array kCameraParameters = {"camera", "view",    "target", "projection",
                                                  "size",   "samples", "cpu",    "gl"};
 std::vector<Parameter> cameraParameters(const Registry& registry);
 
-/// A renderer of these meshes, by OpenGL or on the CPU.
+/// Makes a renderer for these meshes, which draws with OpenGL or on the CPU as `backend` says.
 std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend);
 
-/// The settings that `kCameraParameters` give. Throws `Error` for a camera or a size out of range.
+/// Returns the settings of a picture from the arguments named in `kCameraParameters`. Throws `Error` if the
+/// camera or the size is out of range.
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
-/// The settings of `render`. Without an offset the plane is at `defaultOffset`. Throws `Error` for a camera out of
-/// range, and for parameters that exclude or need each other.
+/// Returns the settings of a picture from the arguments of `render`. If no offset is given, the plane is at
+/// `defaultOffset`. Throws `Error` for a camera out of range, and for parameters that exclude or require each
+/// other.
 render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
-/// Writes a note that explains an empty picture, or a surface that is cut off by the walls of the domain.
+/// Writes a note to the console if the picture is empty, or if the walls of the domain cut off the surface.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// The reference data that a picture of the session's field needs, from the files that the arguments name.
+/// Returns the reference data that a picture of the session's current field needs. The data comes from the
+/// files that the arguments name.
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SlicePicture& picture);
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SurfacePicture& picture);
 
-/// Default offset of a plane across an axis: 0, or the domain's middle if 0 lies outside.
+/// Returns the default offset of a plane perpendicular to an axis: 0, or the middle of the domain if 0 lies
+/// outside the domain.
 double defaultOffset(const Box& domain, int axis);
 
 /// Throws `Error` unless the file ends in .png.
 void requirePng(const std::string& file);
 
-/// Reports a picture that was written: one line, or a JSON object if the arguments ask for it.
+/// Reports a picture that has been written, in one line, or as a JSON object if the arguments ask for JSON.
 void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,
                    const std::string& renderer);
 

@@ -28,7 +28,8 @@ SliceFormat sliceFormat(const std::string& file) {
                           file, kind));
 }
 
-/// Returns the numbers that the colours of a slice stand for; NaN outside the domain.
+/// Returns for each pixel of a slice the number that its colour represents. The number is NaN for pixels
+/// outside the domain.
 std::vector<float> rawValues(const Field& field, const render::SliceView& view, const render::ViewBuffers& buffers,
                              render::ColorBy what, const render::ReferenceData& reference) {
   if (render::isQuantity(what)) return render::quantityAt(field, view, buffers, what, reference);
@@ -41,8 +42,8 @@ std::vector<float> rawValues(const Field& field, const render::SliceView& view, 
   return values;
 }
 
-/// Writes a portable float map: one channel, little-endian (which the negative scale states), rows from bottom to
-/// top, and NaN outside the domain.
+/// Writes the values as a portable float map with one channel. The map is little-endian, which its negative
+/// scale states. Its rows run from bottom to top. Values outside the domain are NaN.
 void writePfm(const render::ViewBuffers& buffers, std::span<const float> values, OutputFile& out) {
   static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
   out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
@@ -51,8 +52,8 @@ void writePfm(const render::ViewBuffers& buffers, std::span<const float> values,
     out.write(std::as_bytes(values.subspan(y * width, width)));
 }
 
-/// Writes one row for each pixel inside the domain: the pixel's point in world units, the value, and the cell's
-/// degree and depth.
+/// Writes a CSV file with one row for each pixel inside the domain. A row holds the pixel's point in world
+/// units, the field value there, and the degree and depth of the cell there.
 void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers, OutputFile& out) {
   out.write("x,y,z,value,degree,depth\n");
   for (int y = 0; y < buffers.height; ++y) {
@@ -173,13 +174,11 @@ const std::vector<Parameter> kRenderDrawn = {
      "Draws cells of these polynomial degrees only: numbers and ranges, as in 2,4-6."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
 
-/// The parameters of colours: all quantities but `left`. `ofCells` begins the help text of the first.
+/// Returns the parameters that choose the colours of a picture. They accept all quantities except `left`. The
+/// help text of the first parameter begins with `ofCells`.
 std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells, const std::string& standard) {
   return {
-      {"color", choice(colorNames(left)).byDefault(standard),
-       ofCells + " value-jump and gradient-jump show the greatest jump at a cell's faces, slope the difference of the "
-                 "gradient's length from 1, error the difference from the exact distance, difference the difference "
-                 "from another field, cell-error the estimated RMS error of a cell."},
+      {"color", choice(colorNames(left)).byDefault(standard), ofCells + " " + quantityHelp()},
       {"range", numbers("LOW,HIGH", {2}),
        "Values of the darkest and the lightest colour of a jump, slope or error, or distances between which "
        "colours and iso-lines are chosen. Use it to compare pictures; when left out, it is chosen from the values."},

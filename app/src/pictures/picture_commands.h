@@ -4,10 +4,11 @@
 
 namespace hpsdf::app {
 
-/// Adds `slice` and `render`.
+/// Adds the commands `slice` and `render`.
 void addPictureCommands(Registry& registry);
 
-/// Adds `turntable` and `frames`. The registry must hold `slice` and `render`, whose parameters they take over.
+/// Adds the commands `turntable` and `frames`. They take over parameters of `slice` and `render`, so the
+/// registry must already hold these two commands.
 void addMotionCommands(Registry& registry);
 
 /// Adds `pick` and `expect`, which read and check numbers of the current field and of the last picture.

@@ -1,5 +1,5 @@
 #pragma once
-// The figures of a field at a point of a picture.
+// The figures of a field at the point that a pixel of a picture shows.
 
 #include <optional>
 #include <string>
@@ -21,10 +21,11 @@ struct Readout {
 
 Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick);
 
-/// The readout of the session's current field, whose jumps are measured if necessary.
+/// Returns the readout of the session's current field at `pick`. Measures the jumps of the field if that has
+/// not been done yet.
 Readout readoutAt(Session& session, const render::Pick& pick);
 
-/// The readout as two lines of text.
+/// Returns the readout as two lines of text.
 std::vector<std::string> readoutText(const Readout& readout);
 
 }  // namespace hpsdf::app

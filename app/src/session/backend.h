@@ -1,5 +1,5 @@
 #pragma once
-// The choice of a renderer, and the options for it.
+// The choice of a renderer, and the command options for this choice.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace hpsdf::app {
 
-/// The choice of a renderer.
+/// The choice between the CPU renderer and an OpenGL renderer.
 struct Backend {
   bool cpu = false;
   render::GlChoice gl = render::GlChoice::automatic;

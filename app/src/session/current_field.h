@@ -8,14 +8,14 @@
 
 namespace hpsdf::app {
 
-/// The field that commands read and change.
+/// The current field of a session. Commands read and change it.
 struct CurrentField {
   Field field;
   std::string name;                              ///< name of the file or mesh that it came from
   std::optional<std::uintmax_t> fileBytes = {};  ///< size of its file, where it was loaded or saved
   std::string surface = {};                      ///< mesh file or shape, where it was built in this session
 
-  /// Returns the mesh file or shape from which it can be built again; "" where that is unknown.
+  /// Returns the mesh file or shape from which the field can be built again. Returns "" if it is unknown.
   const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// The argument FIELD, by which a command names the field on which it works.
+// The argument FIELD, with which a command names the field that it works on.
 
 #include <string>
 
@@ -8,13 +8,14 @@
 
 namespace hpsdf::app {
 
-/// Returns the parameter `field` of commands that read a field.
+/// Returns the parameter `field`, which all commands that read a field have.
 Parameter fieldParameter();
 
-/// Loads a file as the current field. Throws `Error` naming the file.
+/// Loads a field file and makes its field the current one. Throws `Error` naming the file.
 void loadField(Session& session, const std::string& file);
 
-/// Loads the field that the argument `field` names, or keeps the current one. Throws `Error` where neither exists.
+/// Loads the field that the argument `field` names. Without this argument, keeps the current field. Throws
+/// `Error` if there is neither the argument nor a current field.
 void useField(Session& session, const Arguments& arguments);
 
 }  // namespace hpsdf::app

@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kBarCells = 40;
 
-/// Prints one row for each level: its share of the volume, its number of leaves, and a bar proportional to the
-/// share.
+/// Returns a table with one row for each level. A row shows the level's share of the volume, its number of
+/// leaves, and a bar proportional to the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
@@ -47,7 +47,8 @@ Json boundsJson(const Field& field) {
   return {{"median", bounds[bounds.size() / 2]}, {"greatest", bounds.back()}};
 }
 
-/// The value of a setting as a number, a word, true or false; null for a setting that has no value.
+/// Returns the value of a setting as JSON: a number, a word, true or false. Returns null for a setting that
+/// has no value.
 Json settingJson(const BuildSetting& setting, const BuildOptions& options) {
   const std::vector<double> numbers = setting.get(options);
   if (numbers.empty()) return {};
@@ -57,7 +58,7 @@ Json settingJson(const BuildSetting& setting, const BuildOptions& options) {
   return settingText(setting, options);
 }
 
-/// Adds the settings that a field stores, with underscores in their names.
+/// Adds the settings that a field file stores to the JSON object. In the keys, hyphens become underscores.
 void addSettings(Json& json, const BuildOptions& settings) {
   for (const BuildSetting& setting : buildSettings()) {
     if (setting.storedAt == 0) continue;
@@ -121,7 +122,8 @@ std::string fieldLine(const Field& field) {
                      field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
 }
 
-/// The settings that a field stores, except its target error: those whose values are words, or those with numbers.
+/// Returns the settings that a field file stores, except the target error, as text. If `ofWords` is true,
+/// these are only the settings whose values are words, and otherwise only those with numbers.
 std::string settingsText(const BuildOptions& settings, bool ofWords) {
   std::vector<std::string> parts;
   for (const BuildSetting& setting : buildSettings()) {

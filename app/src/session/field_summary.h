@@ -9,7 +9,8 @@
 
 namespace hpsdf::app {
 
-/// An object whose keys are degrees or depths.
+/// Converts values per level to a JSON object. The keys of the object are the levels, which are degrees or
+/// depths.
 template <typename Value>
 Json levelsJson(const std::map<int, Value>& levels) {
   Json json = Json::object();
@@ -17,13 +18,14 @@ Json levelsJson(const std::map<int, Value>& levels) {
   return json;
 }
 
-/// The median and the greatest of the leaves' error bounds; null where the field holds no bounds.
+/// Returns the median and the greatest of the leaves' error bounds as JSON. Returns null if the field holds
+/// no error bounds.
 Json boundsJson(const Field& field);
 
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);
 
-/// The unit of the estimated RMS error, in parentheses: mesh units or normalized units.
+/// Returns the unit of the estimated RMS error in parentheses: mesh units or normalized units.
 std::string unitText(const Field& field);
 
 /// Describes the size of a field: "54,935 leaves, 460,210 coefficients (float), 2.3 MB".

@@ -1,5 +1,5 @@
 #pragma once
-// The surface from which a field was made, for commands that compare the two.
+// The surface from which a field was made, for commands that compare the field with this surface.
 
 #include <string>
 #include <string_view>
@@ -10,18 +10,19 @@
 
 namespace hpsdf::app {
 
-/// Returns the parameter `mesh` of commands that compare a field with its surface.
+/// Returns the parameter `mesh`, which all commands that compare a field with its surface have.
 Parameter surfaceParameter();
 
-/// Returns the mesh file or shape from which a field was made. Throws `Error` where that is unknown; the message
-/// then asks for the argument `asked`.
+/// Returns the mesh file or shape from which the current field was made. If it is unknown, throws `Error`;
+/// the message then asks the user for the argument `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
-/// Returns the surface that the argument `mesh` names, else that of `surfaceOf`.
+/// Returns the surface that the argument `mesh` names. Without this argument, returns the result of
+/// `surfaceOf`.
 std::string surfaceFor(const CurrentField& current, const Arguments& arguments);
 
-/// Throws `Error` where the current field was made from another surface than `surface`, whose data is `reference`. The
-/// message ends with `otherwise`.
+/// Throws `Error` if the current field was not made from `surface`. `reference` holds the data of `surface`.
+/// The error message ends with the text `otherwise`.
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise = "");
 

@@ -19,14 +19,16 @@
 
 namespace hpsdf::app {
 
-/// An object that lives as long as the session and is notified when another field becomes the current one.
+/// An object that lives as long as the session. It is notified each time another field becomes the current
+/// field.
 class SessionExtension {
  public:
   virtual ~SessionExtension() = default;
   virtual void fieldChanged() = 0;
 };
 
-/// The state that lives from command to command: the current field, its renderer, and data that was computed for it.
+/// The state that is kept between commands: the current field, its renderer, and data that was computed for
+/// the field.
 class Session {
  public:
   Session(const Registry& registry, Console console);
@@ -36,51 +38,57 @@ class Session {
 
   const Registry& registry() const { return registry_; }
   const Console& console() const { return console_; }
-  /// Sets the observer of long work, which must outlive its use; null removes it.
+  /// Sets the observer of long work. The observer must outlive all work that the session does with it. Null
+  /// removes the observer.
   void setListener(WorkListener* listener) { console_.listener = listener; }
 
   bool wantsJson(const Arguments& arguments) const { return json_ || arguments.flag("json"); }
-  /// Sets whether all commands report as JSON and returns the previous setting.
+  /// Sets whether all commands write their reports as JSON. Returns the previous setting.
   bool setJson(bool json) { return std::exchange(json_, json); }
 
-  /// Number of scripts that run each other at present. `run` limits it, which ends scripts that run themselves.
+  /// Number of nested scripts that are running now. The command `run` limits this number, so that a script that
+  /// runs itself ends.
   int scriptDepth = 0;
 
   void setField(CurrentField field);
-  /// Replaces the current field by another form of it. The exact distance to its surface is kept.
+  /// Replaces the current field by another form of the same field. The exact distance to the field's surface is
+  /// kept.
   void changeField(CurrentField field);
   bool hasField() const { return field_ != nullptr; }
-  /// Throws `Error` where there is no field.
+  /// Returns the current field. Throws `Error` if the session has no field.
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);
 
-  /// Returns the jumps of the current field, which the first call measures. Throws `Cancelled` after Ctrl-C.
+  /// Returns the jumps of the current field. The first call measures them. Throws `Cancelled` after Ctrl-C.
   const Jumps& jumps();
   bool knowsJumps() const { return jumps_.has_value(); }
 
-  /// Returns the exact distance to `surface`. If `surface` is empty, the surface is the one from which the field was
-  /// made, if that is a shape or the field was built in this session, and otherwise the surface of the previous
-  /// call. The result is kept. Throws `Error` where no surface is known or it cannot be read.
+  /// Returns the exact distance to `surface` and keeps it for later calls. If `surface` is empty, the surface
+  /// is chosen as follows: the one from which the field was made, if that is a shape or if the field was built
+  /// in this session, and otherwise the surface of the previous call. Throws `Error` if no surface is known or
+  /// if the surface cannot be read.
   const DistanceFunction& exact(const std::string& surface);
-  /// True where `exact` can be called with an empty surface.
+  /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
 
-  /// Returns the last picture of the current field. Throws `Error` where none was drawn.
+  /// Returns the last picture of the current field. Throws `Error` if no picture has been drawn.
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
-  /// Records the description of the renderer of a picture that was not drawn by `renderer`.
+  /// Records the description of the renderer that drew the last picture. Needed if that renderer is not the one
+  /// that `renderer` returns.
   void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
-  /// Returns the extension, which the first call creates. All calls must ask for the same type.
+  /// Returns the session's extension. The first call creates it. All calls must use the same type `Extension`.
   template <typename Extension>
   Extension& extension() {
     if (!extension_) extension_ = std::make_unique<Extension>(*this);
     return static_cast<Extension&>(*extension_);
   }
 
-  /// A second field, with which the current one is compared. It is read from its file at first use and kept. Two are
-  /// kept at most: one that is shown beside the current field, and one whose difference from it is shown.
+  /// A second field, with which the current field is compared. A second field is read from its file at first
+  /// use and then kept. At most two second fields are kept: one whose picture is shown beside the current
+  /// field's, and one whose difference from the current field is shown.
   struct Other {
     std::string file;
     Field field;
@@ -90,23 +98,26 @@ class Session {
     Backend backend = {};
   };
   Other& other(const std::string& file);
-  /// Forgets the second fields whose files were modified, and returns whether there were any. A field whose file was
-  /// deleted is kept.
+  /// Drops those second fields whose files have been modified. Returns whether any were dropped. A second field
+  /// whose file was deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
-  /// Returns the data that a colouring needs: jumps, the exact distance to `surface` (see `exact`) for errors, or the
-  /// field of the file `other` for differences. The result is valid until the next call.
+  /// Returns the data that a colouring needs: the jumps, the exact distance to `surface` for errors (see
+  /// `exact`), or the field of the file `other` for differences. The returned data is valid until the next call
+  /// of `reference`.
   render::ReferenceData reference(render::ColorBy color, const std::string& surface, const std::string& other = "");
 
-  /// Returns the defects of the mesh `surface` in the units of the current field. "own" stands for the mesh from which
-  /// the field was made. The result is kept. Throws `Error` where the mesh is unknown or cannot be read.
+  /// Returns the defects of the mesh `surface`, in the units of the current field. The name "own" stands for
+  /// the mesh from which the current field was made. The defects are kept for later calls. Throws `Error` if
+  /// the mesh is unknown or cannot be read.
   const MeshDefects& defects(const std::string& surface);
 
-  /// Returns the renderer of the current field. It is kept, because its upload takes longer than most pictures.
+  /// Returns a renderer of the current field. The renderer is kept for later calls, because uploading the field
+  /// takes longer than drawing most pictures.
   render::Renderer& renderer(const Backend& backend);
-  /// Returns the description of the renderer that was used last; "" before its first use.
+  /// Returns the description of the renderer that was used last, or "" if no renderer has been used.
   const std::string& lastRenderer() const { return lastRenderer_; }
 
  private:

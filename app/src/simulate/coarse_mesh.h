@@ -4,10 +4,11 @@
 
 namespace hpsdf::app {
 
-/// Removes detail below `size` (0 or more, in the mesh's units) by vertex clustering (Rossignac and Borrel 1993): the
-/// vertices within one cube of that size are merged into their mean, and triangles with fewer than three different
-/// corners are removed. A vertex that is alone in its cube keeps its coordinates to the bit. A mesh that would lose all
-/// its triangles is returned as it is.
+/// Removes details smaller than `size` (0 or more, in the mesh's units) by vertex clustering (Rossignac and
+/// Borrel 1993). Space is divided into cubes with edges of length `size`. The vertices within one cube are
+/// merged into their mean, and triangles with fewer than three different corners are removed. A vertex that
+/// is alone in its cube keeps its coordinates exactly. If the mesh would lose all its triangles, it is
+/// returned unchanged.
 TriangleMesh coarse(const TriangleMesh& mesh, double size);
 
 }  // namespace hpsdf::app

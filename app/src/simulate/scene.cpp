@@ -22,7 +22,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Creates the folder if necessary.
+/// Creates the cache folder if it does not exist, and returns it. Throws `Error` if it cannot be created.
 const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -32,7 +32,8 @@ const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
   return folder;
 }
 
-/// Loads a field from the cache and checks that it belongs to the mesh with that fingerprint.
+/// Loads a field from a file of the cache. Throws `Error` unless the field belongs to the mesh with the
+/// fingerprint `print` and has this target error.
 Field cachedField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
   try {
     Field field = load(file);

@@ -1,6 +1,6 @@
 #pragma once
-// The scenes of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9): their bodies at the start, and those that are
-// dropped later.
+// The scenes of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9). A scene holds the bodies that are present
+// at the start, and the bodies that are dropped later.
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -17,7 +17,7 @@
 
 namespace hpsdf::app {
 
-/// The data that all bodies of one mesh share.
+/// The mesh, field and other data that all bodies of the same kind share.
 struct BodyKind {
   BodyKind(TriangleMesh bodyMesh, Field bodyField, std::size_t samples, double margin);
 
@@ -39,7 +39,7 @@ class Scene {
 
   physics::World& world() { return world_; }
   const physics::World& world() const { return world_; }
-  /// Adds the bodies whose time has come to the world. Called before each step.
+  /// Adds to the world those scheduled bodies whose time has come. Called before each simulation step.
   void admit();
 
   /// A body that is added to the world during the simulation.
@@ -55,26 +55,27 @@ class Scene {
   std::size_t lost() const;    ///< number of bodies, soft or rigid, with a part below `floor_`
   std::size_t moving() const;  ///< number of rigid bodies in the world that are not static
   std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
-  /// Length that penetration depths are compared with: a marble's radius, or the size of a body.
+  /// The length with which penetration depths are compared: the radius of a marble, or the size of a body.
   double bodySize() const { return bodySize_; }
 
  protected:
-  /// The mesh of a file or shape with z up. It is centred at the origin and scaled to a longest side of `size`, unless
-  /// that is 0. Warns of a mesh that is not closed. Throws `Error` naming a mesh that cannot be read or has no volume.
+  /// Loads the mesh of a file or shape, with z up. Unless `size` is 0, the mesh is centred at the origin and
+  /// scaled so that its longest side is `size`. Warns if the mesh is not closed. Throws `Error` naming the mesh
+  /// if it cannot be read or has no volume.
   TriangleMesh meshOf(const std::string& name, double size) const;
-  /// Adds a kind of body with the mesh's field, which is loaded from the cache's folder, or else built by the threads
-  /// of the caller's TBB arena and saved there. `samples` is the number of surface samples and `margin` the collision
-  /// margin in world units. Throws `Error` for a folder that cannot be used, and for a file in it that is another
-  /// field.
+  /// Adds a kind of body for the mesh. Its field is loaded from the cache folder. If the folder has no such
+  /// field, the threads of the caller's TBB arena build the field, and it is saved in the folder. `samples` is
+  /// the number of surface samples. `margin` is the collision margin in world units. Throws `Error` if the
+  /// folder cannot be used, or if the file in it holds another field.
   BodyKind& addKind(TriangleMesh mesh, std::size_t samples, double margin);
-  /// Adds a static body.
+  /// Adds a static body of this kind to the world.
   void addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
-  /// Adds a static plane at a height.
+  /// Adds a static horizontal plane at this height to the world.
   void addLevelGround(double height, double friction);
-  /// Schedules a body. Calls must come in ascending order of time.
+  /// Schedules a body to enter the world later. Calls must come in ascending order of `seconds`.
   void drop(Drop drop) { drops_.push_back(std::move(drop)); }
 
-  // These are declared before the world, which refers to them.
+  // The kinds and shapes are declared before the world, because the world refers to them.
   std::deque<BodyKind> kinds_;
   std::deque<std::unique_ptr<btCollisionShape>> shapes_;
   physics::World world_;
@@ -87,12 +88,13 @@ class Scene {
   Console console_;  ///< the streams that it refers to are used only while the scene is made
 };
 
-/// Makes the scene of that name. Throws `Error` naming a mesh or field that cannot be made.
+/// Makes the scene of this name. Throws `Error` naming the mesh or field that cannot be made.
 std::unique_ptr<Scene> makeScene(const Console& console, const std::string& name, const SceneRequest& request);
 
-/// A cylinder of 24 sides around the z axis, centred at the origin.
+/// Returns the mesh of a prism with 24 sides that approximates a cylinder around the z axis, centred at the
+/// origin.
 TriangleMesh poleMesh(double radius, double height);
-/// A box of these extents, centred at the origin.
+/// A mesh of a box with the edge lengths `size`, centred at the origin.
 TriangleMesh slabMesh(const Vector3& size);
 
 }  // namespace hpsdf::app

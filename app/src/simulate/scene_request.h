@@ -33,7 +33,7 @@ struct SceneKind {
   std::array<double, 2> view;  ///< default azimuth and elevation of the camera, degrees
 };
 
-/// The kinds of all scenes.
+/// Returns all kinds of scenes.
 std::span<const SceneKind> scenes();
 
 }  // namespace hpsdf::app

@@ -29,10 +29,10 @@ class Random {
 
   double within(double lo, double hi) { return lo + (hi - lo) * double(engine_() >> 11) * 0x1p-53; }
 
-  /// A point of a cube around the origin.
+  /// Returns a random point of the cube [-most, most]³.
   Vector3 jitter(double most) { return Vector3(within(-most, most), within(-most, most), within(-most, most)); }
 
-  /// A uniformly distributed rotation (Shoemake 1992).
+  /// Returns a uniformly distributed random rotation (Shoemake 1992).
   Eigen::Quaterniond rotation() {
     const double u = within(0, 1), a = within(0, 2 * std::numbers::pi), b = within(0, 2 * std::numbers::pi);
     const double s = std::sqrt(1 - u), c = std::sqrt(u);
@@ -43,8 +43,8 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// The centre of a marble of that radius that lies on a field's surface at (x, y). `name` is the field's, for the
-/// error.
+/// Returns the centre of a marble of this radius that rests on the field's surface at (x, y). Error messages
+/// call the field `name`.
 Vector3 restingPosition(const Field& field, const std::string& name, double x, double y, double radius) {
   Vector3 at(x, y, field.domain().max().z() + radius);
   for (int step = 0; step < 10000; ++step) {
@@ -57,8 +57,8 @@ Vector3 restingPosition(const Field& field, const std::string& name, double x, d
   return at;
 }
 
-/// Throws `Error` unless ground fits marbles of that radius: small ground has no room for them, and on large ground
-/// they become so fast that they pass through it within one step.
+/// Throws `Error` unless the size of the ground suits marbles of this radius. Small ground has no room for the
+/// marbles; on large ground they become so fast that they pass through the ground within one step.
 void requireFitting(const TriangleMesh& ground, const std::string& name, double radius) {
   constexpr double kLeast = 10, kMost = 400;  // least width and greatest extent, in radii
   const double width = boundingBox(ground).sizes().head<2>().minCoeff();
@@ -69,7 +69,7 @@ void requireFitting(const TriangleMesh& ground, const std::string& name, double 
                     name, width, boundingBox(ground).sizes().z(), radius, kLeast * radius, kMost * radius));
 }
 
-/// Marbles that fall onto ground that is open at the top.
+/// A scene in which marbles fall onto ground that is open at the top.
 class MarbleScene : public Scene {
  public:
   MarbleScene(const Console& console, const SceneRequest& request, double radius)
@@ -85,7 +85,8 @@ class MarbleScene : public Scene {
  protected:
   const Field& ground() const { return kinds_.front().field; }
 
-  /// The material of marbles in a pile: motion is damped, and a marble below a certain speed comes to rest.
+  /// Returns the material of marbles in a pile: their motion is damped, and marbles below a certain speed come to
+  /// rest.
   Material pileMaterial() const {
     return {.friction = 0.4,
             .rollingFriction = 0.02 * bodySize_,
@@ -94,7 +95,7 @@ class MarbleScene : public Scene {
             .restSpeed = 0.2};
   }
 
-  /// The material of a marble that rolls for a long time.
+  /// Returns the material of marbles that roll for a long time.
   Material rollingMaterial() const {
     return {.friction = 0.4,
             .rollingFriction = 0.002 * bodySize_,
@@ -103,7 +104,7 @@ class MarbleScene : public Scene {
             .restSpeed = 0};
   }
 
-  /// Schedules a marble of glass at a position.
+  /// Schedules a glass marble that appears at the position `at` after `seconds`.
   void dropMarble(double seconds, const Vector3& at, const Material& material) {
     constexpr double kDensity = 2500;
     const double mass = kDensity * 4 / 3 * std::numbers::pi * std::pow(bodySize_, 3);
@@ -111,7 +112,7 @@ class MarbleScene : public Scene {
   }
 };
 
-/// A bowl into which a layer of marbles falls every 0.2 s.
+/// A scene with a bowl into which a layer of marbles falls every 0.2 s.
 struct BowlScene final : MarbleScene {
   BowlScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.03) {
     const Box box = ground().domain();
@@ -134,13 +135,15 @@ struct BowlScene final : MarbleScene {
 
 struct HelixScene final : MarbleScene {
   HelixScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.035) {
-    // At this x the groove of three turns crosses the line y = 0, away from the edge of the bowl.
+    // Drop a marble every 2 s at x = 2/3 and y = 0. There the groove of three turns crosses the line y = 0, away
+    // from the edge of the bowl.
     for (std::size_t n = 0; n < request.bodies; ++n)
       dropMarble(2.0 * double(n), restingPosition(ground(), request.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
   }
 };
 
-/// A marble rolls down the run and then into a triangle of standing bodies, as in bowling.
+/// A scene in which a marble rolls down a marble run and then into a triangle of standing bodies, as in
+/// bowling.
 struct RunScene final : MarbleScene {
   RunScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.045) {
     const double table = boundingBox(kinds_.front().mesh).min().z() - 0.02;
@@ -165,7 +168,7 @@ struct RunScene final : MarbleScene {
   }
 };
 
-/// Bodies of the request's meshes, which fall onto poles, a slope or a table.
+/// A scene in which bodies, whose meshes the request names, fall onto poles, a slope or a table.
 class PileScene : public Scene {
  public:
   PileScene(const Console& console, const SceneRequest& request) : Scene(console, request), random_(request.seed) {
@@ -185,7 +188,7 @@ class PileScene : public Scene {
     return made;
   }
 
-  /// Schedules a body at a position, with a random orientation.
+  /// Schedules a body that appears at the position `at` after `seconds`, with a random orientation.
   void dropBody(BodyKind& kind, double seconds, const Vector3& at) {
     constexpr double kDensity = 1000;
     drop({seconds,
@@ -217,8 +220,8 @@ struct PolesScene final : PileScene {
   }
 };
 
-/// Makes Bullet solve contacts last. In Bullet's own order the links pull nodes into the bodies on which the nodes
-/// rest.
+/// Makes Bullet solve the contacts of a soft body after its links. In Bullet's own order the links pull nodes
+/// of the soft body into the bodies on which these nodes rest.
 void solveContactsLast(btSoftBody& body) {
   btAlignedObjectArray<btSoftBody::ePSolver::_>& sequence = body.m_cfg.m_psequence;
   sequence.resize(0);

@@ -7,7 +7,7 @@
 
 namespace hpsdf::app {
 
-/// A picture of a simulation.
+/// A picture of a simulation at one moment.
 struct SimulationShot {
   render::Drawn drawn;
   const Field& field;  ///< field of the traced surface, in whose coordinates the picture is; valid during `take`

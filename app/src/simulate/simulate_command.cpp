@@ -25,7 +25,7 @@ const SceneKind& kindOf(const Arguments& arguments) {
   return *std::ranges::find(scenes(), arguments.text("scene"), &SceneKind::name);
 }
 
-/// Throws `Error` for a parameter that was given although the scene does not take it.
+/// Throws `Error` if the parameter `name` was given although the scene does not use it.
 void requireTaken(const Arguments& arguments, const std::string& name, bool takes) {
   if (arguments.given(name) && !takes)
     throw Error(fmt::format("{}: the scene {} does not take it; leave it out", name, arguments.text("scene")));
@@ -146,7 +146,8 @@ SimulationFigures simulateAs(const Console& console, const Arguments& arguments,
                   camera);
 }
 
-/// The camera that the arguments describe, with the scene's direction and distance where they name none.
+/// Returns the camera that the arguments describe. If they do not give its direction or distance, those of the
+/// scene apply.
 SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
   render::SurfacePicture look = cameraPicture(arguments);
   const auto& [azimuth, elevation] = kindOf(arguments).view;
@@ -158,14 +159,15 @@ SimulationCamera cameraOf(const Arguments& arguments, std::function<void(Simulat
   return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
 }
 
-/// The figures of a simulation and the report of its pictures.
+/// The figures of a simulation and the report on the pictures that it drew.
 struct Outcome {
   SimulationFigures figures;
   Json pictures = {};     ///< null without pictures
   std::string line = {};  ///< empty without pictures
 };
 
-/// Draws the end of a simulation. The traced field becomes the session's current field.
+/// Runs a simulation and draws its final state. The field that the picture shows becomes the session's current
+/// field.
 Outcome runStill(Session& session, const Arguments& arguments, const SceneRequest& request) {
   const std::string file = arguments.text("output");
   checkWritable(file);
@@ -221,7 +223,8 @@ void runSimulate(Session& session, const Arguments& arguments) {
   printJson(console.out, json);
 }
 
-/// The camera parameters of `render`, with the meaning that camera and target have in simulations.
+/// Returns the camera parameters of the command `render`. The help of `camera` and `target` says what they mean
+/// in simulations.
 std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
   std::vector<Parameter> parameters = cameraParameters(registry);
   Parameter& camera = parameterNamed("camera", parameters);
@@ -235,7 +238,7 @@ std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
   return parameters;
 }
 
-/// The parameters of the scene and its bodies.
+/// Returns the parameters that describe a scene and its bodies.
 std::vector<Parameter> sceneParameters(const std::vector<std::string>& sceneNames) {
   return {
       {"scene", choice(sceneNames).positional().required(), "Which scene."},
@@ -253,7 +256,7 @@ std::vector<Parameter> sceneParameters(const std::vector<std::string>& sceneName
        "The axis that points up in mesh files. In shapes it is z."}};
 }
 
-/// The parameters of the fields and of the solver.
+/// Returns the parameters of the fields and of the physics solver.
 std::vector<Parameter> solverParameters() {
   return {
       {"target-error", number().above(0).under(setting_group::kAsked),

@@ -4,7 +4,7 @@
 
 namespace hpsdf::app {
 
-/// Adds `simulate`, which runs the scenes of the paper.
+/// Adds the command `simulate`, which runs the scenes of the paper.
 void addSimulateCommand(Registry& registry);
 
 }  // namespace hpsdf::app

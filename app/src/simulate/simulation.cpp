@@ -17,7 +17,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// A hash of the positions and orientations of all bodies.
+/// Returns a hash of the positions and orientations of all bodies in the world.
 std::uint64_t stateOf(const physics::World& world) {
   std::vector<double> state;
   const auto add = [&](const btVector3& v) { state.insert(state.end(), {v.x(), v.y(), v.z()}); };

@@ -14,7 +14,7 @@
 
 namespace hpsdf::app {
 
-/// Statistics of a number that is counted in every step.
+/// Statistics of a quantity that is counted once in every step of a simulation.
 struct CountPerStep {
   double sum = 0;
   std::size_t most = 0, last = 0;
@@ -26,15 +26,16 @@ struct CountPerStep {
   }
 };
 
-/// Figures of a whole simulation. Contacts are samples, spheres, and nodes of soft bodies that lie in a field.
+/// Figures of a whole simulation. A contact is a sample point, a sphere or a node of a soft body that lies in a
+/// field.
 struct SimulationFigures {
   std::size_t bodies = 0, nodes = 0;  ///< number of moving bodies and of nodes of soft bodies
   std::size_t waiting = 0;            ///< bodies that were never added
   std::size_t lost = 0;               ///< bodies below the floor at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< simulated time, seconds
-  /// Wall-clock times in seconds: of the preparation, of all steps, of all field queries, of the solver, and of the
-  /// field queries in the slowest step.
+  /// Wall-clock times in seconds: of setting up the simulation, of all steps, of all field queries, of the
+  /// physics solver, and of the field queries in the step that has the slowest queries.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
   CountPerStep penetrating, touching;  ///< contacts in fields, and contacts that the solver treats
   double size = 0;  ///< length that depths are compared with: a marble's radius, a body's size or a cloth's margin
@@ -43,18 +44,19 @@ struct SimulationFigures {
   std::uint64_t state = 0;  ///< hash of all positions at the end
 };
 
-/// Settings of a simulation's pictures, which do not influence the simulation.
+/// The camera that takes the pictures of a simulation. It does not influence the simulation.
 struct SimulationCamera {
-  /// Camera, size and samples. The camera's distance is a multiple of the distance at which the whole scene is just in
-  /// view. Without a target the camera looks at the scene's middle.
+  /// Camera, picture size and samples. The camera's distance is a multiple of the distance at which the whole
+  /// scene is just in view. A camera without a target looks at the middle of the scene.
   render::SurfacePicture look;
   Backend backend;
   double framesPerSecond = 0;  ///< frames per simulated second, from the start; 0 for one picture of the end
   std::function<void(SimulationShot)> take;  ///< called with each picture
 };
 
-/// Simulates a scene for `seconds` of simulated time and takes pictures if there is a camera. Throws `Error` for a
-/// scene that cannot be made or simulated, and in a program that was built without Bullet; `Cancelled` after Ctrl-C.
+/// Simulates a scene for `seconds` of simulated time and takes pictures if there is a camera. Throws `Error`
+/// for a scene that cannot be made or simulated, and if the program was built without Bullet. Throws
+/// `Cancelled` after Ctrl-C.
 SimulationFigures simulate(const Console& console, const std::string& scene, const SceneRequest& request,
                            double seconds, int threads, const SimulationCamera* camera = nullptr);
 

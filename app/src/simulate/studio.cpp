@@ -29,8 +29,8 @@ const BodyKind& kindOf(const Scene& scene, const physics::FieldShape& shape) {
   return *std::ranges::find(scene.kinds(), &shape, [](const BodyKind& kind) { return &kind.shape; });
 }
 
-/// Calls visit(shape, worldFromBody) for the rigid bodies in the world and, at their initial positions, for those
-/// to be added.
+/// Calls visit(shape, worldFromBody) for every rigid body in the world. Then does so for every rigid body that
+/// is still to be added, with its initial position.
 template <typename Visit>
 void forEachRigid(const Scene& scene, const Visit& visit) {
   const physics::World& world = scene.world();
@@ -62,21 +62,23 @@ Box boxAround(std::span<const Vector3> points) {
 
 TriangleMesh sphereMesh(double radius) { return shapes::mesh(fmt::format("sphere,radius={},subdivisions=3", radius)); }
 
-/// The frame of a plane: the plane is z = 0, its outside is z > 0, and the origin is the foot of `point`.
+/// Returns the transform from a frame in which the plane is z = 0 and its outside is z > 0. The frame's origin
+/// is the perpendicular projection of `point` onto the plane.
 Eigen::Isometry3d planeAt(const btStaticPlaneShape& shape, const Vector3& point) {
   const Vector3 normal = physics::fromBullet(shape.getPlaneNormal());
   const Vector3 foot = point - (normal.dot(point) - shape.getPlaneConstant()) * normal;
   return Eigen::Translation3d(foot) * Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), normal);
 }
 
-/// A slab with its upper side at z = 0.
+/// Returns a square slab whose upper side lies at z = 0.
 TriangleMesh levelGround(double side) {
   TriangleMesh mesh = slabMesh({side, side, 0.01 * side});
   for (Vector3& x : mesh.vertices) x.z() -= 0.005 * side;
   return mesh;
 }
 
-/// Points of a shape, in the body's frame: if they are in view, the whole body is. Level ground has no points.
+/// Returns points of a shape, in the body's frame. If these points are in view, the whole body is in view.
+/// Level ground has no points.
 std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape) {
   constexpr double kDetail = 1.0 / 16;  // in longest sides of the mesh; fine enough for an outline
   std::vector<Vector3> points;
@@ -91,7 +93,8 @@ std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape
   return points;
 }
 
-/// Adds the box's corners projected onto level ground, with a border, because bodies spread when they land on it.
+/// Adds the corners of the enlarged box, projected onto the plane, to `points`. The box is enlarged because
+/// bodies spread when they land on the plane.
 void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<Vector3>& points) {
   constexpr double kSpread = 1.25;
   for (int corner = 0; corner < 8; ++corner) {
@@ -100,7 +103,7 @@ void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<V
   }
 }
 
-/// The outlines of all bodies of a scene, in world coordinates.
+/// Returns the outlines of all bodies of a scene, in world coordinates.
 std::vector<Vector3> outlineOf(const Scene& scene) {
   std::map<const btCollisionShape*, std::vector<Vector3>> outlines;
   std::vector<Vector3> points;
@@ -123,13 +126,13 @@ render::Camera cameraOf(const render::SurfacePicture& look, const Box& domain) {
   return render::cameraOf(look.camera, domain, size.width, size.height);
 }
 
-/// Aims a camera that has a direction, and perhaps a target, at the points. The camera's distance is a multiple of the
-/// distance from which all points are just in view; it is converted to diagonals of the domain. Without a target the
-/// camera looks at the middle of the points.
+/// Aims the camera of `look`, which has a direction and perhaps a target, at the points. The camera's distance
+/// is given as a multiple of the distance from which all points are just in view. It is converted to diagonals
+/// of the domain. A camera without a target looks at the middle of the points.
 ///
-/// Let s be a point's coordinate along the picture's width or height, in units of half the view's extent at distance 1,
-/// and z its coordinate towards the eye. A point is in view if |s - s_eye| ≤ z_eye - z, or, with parallel rays, if
-/// |s - s_eye| ≤ distance.
+/// Let s be a point's coordinate along the picture's width or height, in units of half the view's extent at
+/// distance 1, and z the point's coordinate towards the eye. A point is in view if |s - s_eye| ≤ z_eye - z, or,
+/// with parallel rays, if |s - s_eye| ≤ distance.
 void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Box& domain) {
   constexpr double kBorder = 1.04;
   const bool parallel = look.camera.projection == render::Projection::orthographic;
@@ -155,7 +158,8 @@ void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Bo
   look.camera.distance *= kBorder * distance / domain.diagonal().norm();
 }
 
-/// The extent of a pixel at the point of the box that is nearest to the eye, world units; 0 if the eye is in the box.
+/// Returns the extent of a pixel, in world units, at the point of `box` that is nearest to the eye. It is 0 if
+/// the eye is in the box.
 double finestDetail(const render::SurfacePicture& look, const Box& box, const Box& domain) {
   const render::Camera camera = cameraOf(look, domain);
   double nearest = std::numeric_limits<double>::infinity();
@@ -193,7 +197,7 @@ Studio::Ground Studio::groundOf(const Scene& scene) {
   throw std::logic_error("the scene has no static body whose field can be traced");
 }
 
-/// Aims the camera and makes the meshes, whose detail depends on the camera.
+/// Aims the camera and makes the meshes of the bodies. The detail of the meshes depends on the camera.
 std::vector<TriangleMesh> Studio::makeModels() {
   std::vector<Vector3> outline = outlineOf(scene_);
   const Box extent = boxAround(outline);

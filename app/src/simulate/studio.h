@@ -1,5 +1,5 @@
 #pragma once
-// Draws the pictures of a simulation.
+// Draws pictures of a simulation.
 
 #include <cstdint>
 #include <map>
@@ -15,26 +15,26 @@
 
 namespace hpsdf::app {
 
-/// Draws the present state of a scene. One field's surface is traced: that of the first static body whose
-/// transform is a pure translation. The pictures are in the coordinates of this field. All other bodies are drawn
-/// as meshes, without detail below the size of a pixel.
+/// Draws the present state of a scene. One body is drawn by tracing rays to its field's surface: the first
+/// static body whose field is only translated, not rotated. The pictures are in the coordinates of its field.
+/// All other bodies are drawn as meshes, without detail below the size of a pixel.
 class Studio {
  public:
-  /// `look` as in `SimulationCamera`. The camera is aimed once, at all bodies of the scene and those that are still to
-  /// be added. Throws `Error` when no renderer is available.
+  /// `look` is that of `SimulationCamera`. The camera is aimed only once, at all bodies of the scene, including
+  /// those that are still to be added. Throws `Error` if no renderer is available.
   Studio(const Scene& scene, std::string name, render::SurfacePicture look, const Backend& backend);
 
-  /// A picture of the scene as it is now.
+  /// Draws a picture of the present state of the scene.
   SimulationShot shot();
 
  private:
-  /// The body whose field is traced.
+  /// The body that is drawn by tracing rays to its field's surface.
   struct Ground {
     std::size_t body;  ///< index in the world
     const Field* field;
     Eigen::Isometry3d fieldFromWorld;  ///< a translation, so that z stays up
   };
-  /// The mesh that is drawn for a collision shape.
+  /// The mesh that represents a collision shape in pictures.
   struct Model {
     std::uint32_t mesh;  ///< index in the body renderer
     Eigen::Isometry3d bodyFromMesh;

@@ -13,13 +13,13 @@
 namespace hpsdf::app {
 namespace {
 
-/// The list of all kinds of studies: a new kind is added to the command here alone.
+/// Returns all kinds of studies. To add a kind to the command `study`, add it to this list.
 const std::vector<Study>& studies() {
   static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy()};
   return list;
 }
 
-/// Returns nullptr where the study takes none of that name.
+/// Returns the study's parameter `name`, or nullptr if the study has no such parameter.
 const Parameter* parameterOf(const Study& study, const std::string& name) {
   const auto found = std::ranges::find(study.parameters, name, &Parameter::name);
   return found == study.parameters.end() ? nullptr : &*found;
@@ -42,8 +42,8 @@ const Study& studyOf(const Arguments& arguments) {
   return *std::ranges::find(studies(), arguments.text("kind"), &Study::name);
 }
 
-/// The parameters of all kinds, each once. A parameter whose default depends on the kind has no default here: see
-/// `buildArguments`.
+/// Returns the parameters of all kinds of studies, each parameter once. A parameter whose default differs
+/// between the kinds has no default here: see `buildArguments`.
 std::vector<Parameter> kindParameters() {
   std::vector<Parameter> all;
   for (const Study& study : studies())

@@ -1,5 +1,6 @@
 #pragma once
-// Studies: they build fields of several meshes and write tables and pictures about them into a folder.
+// Studies: commands that build fields of several meshes and write tables and pictures of the fields into a
+// folder.
 
 #include <cstddef>
 #include <string>
@@ -12,10 +13,10 @@
 
 namespace hpsdf::app {
 
-/// Adds `study`.
+/// Adds the command `study`.
 void addStudyCommand(Registry& registry);
 
-/// A kind of study: `hpsdf study NAME MESH…`.
+/// A kind of study, which users run by `hpsdf study NAME MESH…`.
 struct Study {
   std::string name = {};
   std::string help = {};                   ///< one paragraph
@@ -27,26 +28,29 @@ Study convergenceStudy();
 Study tableStudy();
 Study continuityStudy();
 
-/// The parameters of `build` except those named. Each, except flags, may be given once for all meshes or once for
-/// each.
+/// Returns the parameters of the command `build` except those in `names`. Each returned parameter, unless it is
+/// a flag, may be given once for all meshes or once for each mesh.
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);
 
-/// The parameters of the points at which errors are measured: their number and the seed of their positions.
+/// Returns the parameters of the random points at which errors are measured: the number of points and the seed.
 std::vector<Parameter> samplingParameters();
 
-/// Exact distances at such points, all within `near` of the surface unless that is 0.
+/// Returns random points with their exact distances. If `near` is not 0, all points lie within `near` of the
+/// surface.
 ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
                           const Box& domain, int threads, double near = 0);
 
-/// The arguments of `build` for the mesh of that index. A parameter that is given once for each mesh has the value
-/// at the same index. Throws `Error` for a parameter that is given any other number of times.
+/// Returns the arguments of `build` for the mesh with this index. A parameter that is given once for each mesh
+/// takes the value with the same index. Throws `Error` for a parameter that is given neither once nor once for
+/// each mesh.
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh);
 
-/// A different file name for each mesh. Throws `Error` where `buildArguments` would do so for one of them, so that
-/// mistakes are reported before the long work.
+/// Returns a different file name for each mesh. Throws `Error` if `buildArguments` would throw for any of the
+/// meshes, so that mistakes are reported before the long work.
 std::vector<std::string> checkedNames(const Session& session, const Arguments& arguments);
 
-/// The values of an object as one line of a table. Texts stand in quotes, because the names of shapes contain commas.
+/// Returns the values of a JSON object as one line of a table. Texts are quoted, because the names of shapes
+/// contain commas.
 std::string rowText(const Json& row, const char* separator = ",");
 
 }  // namespace hpsdf::app

@@ -22,10 +22,10 @@
 namespace hpsdf::app {
 namespace {
 
-/// Width of the region near the surface, as a share of the domain's longest edge.
+/// Width of the region near the surface, as a fraction of the domain's longest edge.
 constexpr double kNear = 0.01;
 
-/// Measures the fields of one mesh.
+/// Measures the continuity of the fields of one mesh.
 class ContinuityStudy {
  public:
   ContinuityStudy(Session& session, const Arguments& arguments, std::size_t mesh)
@@ -36,8 +36,8 @@ class ContinuityStudy {
         uniform_(samples(0)),
         near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
-  /// Adds one row for each field: its figures, each with the ratio to that of the mesh's first field, which is neither
-  /// enriched nor smoothed.
+  /// Adds one row to `rows` for each field of the mesh. Jumps, errors and bytes also get a ratio to the same
+  /// figure of the mesh's first field, which is neither enriched nor smoothed.
   void addRows(Json& rows) {
     for (const bool enriched : {false, true}) {
       BuildOptions options = input_.options;
@@ -62,7 +62,7 @@ class ContinuityStudy {
     return exactSamples(console_, arguments_, *input_.exact, input_.domain, input_.options.threads, near);
   }
 
-  /// `weight` is null for a field that is not smoothed.
+  /// Measures a field and returns its row of the table. `weight` is null for a field that is not smoothed.
   Json rowOf(const Field& field, bool enriched, const Json& weight, int iterations, double seconds,
              double buildSeconds) {
     Json row = {{"mesh", mesh_}, {"enriched", enriched}, {"weight", weight}};
@@ -94,7 +94,7 @@ class ContinuityStudy {
   Json first_;  ///< the mesh's first row; null before
 };
 
-/// A CSV table of the rows. It leaves the time of the construction out.
+/// Returns the rows as a CSV table, without the column of construction times.
 std::string csv(Json rows) {
   std::string head, body;
   for (Json& row : rows) {

@@ -32,11 +32,12 @@ namespace fs = std::filesystem;
 
 constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
 
-/// Thrown to end a construction that has enough coefficients.
+/// Thrown to end a construction when its field has enough coefficients.
 struct LargeEnough {};
 
-/// The numbers of steps at which the field is inspected: 0, then a geometric sequence with the ratio `growth`. Steps
-/// add different numbers of coefficients, so that more fields are inspected than become stages.
+/// Returns the numbers of construction steps after which the field is inspected: 0, then a geometric sequence
+/// with the ratio `growth`. Different steps add different numbers of coefficients. Therefore more fields are
+/// inspected than are recorded as stages of the curve.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
       double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients of one step
@@ -47,7 +48,8 @@ std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficient
   return steps;
 }
 
-/// The figures of a field during its construction. Errors are scaled to a mesh with a longest side of 2.
+/// Returns the figures of a field during its construction. Errors are converted to a scale at which the longest
+/// side of the mesh is 2.
 Json stageOf(const Field& field, const ExactSamples& samples, int threads) {
   const double scale = field.metadata().referenceLength / 2;
   const FieldStatistics figures = statistics(field);
@@ -58,7 +60,8 @@ Json stageOf(const Field& field, const ExactSamples& samples, int threads) {
       {"measured_rms", error.rms / scale},    {"measured_max", error.max / scale}};
 }
 
-/// The stages of a construction, by ascending number of coefficients.
+/// Builds a field by this strategy. Returns the stages of its construction, in ascending order of the number of
+/// coefficients.
 Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& samples, const Arguments& arguments,
              const Progress& progress) {
   const double growth = std::pow(10, 1 / arguments.number("stages"));
@@ -89,7 +92,7 @@ Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sam
   return stages;
 }
 
-/// The smallest measured RMS error that all curves reach.
+/// Returns the smallest measured RMS error that all curves reach.
 double commonRms(const Json& curves) {
   double common = 0;
   for (const Json& stages : curves) {
@@ -100,8 +103,8 @@ double commonRms(const Json& curves) {
   return common;
 }
 
-/// The number of coefficients at which a curve has a measured RMS error, interpolated linearly in logarithms.
-/// Empty if the curve does not reach the error, or starts below it.
+/// Returns the number of coefficients at which a curve reaches the measured RMS error `rms`, interpolated
+/// linearly in logarithms. Returns std::nullopt if the curve does not reach this error or starts below it.
 std::optional<double> coefficientsAt(const Json& stages, double rms) {
   for (std::size_t n = 0; n < stages.size(); ++n) {
     const double rmsAfter = numberIn(stages[n], "measured_rms"), after = numberIn(stages[n], "coefficients");
@@ -115,7 +118,7 @@ std::optional<double> coefficientsAt(const Json& stages, double rms) {
   return std::nullopt;
 }
 
-/// The numbers of coefficients with which the curves have the same error.
+/// Returns, for each curve, the number of coefficients at which the curve reaches the RMS error `rms`.
 Json equalError(const Json& curves, double rms) {
   Json json = {{"measured_rms", rms}};
   const auto ofHp = coefficientsAt(curves.front(), rms);
@@ -127,7 +130,8 @@ Json equalError(const Json& curves, double rms) {
   return json;
 }
 
-/// The curves of a mesh, and the comparison between them; `name` is its name for files.
+/// Returns the convergence curves of one mesh and the comparison of these curves. `name` stands for the mesh in
+/// file names.
 Json studied(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
   const std::string surface = arguments.texts("mesh")[mesh];
   const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
@@ -173,7 +177,8 @@ std::string textOf(const Json& mesh) {
   return text;
 }
 
-/// The gnuplot script that draws a mesh's curves. The data of the n-th curve are the n-th block of plot.dat.
+/// Returns the gnuplot script that draws the curves of a mesh. The data of the n-th curve are the n-th block of
+/// the file plot.dat.
 std::string plotScript(const Json& mesh) {
   std::string script = fmt::format(
       "set terminal pngcairo size 900,560 font \"DejaVu Sans,11\" background \"#fbfbf8\"\n"
@@ -259,7 +264,8 @@ void runConvergence(Session& session, const Arguments& arguments) {
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
 }
 
-/// The parameters of `build`, with a nearness of 0, because the paper's curves show unweighted errors.
+/// Returns the parameters of `build` with the default 0 for nearness, because the paper's curves show
+/// unweighted errors.
 std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
   std::vector<std::string> left =

@@ -35,7 +35,8 @@ constexpr int kBarHeight = 18;
 using Shares = std::map<int, double>;
 using Colors = std::map<int, render::Color>;
 
-/// A number of each cell, which bars and slices show by colours.
+/// A property of the cells, such as their degree, that pictures show by colours. Each of its values is called a
+/// level.
 struct Level {
   render::ColorBy color;
   const char *name, *title;
@@ -44,14 +45,15 @@ struct Level {
 constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
                                 Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
 
-/// A slice through the middle of the domain, and a bar that shows the shares of the volume in the same colours.
+/// A picture of a slice through the middle of the domain, and a bar that shows, in the same colours, the share
+/// of the volume that each level takes.
 struct LevelPicture {
   std::string png = {};  ///< bytes of the slice's file
   std::string svg = {};  ///< the bar
   Colors colors = {};    ///< of the levels of all rows
 };
 
-/// A mesh and its field.
+/// A mesh and its field, which make one row of the table.
 struct TableRow {
   std::string mesh;
   std::string name;  ///< name for files
@@ -76,8 +78,9 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
   return {surface, name, std::move(built.field), std::move(figures), built.seconds, std::move(error)};
 }
 
-/// A row of rectangles in the colours of levels, each as wide as its share. They contain the level's number where there
-/// is room, and tell it, with the share if asked, where the pointer rests on them.
+/// Returns an SVG bar: one rectangle for each level, in the level's colour and as wide as its share. A
+/// rectangle contains the number of its level if there is room. Its tooltip shows the number and, if
+/// `tellsShares`, the share.
 std::string sharesSvg(int width, const Shares& shares, const Colors& colors, bool tellsShares) {
   std::string parts;
   double from = 0;
@@ -99,7 +102,7 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
       width, kBarHeight, parts);
 }
 
-/// The key to the colours of all levels.
+/// Returns an SVG legend of the colours of all levels.
 std::string legendSvg(const Colors& colors) {
   constexpr int kWidth = 26;
   Shares equal;
@@ -144,7 +147,7 @@ std::string gridText(const TableRow& row) {
   return x == y && y == z ? fmt::format("{}³", x) : fmt::format("{}×{}×{}", x, y, z);
 }
 
-/// The names and values of a row's figures, in the order of the paper's table.
+/// Returns the names and values of the figures of a row, in the order of the paper's table.
 std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
   const FieldMetadata& metadata = row.field.metadata();
   const bool isMesh = metadata.source.faces > 0;

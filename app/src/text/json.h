@@ -11,11 +11,12 @@ namespace hpsdf::app {
 
 using Json = nlohmann::ordered_json;
 
-/// Indented JSON and a newline. Bytes that are not UTF-8, which names of files may contain, are replaced.
+/// Returns indented JSON that ends with a newline. Bytes that are not UTF-8, which file names may contain, are
+/// replaced.
 std::string jsonText(const Json& json);
 void printJson(std::ostream& out, const Json& json);
 
-/// The number of that name in an object.
+/// Returns the number that an object holds under this name.
 inline double numberIn(const Json& object, const char* name) { return object.at(name).get<double>(); }
 
 Json vectorJson(const Vector3& v);

@@ -1,5 +1,5 @@
 #pragma once
-// Formats numbers, names and points for people.
+// Formats numbers, names and points for human readers.
 
 #include <array>
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace hpsdf::app {
 
-/// isDigit is true for the ASCII digits, isLetter for the ASCII letters and _. Unlike the functions of <cctype>,
-/// they do not depend on the locale.
+/// isDigit tells whether a character is an ASCII digit, isLetter whether it is an ASCII letter or an
+/// underscore. Unlike the functions of <cctype>, both are independent of the locale.
 constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
@@ -23,30 +23,31 @@ std::string colorText(const std::array<std::uint8_t, 3>& color);
 /// Separates thousands by commas: 1234567 becomes "1,234,567".
 std::string grouped(std::uint64_t number);
 
-/// Chooses the singular or the plural: "1 face", "1,234 faces".
+/// Writes a count with its noun, in the singular or the plural: "1 face", "1,234 faces".
 std::string countOf(std::size_t count, std::string_view one, std::string_view many);
 
-/// Writes three significant digits, with an exponent where that is shorter: 1e-6, 3.06e-4, 0.125.
+/// Writes a number with three significant digits, with an exponent if that is shorter: 1e-6, 3.06e-4, 0.125.
 std::string shortNumber(double number);
 
 /// Writes a point as "(0.1, 0.2, 0.3)".
 std::string vectorText(const Vector3& v);
 
-/// Writes a point of `box` with extra digits where the box is small compared with its distance from the origin.
+/// Writes a point of `box` as "(0.1, 0.2, 0.3)". Uses extra digits if the box is small compared with its
+/// distance from the origin.
 std::string vectorText(const Vector3& v, const Box& box);
 
-/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with digits as in `vectorText` for a box.
+/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with as many digits as `vectorText` uses for points of this box.
 std::string boxText(const Box& box);
 
-/// Derives a name for files and commands from a mesh file or a shape: "bunny" for bunny.obj, "torus" for
-/// builtin:torus,major=0.7. It consists of letters, digits, '.', '-' and '_'.
+/// Derives a name for files and commands from the name of a mesh file or a shape: "bunny" from bunny.obj,
+/// "torus" from builtin:torus,major=0.7. The derived name consists of letters, digits, '.', '-' and '_'.
 std::string plainName(const std::string& source);
 
-/// Quotes a word for a shell where it contains characters that a shell would interpret.
+/// Returns a word, quoted for a shell if it contains characters that a shell would interpret.
 std::string shellWord(const std::string& word);
 
-/// Replaces control characters by blanks, so that text from other people's files can neither break a line nor control
-/// the terminal.
+/// Replaces control characters by blanks, so that text from untrusted files can neither break a line nor
+/// control the terminal.
 std::string printable(std::string_view text);
 
 /// Formats one indented line of a summary: a label and its value.

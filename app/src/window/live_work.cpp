@@ -46,7 +46,8 @@ void LiveWork::refreshWhenDue() {
     if (!reported_) return;
     explorer_.work = reported_;
   }
-  // Only commands can be cancelled: a measurement for the frame itself would be started again by the next frame.
+  // Let users cancel the work only while a command runs. A measurement for the frame itself would be started
+  // again by the next frame.
   explorer_.work->cancellable = explorer_.running();
   refreshing_ = true;
   refresh_();

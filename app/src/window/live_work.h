@@ -1,5 +1,5 @@
 #pragma once
-// Long work in the explorer: the panels show its progress, and a person can cancel it.
+// Long work in the explorer: the panels show the progress of the work, and users can cancel it.
 
 #include <atomic>
 #include <chrono>
@@ -13,8 +13,9 @@
 
 namespace hpsdf::app {
 
-/// Listens to the session's long work during its lifetime. While work runs in the thread that made this object, it
-/// calls `refresh` about every 50 ms, which must pass input events to `Explorer::input` and show a frame.
+/// Listens to the session's long work during the lifetime of this object. While work runs in the thread that
+/// made this object, `refresh` is called about every 50 ms. `refresh` must pass input events to
+/// `Explorer::input` and show a frame.
 class LiveWork : public WorkListener {
  public:
   LiveWork(Explorer& explorer, std::function<void()> refresh);

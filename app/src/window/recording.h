@@ -1,5 +1,5 @@
 #pragma once
-// Records what a person does in the explorer as a script that repeats it.
+// Records what a user does in the explorer as a script that repeats these actions.
 
 #include <string>
 #include <vector>
@@ -8,16 +8,18 @@
 
 namespace hpsdf::app {
 
-/// Records the lines that the explorer runs during its lifetime. It uses the explorer's `onCommand`.
+/// Records the command lines that the explorer runs during the lifetime of this object. It sets the explorer's
+/// `onCommand`.
 class Recording {
  public:
-  /// `lines` have run before and begin the script.
+  /// `lines` are command lines that have run already. They begin the recorded script.
   Recording(Explorer& explorer, std::vector<std::string> lines);
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  /// Adds a line that moves the pointer to its present position, on which highlights and the readout depend.
+  /// Adds a line that moves the pointer to its present position, because highlights and the readout depend on the
+  /// pointer.
   void notePointer();
 
   std::size_t lines() const { return lines_.size(); }

@@ -29,7 +29,7 @@ constexpr double kRestSeconds = 0.06;    // time without an event after which a 
 constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // pixels, the range of `show size`
 
-/// The reason of GLFW's last error.
+/// Returns the description of GLFW's last error.
 std::string glfwProblem() {
   const char* description = nullptr;
   glfwGetError(&description);
@@ -38,7 +38,7 @@ std::string glfwProblem() {
   return text;
 }
 
-/// Initializes GLFW during its lifetime.
+/// Keeps GLFW initialized during the lifetime of this object.
 class Desktop {
  public:
   Desktop() {
@@ -53,8 +53,8 @@ class Desktop {
   Desktop& operator=(const Desktop&) = delete;
 };
 
-/// A window with an OpenGL context of its own. The context is current only while `show` runs, because the renderer
-/// draws in another one.
+/// A window with an OpenGL context of its own. This context is current only while `show` runs, because the
+/// renderer draws in another OpenGL context.
 class Screen {
  public:
   Screen(int width, int height, const std::string& title) {
@@ -72,7 +72,7 @@ class Screen {
 
   GLFWwindow* window() const { return window_; }
 
-  /// The window's size in pixels; nothing while it is minimized.
+  /// Returns the window's size in pixels, or std::nullopt if the window is minimized.
   std::optional<std::array<int, 2>> size() const {
     std::array<int, 2> size{};
     glfwGetFramebufferSize(window_, &size[0], &size[1]);
@@ -117,7 +117,8 @@ void appendUtf8(std::string& text, unsigned code) {
   for (int i = more - 1; i >= 0; --i) add(0x80 | (code >> 6 * i & 0x3f));
 }
 
-/// The key by its function, or by the letter on it in the present keyboard layout.
+/// Returns the key that GLFW's code stands for: a special key such as Enter, or the letter on the key in the
+/// present keyboard layout. Returns std::nullopt for an unknown key.
 std::optional<Key> keyOf(int key, int scancode) {
   struct Code {
     int code;
@@ -133,14 +134,15 @@ std::optional<Key> keyOf(int key, int scancode) {
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// An error message without its position: the script that holds a widget's line is unknown to users.
+/// Removes the script position from the beginning of an error message. Users do not know the internal script in
+/// which a widget's command line stands.
 std::string withoutPosition(std::string message) {
   for (const std::string_view script : {"panel:1:", "rebuild:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
   return message;
 }
 
-/// The first of the names hpsdf-0001.png, hpsdf-0002.png, … that no file has yet.
+/// Returns the first of the names hpsdf-0001.png, hpsdf-0002.png, … for which no file exists.
 std::string freeShotName() {
   for (int number = 1;; ++number) {
     std::string name = fmt::format("hpsdf-{:04}.png", number);
@@ -170,7 +172,7 @@ class Window {
     }
   }
 
-  /// The last frame, which the recorded script ends with.
+  /// Ends the recording and draws the last frame, with which the recorded script ends.
   render::Image finish() {
     endGestures();
     return frame(1);
@@ -212,7 +214,7 @@ class Window {
     return false;
   }
 
-  /// Converts a pointer position from the desktop's units into pixels of the frame.
+  /// Handles a movement of the pointer. Converts its position from the desktop's units into pixels of the frame.
   void moved(double x, double y) {
     int width = 0, height = 0;
     glfwGetWindowSize(screen_.window(), &width, &height);
@@ -221,7 +223,7 @@ class Window {
     move({x * view.width / width, y * view.height / height});
   }
 
-  /// Adds a movement of the pointer; it replaces one that has not been handled yet.
+  /// Adds a movement of the pointer to the waiting events. It replaces an earlier movement that still waits.
   void move(const std::array<double, 2>& at) {
     if (!events_.empty() && events_.back() && events_.back()->kind == Input::Kind::move) events_.pop_back();
     events_.push_back(Input{.kind = Input::Kind::move, .at = at});
@@ -247,7 +249,7 @@ class Window {
           Input{.kind = Input::Kind::key, .key = *known, .control = control, .shift = (mods & GLFW_MOD_SHIFT) != 0});
   }
 
-  /// Handles all waiting events. Returns false if there were none.
+  /// Handles all waiting input events. Returns false if no event was waiting.
   bool takeEvents() {
     bool happened = std::exchange(damaged_, false);
     const auto size = screen_.size();
@@ -267,7 +269,7 @@ class Window {
     return happened;
   }
 
-  /// Passes an event to the explorer, with the desktop's clipboard in both directions.
+  /// Passes an input event to the explorer. Text can be pasted from the desktop's clipboard and copied to it.
   void take(const Input& event) {
     if (event.kind == Input::Kind::key && event.control && event.key == Key::v) {
       const char* text = glfwGetClipboardString(screen_.window());
@@ -285,7 +287,7 @@ class Window {
     explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
   }
 
-  /// Runs an action and shows its error, so that the window stays open.
+  /// Runs an action. If the action throws, shows the error in the window, which stays open.
   template <typename Action>
   void attempt(const Action& action) {
     try {
@@ -297,7 +299,7 @@ class Window {
     }
   }
 
-  /// Draws a frame. Undoes changes of the view until the picture can be drawn.
+  /// Draws a frame and returns it. If the picture cannot be drawn, undoes changes of the view until it can.
   render::Image frame(int shrink) {
     for (;;) {
       try {
@@ -310,7 +312,7 @@ class Window {
     }
   }
 
-  /// Draws and shows a frame. `roughly` draws a picture that takes too long with fewer pixels.
+  /// Draws and shows a frame. If `roughly` is true and the picture takes too long, it is drawn with fewer pixels.
   void draw(bool roughly) {
     const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
@@ -321,7 +323,7 @@ class Window {
     screen_.show(image);
   }
 
-  /// Handles events and shows a frame during long work. Screenshots wait until the work has ended.
+  /// Handles input events and shows a frame while long work runs. Screenshots wait until the work has ended.
   void refresh() {
     glfwPollEvents();
     std::deque<std::optional<Input>> later;
@@ -338,7 +340,8 @@ class Window {
     screen_.show(explorer_.frame());
   }
 
-  /// Ends gestures and records the pointer, so that the recording leads to the present frame.
+  /// Ends the user's gestures and records the pointer's position, so that the recording leads to the present
+  /// frame.
   void endGestures() {
     attempt([&] { explorer_.releaseInput(); });  // a released slider may start work
     frame(1);                                    // undoes a view that cannot be drawn, in the recording too
@@ -346,7 +349,7 @@ class Window {
     recording_.notePointer();
   }
 
-  /// Writes the frame under the next free name.
+  /// Writes the frame to a file under the next unused name.
   void shoot() {
     endGestures();
     attempt([&] {
@@ -380,7 +383,8 @@ std::size_t showWindow(Session& session, const WindowOptions& options) {
     const render::Image last = window.finish();
     if (options.shot) savePng(last, *options.shot);
   } catch (const Cancelled&) {
-    // The window was closed during a measurement for the first frame, so that there is no frame.
+    // `Cancelled` is not an error here: the user closed the window during a measurement for the first frame, and
+    // there is no frame yet.
   } catch (...) {
     write();
     throw;

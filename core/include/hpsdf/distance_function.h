@@ -25,14 +25,15 @@ enum class InsideTest : std::uint8_t {
   outerHull,     ///< as `winding`, but without the triangles that have the inside on both sides
 };
 
-/// The inside test of a distance, and the reason for it.
+/// The inside test that a distance uses, and the reason for this choice.
 struct InsideTestChoice {
   InsideTest insideTest = InsideTest::pseudonormal;  ///< never `automatic`
   std::string reason = {};  ///< such as "the mesh has no holes and does not intersect itself"; empty if requested
   std::optional<Vector3> position = {};  ///< a position on the mesh that shows the reason, if there is one
 };
 
-/// The origin of a signed distance; it is stored with a field that is built from it.
+/// A description of where a signed distance comes from. It is stored with each field that is built from this
+/// distance.
 struct Source {
   std::string name = {};          ///< the mesh file's name without its path, or the shape's specification
   std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 without a mesh
@@ -44,15 +45,15 @@ struct Source {
   double thickness = 0;                           ///< thickness of a shell, in world units
 };
 
-/// Any signed distance Φ, negative inside, evaluated in batches.
+/// A signed distance Φ of any kind, negative inside, evaluated in batches of points.
 ///
-/// It converts from any callable for single points (`double(const Vector3&)`) or batches
-/// (`void(std::span<const Vector3>, std::span<double>)`). The callable must be thread-safe. The points of a batch lie
-/// close to each other, in a deterministic order. A member function `Source source() const` of the callable provides
-/// the source, unless the constructor gets another one.
+/// A `DistanceFunction` converts from any callable for single points (`double(const Vector3&)`) or for batches
+/// (`void(std::span<const Vector3>, std::span<double>)`). The callable must be thread-safe. The points of a
+/// batch lie close to each other, in a deterministic order. If the callable has a member function `Source
+/// source() const`, this function provides the source, unless the constructor gets another source.
 ///
-/// Lvalues are referenced, not copied, because an `ExactDistance` is large: they must outlive this object. Temporaries
-/// are moved into it.
+/// A callable that is an lvalue is referenced, not copied, because an `ExactDistance` is large. It must outlive
+/// this object. A temporary callable is moved into this object.
 class DistanceFunction {
  public:
   template <typename F>
@@ -70,7 +71,7 @@ class DistanceFunction {
           [owned = std::make_shared<const Callable>(std::forward<F>(f))]() -> const Callable& { return *owned; });
   }
 
-  /// out[i] = Φ(points[i]); the spans have equal length.
+  /// Evaluates out[i] = Φ(points[i]) for all i. Both spans must have the same length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const {
     assert(points.size() == out.size());
     evaluate_(points, out);
@@ -78,7 +79,8 @@ class DistanceFunction {
 
   const Source& source() const { return source_; }
 
-  /// Returns the bytes that the callable holds, if it has a member `std::size_t bytes() const`; else 0.
+  /// Returns the number of bytes that the callable holds, as told by its member `std::size_t bytes() const`, or 0
+  /// if it has no such member.
   std::size_t bytes() const { return bytes_; }
 
  private:

@@ -16,7 +16,7 @@
 
 namespace hpsdf {
 
-/// The part of a triangle on which a closest point lies.
+/// The part of a triangle on which the closest point to a query lies.
 enum class Feature : std::uint8_t { face, edge, vertex };
 
 struct ClosestPoint {
@@ -34,34 +34,37 @@ struct DistanceOptions {
 
 /// Exact signed distance to a triangle mesh in double precision.
 ///
-/// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, eight points at
-/// a time. The sign comes from an inside test:
-/// - `InsideTest::pseudonormal`: the dot product of x − closest point with the angle-weighted pseudonormal of the
-///   closest feature (Bærentzen & Aanæs 2005). It is right for closed meshes without self-intersections.
-/// - `InsideTest::winding`: a point is inside if the generalised winding number is above ½ (Jacobson et al. 2013). The
-///   decision is that of the exact sum over all triangles. The surface on which the winding number is ½ closes holes
-///   and counts as surface; its distance is |w − ½|/|∇w|, to first order. A closed mesh that is oriented inward has its
-///   inside all around it.
-/// - `InsideTest::outerHull`: the sign, and outside also the distance, are those of `winding`. Inside, triangles with
-///   the inside on both sides, such as inner walls of overlapping bodies, do not count as surface. Along intersections
-///   this is decided for pieces of 1/512 of the mesh's size.
-/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. It suits sheets.
-/// - `InsideTest::automatic`: the first test if it is certain to be right, else the second.
+/// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, which
+/// takes eight points at a time. The sign comes from an inside test:
+/// - `InsideTest::pseudonormal`: the sign of the dot product of x − closest point with the angle-weighted
+///   pseudonormal of the closest feature (Bærentzen & Aanæs 2005). It is right for closed meshes without
+///   self-intersections.
+/// - `InsideTest::winding`: a point is inside if the generalised winding number w is above ½ (Jacobson et al.
+///   2013). The decision is that of the exact sum over all triangles. The surface w = ½ closes holes and counts
+///   as surface; the distance to this surface is |w − ½|/|∇w|, to first order. A closed mesh that is oriented
+///   inward has its inside all around it.
+/// - `InsideTest::outerHull`: the sign is that of `winding`; outside, the distance also is. For points inside,
+///   triangles with the inside on both sides, such as inner walls of overlapping bodies, do not count as
+///   surface. Along intersections this is decided for pieces of 1/512 of the mesh's size.
+/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. This test suits
+///   sheets.
+/// - `InsideTest::automatic`: `pseudonormal` if this test is certain to be right, else `winding`.
 ///
-/// The lowest index decides between equally near triangles: results depend neither on the order nor on the
-/// grouping of queries, and single and batched queries agree bit for bit.
+/// Among equally near triangles, the one with the lowest index counts. Therefore results depend neither on the
+/// order nor on the grouping of queries, and single and batched queries agree bit for bit.
 ///
-/// The distance to a degenerate triangle, whose height is within the rounding errors of its coordinates, is that to its
-/// edges; it does not contribute to pseudonormals. A point that is not finite gets a value that is not finite. Signs
-/// are lost at distances of about 10¹⁵ times the mesh's size, where all triangles are equally near.
+/// A triangle is degenerate if its height is within the rounding errors of its coordinates. The distance to a
+/// degenerate triangle is that to its edges; the triangle does not contribute to pseudonormals. A point that is
+/// not finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size,
+/// where all triangles are equally near.
 ///
-/// Const and thread-safe after construction. Keeps no reference to the mesh.
+/// Objects are const and thread-safe after construction. They keep no reference to the mesh.
 class ExactDistance {
  public:
-  /// Throws `Error` for a mesh without triangles, with indices out of range or with coordinates that are not finite;
-  /// for a thickness that does not fit the inside test; and for an outer hull of a mesh with more than two million
-  /// pairs of intersecting triangles, or one that would consist of more than 250,000 pieces of 1/32 of its size. Throws
-  /// `Cancelled`.
+  /// Throws `Error` for a mesh without triangles, with indices out of range or with coordinates that are not
+  /// finite. Throws `Error` for a thickness that does not fit the inside test. For the outer hull, throws `Error`
+  /// if the mesh has more than two million pairs of intersecting triangles, or if the hull would consist of more
+  /// than 250,000 pieces of 1/32 of the mesh's size. Throws `Cancelled` when `progress` says so.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {}, const Progress& progress = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;
@@ -69,26 +72,29 @@ class ExactDistance {
 
   double operator()(const Vector3& x) const;
 
-  /// Batched: fastest when neighbours in `points` are neighbours in space. The spans have equal length.
+  /// Evaluates the signed distance at many points. It is fastest if successive points are close in space. Both
+  /// spans must have the same length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
-  /// Returns the nearest point of the triangles, or of the outer hull's triangles for that test, with the signed
-  /// distance of `operator()`. Near a closed hole and for a shell, this distance is not that to the returned point.
+  /// Returns the point of the triangles that is nearest to x, together with the signed distance that `operator()`
+  /// returns. For `InsideTest::outerHull` the triangles are those of the outer hull. Near a closed hole and for a
+  /// shell, the signed distance is not the distance to the returned point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
   const InsideTestChoice& insideTestChoice() const;
 
-  /// Returns the triangles to which distances are measured. For an outer hull, pieces of subdivided triangles have
-  /// vertices of their own.
+  /// Returns the triangles to which distances are measured. For an outer hull, some of them are pieces of
+  /// subdivided triangles. These pieces have their own vertices, which are not shared with other triangles.
   TriangleMesh surface() const;
 
-  /// Returns the crossings of the mesh by `findCrossings`.
+  /// Returns the self-intersections of the mesh, as `findCrossings` does.
   Crossings crossings(std::size_t limit = kMaxCrossings, const Progress& progress = {}) const;
 
-  /// Returns name, fingerprint, counts, box and inside test of the mesh.
+  /// Returns the description of the mesh: its name, fingerprint, counts, box and inside test.
   const Source& source() const;
 
-  /// Returns the bytes held: triangles, hierarchy, pseudonormals, moments of the winding number.
+  /// Returns the bytes held by this object: triangles, hierarchy, pseudonormals, and moments of the winding
+  /// number.
   std::size_t bytes() const;
 
  private:
@@ -96,8 +102,8 @@ class ExactDistance {
   std::unique_ptr<const Data> data_;
 };
 
-/// Returns the instruction set that exact distances use on this machine, such as "AVX2". It affects the speed only:
-/// distances are the same to the bit.
+/// Returns the name of the instruction set that exact distances use on this machine, such as "AVX2". The
+/// instruction set affects only the speed: distances are the same to the bit.
 std::string_view instructionSet();
 
 }  // namespace hpsdf

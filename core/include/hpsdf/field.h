@@ -13,32 +13,36 @@
 
 namespace hpsdf {
 
-/// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every query is
-/// const, thread-safe and allocation-free.
+/// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every
+/// query is const, thread-safe and allocation-free.
 ///
-/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so that every
-/// point lies in exactly one. The field jumps slightly from leaf to leaf unless it is blended (`FieldData::blend`).
-/// Then f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the point, where fₙ are their polynomials, continued
-/// beyond their boxes, and wₙ are products of smooth steps across their faces. Value and gradient are continuous
-/// throughout the domain, and away from the faces the field equals that without blending to the bit.
+/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so
+/// that every point lies in exactly one leaf. The field jumps slightly from leaf to leaf unless it is blended
+/// (`FieldData::blend`). A blended field is f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the
+/// point. Here fₙ is the polynomial of leaf n, continued beyond the box of the leaf, and wₙ is a product of
+/// smooth steps across the leaf's faces. Value and gradient of a blended field are continuous throughout the
+/// domain. Away from the faces it equals the field without blending to the bit.
 ///
-/// Outside the domain the value is f(q) + |x − q|, where q is the domain's closest point, and the gradient matches. The
-/// value is continuous across the domain's boundary; jumps between leaves at the boundary continue outwards. This value
-/// is an upper bound of a 1-Lipschitz field, and hence no safe step for sphere tracing. At infinite points the value is
-/// infinite and the gradient NaN.
+/// Outside the domain the value at x is f(q) + |x − q|, where q is the domain's closest point, and the gradient
+/// matches. The value is continuous across the domain's boundary; jumps between leaves at the boundary continue
+/// outwards. The value is an upper bound of a 1-Lipschitz field, and hence no safe step for sphere tracing. At
+/// infinite points the value is infinite and the gradient NaN.
 class Field {
  public:
-  /// Takes finished arrays. Throws `Error` if they violate the layout that `FieldData` describes.
+  /// Makes a field of finished arrays. Throws `Error` if the arrays violate the layout that `FieldData`
+  /// describes.
   explicit Field(FieldData data);
 
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
-  /// Evaluates many points, several times faster than one by one, with the same results. The spans have equal length.
+  /// Evaluates the field at many points, several times faster than one by one, with the same results. Both spans
+  /// must have the same length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
 
-  /// Returns the leaf that holds x or, for x outside the domain, the domain's closest point.
+  /// Returns the leaf that holds x. For x outside the domain, returns the leaf that holds the domain's closest
+  /// point to x.
   Cell cellAt(const Vector3& x) const;
 
   /// Calls `visit` for every leaf in the order of the octree (base cells first to last, children 0 to 7).
@@ -49,13 +53,13 @@ class Field {
   const FieldMetadata& metadata() const { return data_.metadata; }
   bool singlePrecision() const { return data_.coefficients.index() == 1; }
 
-  /// Returns the arrays themselves, for files, uploads and tests.
+  /// Returns the arrays of the field itself, for files, uploads to a GPU and tests.
   const FieldData& data() const { return data_; }
 
-  /// Returns the grid in which queries start, for uploads and tests.
+  /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }
 
-  /// Returns the bytes of nodes, coefficients, lookup grid and, if the field has them, bounds.
+  /// Returns the bytes that the field takes: its nodes, coefficients, lookup grid and, if it has them, bounds.
   std::size_t bytes() const;
 
  private:
@@ -63,7 +67,7 @@ class Field {
   LookupGrid lookupGrid_;
 };
 
-/// Sizes of a field and the distribution of its leaves.
+/// Statistics of a field: its sizes and the distribution of its leaves.
 struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;

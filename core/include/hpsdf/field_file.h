@@ -6,13 +6,15 @@
 
 namespace hpsdf {
 
-/// Writes a `.hpsdf` file (docs/file-format.md), which is versioned, little-endian and checksummed. Equal fields give
-/// equal bytes. The file is written under a temporary name in the same folder and renamed, so that an interrupted save
-/// leaves an older file intact. Throws `Error` that names the file and the reason.
+/// Writes a field as a `.hpsdf` file (docs/file-format.md), which is versioned, little-endian and checksummed.
+/// Equal fields give equal bytes. The file is written under a temporary name in the same folder and then
+/// renamed, so that an interrupted save leaves an older file intact. Throws `Error` with a message that names
+/// the file and the reason.
 void save(const Field& field, const std::filesystem::path& file);
 
-/// Reads a file that `save` wrote. Sizes are checked against the file's length before memory is allocated. Throws
-/// `Error` if the file is missing, truncated, altered, of an unknown version or no field at all.
+/// Reads the field from a file that `save` wrote. Sizes are checked against the file's length before memory is
+/// allocated. Throws `Error` if the file is missing, is truncated, is altered, has an unknown version or is not
+/// a `.hpsdf` file.
 Field load(const std::filesystem::path& file);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// Jumps of a field: the differences between neighbouring leaves on the faces that they share.
+// Jumps of a field: the differences between neighbouring leaves on the faces that these leaves share.
 
 #include <array>
 #include <cstddef>
@@ -13,14 +13,16 @@
 
 namespace hpsdf {
 
-/// Size of a jump on one interface. The jump is the difference of the limits from both leaves: the limits of their
-/// polynomials or, in a blended field, of the blended field.
+/// The size of a jump on one interface between two leaves. The jump is the difference of the limits from the
+/// two leaves. The limits are those of the leaves' polynomials or, in a blended field, those of the blended
+/// field.
 struct Jump {
   double rms = 0;  ///< √(∫ jump² dA / area) by a quadrature that is exact for polynomials
   double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
 };
 
-/// The face between two neighbouring leaves. It is a whole face of the smaller one.
+/// The face between two neighbouring leaves. If the leaves differ in size, it is a whole face of the smaller
+/// leaf.
 struct Interface {
   std::array<std::uint32_t, 2> cells;  ///< `Cell::id` on the lower and on the upper side
   std::array<std::uint8_t, 2> degrees;
@@ -32,11 +34,12 @@ struct Interface {
   Vector3 center;  ///< centre of the face
   Vector3 worst;   ///< point of the face where f jumps most
 
-  /// Tells whether the leaves differ in size, so that the smaller one's corners hang in the larger one's face.
+  /// Tells whether the two leaves differ in size, so that corners of the smaller leaf are hanging nodes on the
+  /// larger leaf's face.
   bool hanging() const { return depths[0] != depths[1]; }
 };
 
-/// All of a field's interfaces.
+/// All interfaces of a field, with their jumps.
 struct Jumps {
   std::vector<Interface> interfaces;  ///< in the octree's order of the smaller leaf or, of two equal ones, the lower
   std::size_t hanging = 0;            ///< number of interfaces between leaves of different size
@@ -45,8 +48,8 @@ struct Jumps {
   Jump gradient;                      ///< jumps of ∇f over all interfaces
 };
 
-/// Measures the jumps of all interfaces. The result does not depend on `threads` (0: all that the machine offers).
-/// Throws `Cancelled` when `progress` says so.
+/// Measures the jumps of a field on all interfaces between its leaves. The result does not depend on `threads`
+/// (0: all that the machine offers). Throws `Cancelled` when `progress` says so.
 Jumps findJumps(const Field& field, int threads = 0, const Progress& progress = {});
 
 enum class JumpKind : std::uint8_t { value, gradient };
@@ -55,11 +58,12 @@ inline const Jump& jumpOf(const Interface& interface, JumpKind kind) {
   return kind == JumpKind::value ? interface.value : interface.gradient;
 }
 
-/// Returns the indices of the `count` interfaces with the greatest `max`, greatest first; ties keep their order.
+/// Returns the indices of the `count` interfaces with the greatest maximum jump (`Jump::max`), greatest first.
+/// Interfaces with equal jumps keep their order.
 std::vector<std::size_t> worstInterfaces(const Jumps& jumps, JumpKind kind, std::size_t count);
 
-/// Returns, by `Cell::id`, the greatest `max` of a leaf's interfaces; 0 for internal nodes and leaves without
-/// interface.
+/// Returns, for each node of the octree by `Cell::id`, the greatest maximum jump (`Jump::max`) on the
+/// interfaces of this leaf. The element is 0 for internal nodes and for leaves without an interface.
 std::vector<double> worstJumpOfCells(const Field& field, const Jumps& jumps, JumpKind kind);
 
 /// One bin of a histogram of interfaces.
@@ -68,8 +72,8 @@ struct JumpBin {
   double area = 0;  ///< in units²
 };
 
-/// Counts interfaces by the order of magnitude of their jumps: bin n holds those with `max` in [10^n, 10^(n+1)).
-/// Interfaces without a jump are left out.
+/// Counts interfaces by the order of magnitude of their jumps: bin n holds the interfaces whose maximum jump is
+/// in [10^n, 10^(n+1)). Interfaces without a jump are left out.
 std::map<int, JumpBin> jumpHistogram(const Jumps& jumps, JumpKind kind);
 
 }  // namespace hpsdf

@@ -8,50 +8,55 @@
 
 namespace hpsdf {
 
-/// Prepares a mesh for distances:
+/// Prepares a mesh for distance queries:
 /// - welds vertices of equal position,
-/// - drops degenerate and duplicate triangles and unused vertices. A degenerate triangle that connects its neighbours
-///   is replaced by an edge flip, because dropping it would open the mesh. A shared wall keeps both of its triangles,
-///   so that each body is closed; a surface that is modelled with both sides keeps one,
-/// - reverses the whole mesh when its signed volume is negative, and never single components, because the triangles of
-///   a cavity face inward on purpose.
+/// - drops degenerate triangles, duplicate triangles and unused vertices. A degenerate triangle that connects
+///   its neighbours is replaced by an edge flip, because dropping it would open the mesh. A wall that two
+///   bodies share keeps both of its triangles, so that each body is closed; a surface that is modelled with
+///   both sides keeps one,
+/// - reverses the whole mesh if its signed volume is negative. Single components are never reversed, because
+///   the triangles of a cavity face inward on purpose.
 ///
-/// Throws `Error` (mesh) for indices out of range, coordinates that are not finite or beyond `kLargestCoordinate`, or
-/// when no triangle with an area is left.
+/// Throws `Error` (mesh) for indices out of range, for coordinates that are not finite or beyond
+/// `kLargestCoordinate`, and if no triangle with an area is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
-/// Reads an OBJ, PLY, STL, OFF, 3DS or glTF file through assimp, joins all meshes of the scene under their node
-/// transforms, triangulates polygons, and returns the mesh `cleaned`.
+/// Reads an OBJ, PLY, STL, OFF, 3DS or glTF file through the library assimp, joins all meshes of the scene
+/// under their node transforms, triangulates polygons, and returns the mesh `cleaned`.
 ///
-/// assimp sets two limits. Positions pass through `float`: a relative error of 6e-8, which is 0.06 at coordinates near
-/// 1e6 (see `coordinateSpacing`). Indices out of range are corrected without notice in OFF and PLY files, and their
-/// faces dropped in glTF files, so that they cannot be reported.
+/// assimp sets two limits. Positions pass through `float`, with a relative error of 6e-8, which is 0.06 at
+/// coordinates near 1e6 (see `coordinateSpacing`). Indices out of range cannot be reported: assimp corrects
+/// them without notice in OFF and PLY files, and drops their faces in glTF files.
 ///
-/// The file is read in the caller's process without a limit of time or memory. A damaged file can crash assimp: a
-/// deeply nested glTF file overflows its stack, others trigger its asserts, which are on in Debian. Other files keep
-/// assimp, or the triangulation of a polygon with very many corners, busy for minutes. Read untrusted files in a
-/// subprocess, as the program `hpsdf` does.
+/// The file is read in the caller's process without a limit of time or memory. A damaged file can crash assimp:
+/// a deeply nested glTF file overflows its stack, others trigger its asserts, which are enabled in Debian's
+/// package. Other files keep assimp, or the triangulation of a polygon with very many corners, busy for
+/// minutes. Read untrusted files in a subprocess, as the program `hpsdf` does.
 ///
-/// Throws `Error` (file or mesh, the subject is `file`) for a file that is missing, a folder, unreadable, empty or not
-/// a mesh, and for a mesh beyond the range of float, too small for it, or without area.
+/// Throws `Error` (file or mesh, the subject is `file`) for a file that is missing, a folder, unreadable, empty
+/// or not a mesh. Also throws `Error` for a mesh that exceeds the range of float, is too small for float, or
+/// has no area.
 ImportedMesh importMesh(const std::filesystem::path& file);
 
-/// Distance between adjacent coordinates that the reader can tell apart, in mesh units: the spacing of `float` at the
-/// largest coordinate of `mesh`, which was read from `file`. Numbers with exponents may be off by twice as much.
-/// Returns 0 for a file that itself holds floats (3DS, glTF, binary STL and most binary PLY), so that reading loses
-/// nothing, and for a file that is not a mesh.
+/// Returns the distance between adjacent coordinates that the reader of `file` can distinguish, in mesh units:
+/// the spacing of `float` at the largest coordinate of `mesh`, which was read from `file`. Coordinates that are
+/// written with exponents may be off by twice this distance. Returns 0 for a file that itself holds floats
+/// (3DS, glTF, binary STL and most binary PLY), because reading loses nothing, and for a file that is not a
+/// mesh.
 double coordinateSpacing(const std::filesystem::path& file, const TriangleMesh& mesh);
 
-/// The mesh of `importMesh`, or of `shapes::mesh` for a name that starts with `builtin:`.
+/// Returns the mesh of a file, as `importMesh` does, or the mesh of a built-in shape, as `shapes::mesh` does,
+/// for a name that starts with `builtin:`.
 TriangleMesh loadMesh(const std::string& fileOrShape);
 
-/// Writes a mesh as OBJ or binary PLY, by the file's extension, with coordinates in full double precision. A PLY file
-/// is written as text where its binary data would begin with a line feed, which `importMesh` could not read. The file
-/// appears whole or not at all. Throws `Error` (file) for another extension, and as `OutputFile` does.
+/// Writes a mesh as OBJ or binary PLY, depending on the file's extension, with coordinates in full double
+/// precision. A PLY file is written as text if its binary data would begin with a line feed, because
+/// `importMesh` could not read such a file. The file appears whole or not at all. Throws `Error` (file) for
+/// another extension, and as `OutputFile` does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
 
-/// Throws the `Error` that `saveMesh` would throw for this file name, as far as it is known beforehand. Call it
-/// before long work.
+/// Throws the `Error` that `saveMesh` would throw for this file name, as far as it can be foreseen. Call this
+/// function before long work.
 void checkMeshWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

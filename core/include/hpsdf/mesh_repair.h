@@ -15,28 +15,30 @@ struct RepairedMesh {
 /// Orients a mesh consistently and outward by reversing triangles. Vertices and triangles are neither added nor
 /// removed.
 ///
-/// 1. Patches. A patch is a set of triangles that are connected by edges of exactly two triangles. All triangles of a
-///    patch get the orientation of the greater part of its area. A one-sided patch, such as a Möbius strip, stays
-///    unchanged and keeps its inconsistent edges.
-/// 2. Bodies. A body is a closed patch; or several patches that are closed only in union, with solid material between
-///    them; or any other patch, which is open.
-/// 3. Signed volumes. A body with a negative signed volume is oriented inward. An open body takes part only if its
-///    volume is large enough to be reliable, by the rule of `cleaned`; otherwise it stays unchanged. If there is only
-///    one body, or none is oriented inward, the volumes decide and the algorithm ends here.
-/// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is probed
-///    close to both sides of each body, at points spread over its area. Two patterns decide if at least three quarters
-///    of the points show them:
-///    - At most 0 in front and at least 1 behind: the body is oriented correctly, such as a cavity. It stays.
-///    - At most −1 in front and at least 0 behind: the body would be correct if the whole mesh were reversed, such as
-///      both surfaces of a hollow body that is inside out. It is reversed, unless it is open with a positive volume.
-///    A point with equal winding numbers on both sides does not count: another body cancels this one there. A point
-///    that fits both patterns, because a body of opposite orientation touches there, counts for the pattern that agrees
-///    with the body's volume.
-/// 5. Nesting. If step 4 does not decide, a body that is oriented inward is reversed, unless three quarters of its
-///    points lie within an odd number of other bodies, so that it is a cavity.
+/// 1. Patches. A patch is a set of triangles that are connected by edges of exactly two triangles. All
+///    triangles of a patch get the orientation that the greater part of its area has. A one-sided patch, such
+///    as a Möbius strip, stays unchanged and keeps its inconsistent edges.
+/// 2. Bodies. A body is a closed patch; or several patches that are closed only in union, with solid material
+///    between them; or any other patch, which is open.
+/// 3. Signed volumes. A body with a negative signed volume is oriented inward. An open body takes part only if
+///    its volume is large enough to be reliable, by the rule of `cleaned`; otherwise it stays unchanged. If
+///    there is only one body, or none is oriented inward, the volumes decide and the algorithm ends here.
+/// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is
+///    probed close to both sides of each body, at points spread over its area. Two patterns decide if at least
+///    three quarters of the points show them:
+///    - Winding number at most 0 in front of the body and at least 1 behind: the body is oriented correctly,
+///      such as a cavity. It stays unchanged.
+///    - Winding number at most −1 in front and at least 0 behind: the body would be correct if the whole mesh
+///      were reversed, such as both surfaces of a hollow body that is inside out. The body is reversed, unless
+///      it is open with a positive volume.
+///    A point with equal winding numbers on both sides does not count: at this point another body cancels this
+///    body. A point that fits both patterns, because a body of opposite orientation touches this body, counts
+///    for the pattern that agrees with the body's volume.
+/// 5. Nesting. If step 4 does not decide, a body that is oriented inward is reversed, unless three quarters of
+///    its points lie within an odd number of other bodies, so that it is a cavity.
 ///
-/// Throws `Error` for a mesh without triangles or with more than 2²⁸, and for vertices that do not exist or are not
-/// finite.
+/// Throws `Error` for a mesh without triangles or with more than 2²⁸ triangles, and for vertices that do not
+/// exist or are not finite.
 RepairedMesh repaired(ImportedMesh imported);
 
 }  // namespace hpsdf

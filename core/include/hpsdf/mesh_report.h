@@ -1,5 +1,6 @@
 #pragma once
-// The state of a mesh: counts, measures, and the defects by which it is not the surface of a solid.
+// The state of a mesh: counts, measures, and the defects because of which the mesh is not the surface of a
+// solid.
 
 #include <array>
 #include <cstddef>
@@ -12,7 +13,8 @@
 
 namespace hpsdf {
 
-/// Counts and measures of a mesh after import. Edges are counted without direction.
+/// Counts and measures of a mesh after import. An edge is counted once, whatever its directions in the
+/// triangles.
 struct MeshReport {
   std::size_t vertices = 0;    ///< vertices after welding that at least one triangle uses
   std::size_t faces = 0;       ///< triangles kept
@@ -22,9 +24,9 @@ struct MeshReport {
   std::size_t nonManifoldEdges = 0;   ///< edges of more than two triangles
   std::size_t inconsistentEdges = 0;  ///< edges that two triangles run along in the same direction
 
-  /// Edges that more triangles run along in one direction than in the other: the boundary of holes, and edges where the
-  /// orientation is wrong. Without any, winding numbers are whole numbers, so that inside and outside are defined
-  /// even where edges are non-manifold.
+  /// Number of edges that more triangles traverse in one direction than in the other: the boundary of holes, and
+  /// edges with a wrong orientation. If there are no such edges, winding numbers are whole numbers, so that
+  /// inside and outside are defined even if other edges are non-manifold.
   std::size_t unbalancedEdges = 0;
 
   std::size_t weldedVertices = 0;                ///< vertices removed because another has the same position
@@ -40,22 +42,22 @@ struct MeshReport {
   double area = 0;    ///< surface area, in squared mesh units
   Box box;            ///< bounding box, in mesh units
 
-  /// Every edge belongs to exactly two triangles that run along it in opposite directions.
+  /// Returns true if every edge belongs to exactly two triangles, which traverse it in opposite directions.
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Returns the counts and measures of a mesh as it is; the counts of what cleaning removes are 0. Throws `Error`
-/// (mesh) for indices out of range.
+/// Returns the counts and measures of a mesh without changing it. The counts of items that cleaning removes are
+/// 0. Throws `Error` (mesh) for indices out of range.
 MeshReport inspect(const TriangleMesh& mesh);
 
-/// A mesh after import, and the report on it.
+/// A mesh after import, together with the report on this mesh.
 struct ImportedMesh {
   TriangleMesh mesh;
   MeshReport report;
 };
 
-/// Two triangles that intersect beyond the corners and edges they share: they pass through each other, touch, or
-/// overlap in one plane.
+/// Two triangles of a mesh that pass through each other, touch, or overlap in one plane. Corners and edges that
+/// the two triangles share do not count as contact.
 struct Crossing {
   std::array<std::uint32_t, 2> triangles;  ///< indices in the mesh, the lower one first
   Vector3 position;                        ///< the middle of the intersection of the triangles' boxes
@@ -87,18 +89,20 @@ struct MeshDefects {
   std::vector<Defect> found;  ///< sorted by kind; edges and vertices by vertex index, crossings by triangle index
   std::array<std::size_t, kDefectKinds> counts = {};
   bool allCrossings = true;  ///< false when the search for crossings stopped at its limit
-  /// Crossings of two triangles of one component, at which the surface folds into itself. Shared walls are not counted.
+  /// Number of crossings between two triangles of the same component, at which the surface passes through itself.
+  /// Shared walls are not counted.
   std::size_t crossingsWithinComponents = 0;
-  /// True if reversing triangles can make every edge of two triangles consistent; false for a Möbius strip.
+  /// True if reversing triangles can make the orientation consistent at every edge of exactly two triangles;
+  /// false for a Möbius strip.
   bool orientable = true;
 
   std::size_t count(DefectKind kind) const { return counts[static_cast<std::size_t>(kind)]; }
   std::span<const Defect> ofKind(DefectKind kind) const;
 };
 
-/// Finds every defect of a mesh by which it is not the surface of a solid, with its position. Triangles share a corner
-/// where its index is the same, so that the mesh must be welded. `crossings` are those of this mesh. Throws `Error`
-/// (mesh) for indices out of range.
+/// Finds every defect, with its position, because of which a mesh is not the surface of a solid. The mesh must
+/// be welded, because triangles share a corner only if they use the same vertex index. `crossings` are the
+/// self-intersections of this mesh. Throws `Error` (mesh) for indices out of range.
 MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings);
 
 }  // namespace hpsdf

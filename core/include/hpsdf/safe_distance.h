@@ -1,12 +1,12 @@
 #pragma once
-// Proven bounds of a field's error, and distances from the surface that follow from them.
+// Proven bounds of a field's error, and safe distances from the surface that follow from these bounds.
 //
-// A signed distance is 1-Lipschitz, |Φ(x) − Φ(y)| ≤ |x − y|, so that every exact value bounds Φ everywhere from above
-// and from below. These bounds and those of a leaf's polynomial give a bound of |f − Φ| over the whole leaf
-// (`CellBound`).
+// A signed distance Φ is 1-Lipschitz, |Φ(x) − Φ(y)| ≤ |x − y|. Therefore every exact value bounds Φ everywhere
+// from above and from below. Together with bounds of a leaf's polynomial f, these bounds of Φ give a bound of
+// |f − Φ| over the whole leaf (`CellBound`).
 //
-// The bounds hold if Φ is the signed distance of a closed surface without self-intersections. Near the holes of an open
-// mesh and wherever else the sign is wrong, Φ jumps and no bound holds.
+// The bounds hold if Φ is the signed distance of a closed surface without self-intersections. Near the holes of
+// an open mesh, and wherever else the sign of Φ is wrong, Φ jumps and no bound holds.
 
 #include <cstdint>
 #include <optional>
@@ -17,33 +17,34 @@
 
 namespace hpsdf {
 
-/// Returns the field with a bound for each leaf. This evaluates Φ 24 times a leaf, which `exactEvaluations` counts. The
-/// result does not depend on `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite, `Cancelled`
-/// when `progress` says so.
+/// Returns a copy of `field` with a bound for each leaf. The function evaluates Φ at 24 points per leaf, which
+/// `exactEvaluations` in the metadata counts. The result does not depend on `threads` (0: all that the machine
+/// offers). Throws `Error` if Φ is not finite. Throws `Cancelled` when `progress` says so.
 Field withBounds(const Field& field, const DistanceFunction& distance, int threads = 0, const Progress& progress = {});
 
-/// Returns the bound of the leaf that holds x or, for x outside the domain, the domain's closest point; nothing if the
-/// field has no bounds.
+/// Returns the bound of the leaf that holds x or, for x outside the domain, of the leaf that holds the domain's
+/// closest point to x. Returns std::nullopt if the field has no bounds.
 std::optional<CellBound> boundAt(const Field& field, const Vector3& x);
 
-/// Returns a distance from x within which the surface certainly does not lie: |f| less the bound of the error, and at
-/// least 0. For x outside the domain, it is the safe distance of the domain's closest point less the distance to that
-/// point. Throws `Error` if the field has no bounds.
+/// Returns a distance around x within which the surface certainly does not lie: |f| less the bound of its
+/// error, and at least 0. For x outside the domain, it is the safe distance of the domain's closest point less
+/// the distance from x to this point. Throws `Error` if the field has no bounds.
 double safeDistance(const Field& field, const Vector3& x);
 
-/// The result of tracing a ray by safe distances.
+/// The result of `safeTrace`.
 struct SafeTrace {
   double length = 0;  ///< length of the ray, in the field's units, that certainly does not touch the surface
-  /// True if the surface may lie within `slack` of the ray at this length. Rounding may add to the slack far from the
-  /// domain. If false, the ray left the domain.
+  /// True if the surface may lie within `slack` of the ray's point at `length`; far from the domain, rounding may
+  /// enlarge the slack. False if the ray left the domain.
   bool mayTouch = false;
   int steps = 0;
 };
 
-/// Follows a ray by safe distances until one is shorter than `slack`, in the field's units. The ray never passes
-/// through the surface, though it may stop where a more exact field would let it pass. From an origin outside the
-/// domain the march starts where the ray enters the domain. `direction` need not have unit length. Throws `Error` if
-/// the field has no bounds, for a direction of length 0 and for a slack that is not above 0.
+/// Follows a ray by steps of the safe distance until a safe distance is shorter than `slack`, in the field's
+/// units. The ray never passes through the surface, though it may stop at a place where a more exact field
+/// would let it pass. If the origin lies outside the domain, the march starts where the ray enters the domain.
+/// `direction` need not have unit length. Throws `Error` if the field has no bounds, for a direction of length
+/// 0, and for a slack that is not above 0.
 SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& direction, double slack);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// Built-in shapes: as triangle meshes, and some also as signed distances in closed form.
+// Built-in shapes. All are available as triangle meshes, and some also as signed distances in closed form.
 
 #include <span>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace hpsdf::shapes {
 
-/// A numeric parameter of a shape. All lengths are in mesh units.
+/// A numeric parameter of a built-in shape. All lengths are in mesh units.
 struct Parameter {
   std::string name;
   double defaultValue;
@@ -28,7 +28,8 @@ struct Shape {
   bool analytic;  ///< `analytic` accepts this shape
 };
 
-/// All shapes in the order in which to list them: sphere, torus, box, gear, helix-bowl, marble-run, structured-bowl.
+/// Returns all built-in shapes in the order in which lists show them: sphere, torus, box, gear, helix-bowl,
+/// marble-run, structured-bowl.
 std::span<const Shape> catalogue();
 
 /// The mesh of a shape: closed, triangles facing outward, centred at the origin.
@@ -40,11 +41,12 @@ std::span<const Shape> catalogue();
 /// for a value out of range.
 TriangleMesh mesh(std::string_view spec);
 
-/// The signed distance of a shape in closed form, with the shape's name and box as its `source()`. Takes a spec as
-/// `mesh` does, with or without a leading `analytic:`, and throws as it does; also for a shape without a closed form.
+/// Returns the signed distance of a built-in shape in closed form, with the shape's name and box as its
+/// `source()`. `spec` is as for `mesh`, with or without a leading `analytic:`. Throws `Error` as `mesh` does,
+/// and for a shape that has no closed form.
 DistanceFunction analytic(std::string_view spec);
 
-/// Exact signed distances, negative inside, to shapes centred at the origin.
+/// Return the exact signed distance, negative inside, from x to a shape that is centred at the origin.
 double sphereDistance(const Vector3& x, double radius);
 double torusDistance(const Vector3& x, double majorRadius, double minorRadius);  ///< the torus' axis is z
 double boxDistance(const Vector3& x, const Vector3& halfSize);

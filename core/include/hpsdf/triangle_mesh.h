@@ -10,45 +10,50 @@
 
 namespace hpsdf {
 
-/// The greatest absolute coordinate of a mesh: beyond it, squares and volumes leave the range of double.
+/// The greatest allowed absolute coordinate of a mesh. Beyond it, squared lengths and volumes would leave the
+/// range of double.
 constexpr double kLargestCoordinate = 1e100;
 
-/// The vertices of a triangle, counter-clockwise as seen from outside.
+/// The indices of a triangle's three vertices, counter-clockwise as seen from outside.
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Vertices in mesh units, and triangles that index them.
+/// A mesh: vertices in mesh units, and triangles that refer to the vertices by index.
 struct TriangleMesh {
   std::vector<Vector3> vertices;
   std::vector<Triangle> triangles;
   std::string name;  ///< the file's name without its path, or the shape's spec; for messages and metadata
 };
 
-/// The positions of a triangle's vertices.
+/// Returns the positions of the three vertices of a triangle.
 inline std::array<Vector3, 3> cornersOf(const TriangleMesh& mesh, const Triangle& triangle) {
   return {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]};
 }
 
-/// Throws `Error` (mesh) for the first triangle that refers to a vertex which does not exist.
+/// Throws `Error` (mesh) if a triangle refers to a vertex that does not exist. The error is about the first
+/// such triangle.
 void requireValidIndices(const TriangleMesh& mesh);
 
-/// Smallest box around the vertices that triangles use; empty for a mesh without triangles.
+/// Returns the smallest box around the vertices that triangles use. The box is empty for a mesh without
+/// triangles.
 Box boundingBox(const TriangleMesh& mesh);
 
-/// Signed volume by the divergence theorem, in cubed mesh units; positive when the triangles face outward.
+/// Returns the signed volume of a mesh by the divergence theorem, in cubed mesh units. It is positive if the
+/// triangles face outward.
 double signedVolume(const TriangleMesh& mesh);
 
-/// Sum of the triangles' areas, in squared mesh units.
+/// Returns the sum of the areas of all triangles, in squared mesh units.
 double surfaceArea(const TriangleMesh& mesh);
 
-/// 64-bit XXH3 hash of vertices and triangles, the same on every machine. The name has no influence.
+/// Returns the 64-bit XXH3 hash of a mesh's vertices and triangles, which is the same on every machine. The
+/// name of the mesh does not influence the hash.
 std::uint64_t fingerprint(const TriangleMesh& mesh);
 
-/// The normalization that maps a surface with this box into [-1, 1]³. Throws `Error` (mesh) for a box without finite
-/// extent.
+/// Returns the normalization that maps a surface with this bounding box into [-1, 1]³. Throws `Error` (mesh)
+/// for a box without finite extent.
 Normalization normalizationOf(const Box& surface);
 
-/// The mesh scaled uniformly and centred so that the longest side of its box spans exactly [-1, 1] (Koschier et al.
-/// 2016, sec. 4). Throws `Error` (mesh) for a mesh without finite extent.
+/// Returns a copy of the mesh, scaled uniformly and centred so that the longest side of its bounding box spans
+/// exactly [-1, 1] (Koschier et al. 2016, sec. 4). Throws `Error` (mesh) for a mesh without finite extent.
 TriangleMesh normalized(const TriangleMesh& mesh);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// The value types that all libraries share.
+// Basic value types that all libraries of the project share.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -8,7 +8,7 @@ namespace hpsdf {
 
 using Vector3 = Eigen::Vector3d;
 
-/// Axis-aligned box with the corners `min()` and `max()` in world units.
+/// An axis-aligned box with the corners `min()` and `max()` in world units.
 using Box = Eigen::AlignedBox3d;
 
 /// A uniform scale about a centre: y = scale·(x − center).
@@ -22,10 +22,12 @@ struct Normalization {
 constexpr int kMaxDegree = 30;  ///< highest total degree of a leaf's polynomial
 constexpr int kMaxDepth = 20;   ///< levels below a base cell; a local coordinate keeps 32 of a double's 52 bits there
 
-/// The greatest `FieldData::blend`: with more, the blend zones at opposite faces of a cell could meet.
+/// The greatest value of `FieldData::blend`. With a greater value, the blend zones at opposite faces of a cell
+/// could meet.
 constexpr double kMaxBlend = 0.25;
 
-/// n(p) = (p+1)(p+2)(p+3)/6, the coefficients of a polynomial of total degree p (Koschier et al. 2016, sec. 3.3).
+/// Returns n(p) = (p+1)(p+2)(p+3)/6, the number of coefficients of a polynomial of total degree p (Koschier et
+/// al. 2016, sec. 3.3).
 constexpr int coefficientCount(int degree) { return (degree + 1) * (degree + 2) * (degree + 3) / 6; }
 
 }  // namespace hpsdf

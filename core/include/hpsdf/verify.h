@@ -1,5 +1,5 @@
 #pragma once
-// The error of a field, measured at random points against the exact distance rather than estimated.
+// Measures the error of a field against the exact distance at random points, instead of estimating the error.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace hpsdf {
 
-/// The distribution of |f − Φ| over samples, in units of length.
+/// Figures of the error |f − Φ| over samples, in units of length.
 struct ErrorFigures {
   std::size_t samples = 0;
   double rms = 0;
@@ -25,8 +25,8 @@ struct ErrorFigures {
   std::map<double, double> percentiles = {};  ///< 50, 90, 99 and 99.9 → percentile
 };
 
-/// Samples at which f and Φ have different signs. Between the zeros of f and of Φ such samples are inevitable; they are
-/// defects only where |Φ| exceeds the field's error.
+/// Counts samples at which f and Φ have different signs. Such samples are inevitable between the zeros of f and
+/// the zeros of Φ. They are defects only if |Φ| exceeds the field's error.
 struct SignFigures {
   std::size_t mismatches = 0;
   double farthest = 0;      ///< largest |Φ| of a mismatch
@@ -34,7 +34,7 @@ struct SignFigures {
   std::size_t defects = 0;  ///< number of mismatches with |Φ| above the threshold
 };
 
-/// The length of ∇f at all samples and its angle with ∇Φ at some of them.
+/// Figures of the gradient ∇f: its length at all samples, and its angle with ∇Φ at some of the samples.
 struct GradientFigures {
   double meanLength = 0;
   double lengthErrorRms = 0;  ///< RMS of ‖∇f‖ − 1
@@ -52,7 +52,8 @@ struct SampleFigures {
   GradientFigures gradient;
 };
 
-/// The bounds of the cells (`CellBound`), compared with samples. Cells without a sample do not count.
+/// Compares the bounds of cells (`CellBound`) with the errors at samples. Cells that contain no sample do not
+/// count.
 struct BoundFigures {
   std::size_t violations = 0;  ///< number of samples whose error or gradient exceeds the bound of their cell
   std::size_t cells = 0;
@@ -60,7 +61,7 @@ struct BoundFigures {
   double medianWorst = 0;  ///< median of the cells' greatest sampled errors
 };
 
-/// A sample with a large error and its cell.
+/// A sample with a large error, and the cell that contains the sample.
 struct WorstPoint {
   Vector3 point;
   double exact;  ///< Φ at the point
@@ -91,19 +92,20 @@ struct Verification {
   std::vector<WorstPoint> worst;       ///< points with the greatest |f − Φ|, greatest first
 };
 
-/// The exact surface that a field is compared with. The referenced objects must outlive it.
+/// The exact surface with which a field is compared. The objects to which the members refer must outlive this
+/// object.
 struct VerifiedSurface {
   const DistanceFunction& distance;                       ///< Φ
   std::function<Vector3(const Vector3&, double)> normal;  ///< returns ∇Φ from x and Φ(x); zero where it is unknown
   const TriangleMesh& mesh;                               ///< surface near which points are drawn, in the field's units
 };
 
-/// Measures |f − Φ| at samples. The result does not depend on `threads` (0: all that the machine offers).
+/// Measures |f − Φ| at the samples. The result does not depend on `threads` (0: all that the machine offers).
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads = 0);
 
-/// Measures a field's errors, signs, gradients and bounds; `findJumps` measures its jumps. The result does not depend
-/// on the number of threads. Throws `Error` as `sampleUniform` and `sampleNear` do and for options out of range,
-/// `Cancelled` when `progress` says so.
+/// Measures the errors, signs, gradients and bounds of a field; `findJumps` measures its jumps. The result does
+/// not depend on the number of threads. Throws `Error` for options out of range, and as `sampleUniform` and
+/// `sampleNear` do. Throws `Cancelled` when `progress` says so.
 Verification verify(const Field& field, const VerifiedSurface& surface, const VerifyOptions& options = {},
                     const Progress& progress = {});
 

@@ -8,15 +8,17 @@
 namespace hpsdf::basis {
 namespace {
 
-/// A point that stands for all its images under the symmetries of the cube, each with the same weight.
+/// A quadrature point that represents all its images under the symmetries of the cube. All images have the same
+/// weight.
 struct Orbit {
   double weight;
   double x, y, z;
 };
 
-// These rules solve the moment equations over all kinds of orbits by Levenberg-Marquardt from random starts. Up to
-// order 11 they have as few points as the rules in F. Witherden, P. Vincent, "On the identification of symmetric
-// quadrature rules for finite element methods", 2015. Tests check the moments.
+// The rules below were found by solving the moment equations over all kinds of orbits by the
+// Levenberg-Marquardt method from random starts. Up to order 11 they have as few points as the rules in F.
+// Witherden, P. Vincent, "On the identification of symmetric quadrature rules for finite element methods",
+// 2015. Tests check the moments.
 constexpr Orbit kOrder5[] = {
     {0.88642659279778391, 0.79582242575422146, 0, 0},
     {0.33518005540166201, 0.75878691063932813, 0.75878691063932813, 0.75878691063932813},

@@ -1,10 +1,10 @@
-// The part of legendre.h that works on a number or on a SIMD vector of numbers (`Number`). legendre.h includes this
-// file for numbers. Highway compiles code for one instruction set within that set's namespace, so that files with SIMD
-// code include it there again.
+// The functions of legendre.h that work on a number or on a SIMD vector of numbers (type `Number`). legendre.h
+// includes this file for plain numbers. Files with SIMD code include this file once more for each instruction
+// set, because Highway compiles the code for an instruction set within a namespace of its own.
 
-/// values[i] = L_i(t) for i = 0..degree, by the three-term recurrence (Koschier et al. 2016, eq. 4) in the form
-/// L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1). The ratios i/(i+1) are tabulated, because divisions would take most
-/// of the time.
+/// Computes values[i] = L_i(t) for i = 0..degree by the three-term recurrence (Koschier et al. 2016, eq. 4) in
+/// the form L_{i+1} = t L_i + (t L_i - L_{i-1}) i/(i+1). The ratios i/(i+1) are tabulated, because divisions
+/// would take most of the time.
 template <typename Number>
 inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* values) {
   values[0] = Number(1);
@@ -16,8 +16,8 @@ inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* v
   }
 }
 
-/// values[i] = L_i(t) and derivatives[i] = L_i'(t) for i = 0..degree, by L_i' = L_{i-2}' + (2i-1) L_{i-1}, which also
-/// holds at t = ±1.
+/// Computes values[i] = L_i(t) and derivatives[i] = L_i'(t) for i = 0..degree. The derivatives follow from L_i'
+/// = L_{i-2}' + (2i-1) L_{i-1}, which also holds at t = ±1.
 template <typename Number>
 inline void legendreValuesAndDerivatives(std::type_identity_t<Number> t, int degree, Number* values,
                                          Number* derivatives) {

@@ -14,7 +14,8 @@ QuadratureRule gaussLegendre(int n) {
   std::vector<double> values(n + 1);
   std::vector<double> derivatives(n + 1);
   for (int i = 0; i < (n + 1) / 2; ++i) {
-    // Newton's method from Tricomi's estimate of the i-th largest root reaches rounding in a few steps.
+    // Find the i-th largest root t of L_n by Newton's method. From Tricomi's estimate of the root, the method
+    // reaches rounding precision in a few steps.
     double t = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5));
     for (int step = 0; step < 50; ++step) {
       legendreValuesAndDerivatives(t, n, values.data(), derivatives.data());

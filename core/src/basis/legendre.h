@@ -9,7 +9,8 @@
 
 namespace hpsdf::basis {
 
-/// Number of tabulated ratios i/(i+1) of the recurrence: enough for the highest degree that a quadrature rule needs.
+/// Number of tabulated ratios i/(i+1) of the three-term recurrence. It suffices for the highest degree of a
+/// Legendre polynomial that a quadrature rule needs.
 constexpr int kMostLegendre = 256;
 constexpr auto kLegendreRatio = [] {
   std::array<double, kMostLegendre> ratio{};
@@ -25,7 +26,8 @@ struct QuadratureRule {
   std::vector<double> weights;
 };
 
-/// The n-point Gauss-Legendre rule, exact for polynomials up to degree 2n-1. Points ascend and are exactly symmetric.
+/// Returns the n-point Gauss-Legendre rule, which is exact for polynomials up to degree 2n-1. The points ascend
+/// and are exactly symmetric about 0.
 QuadratureRule gaussLegendre(int n);
 
 }  // namespace hpsdf::basis

@@ -7,7 +7,7 @@
 namespace hpsdf::basis {
 namespace {
 
-/// The tensor product of an axis rule, with z fastest.
+/// Returns the tensor product of three copies of a one-dimensional rule, with z fastest.
 Cubature product(const QuadratureRule& axis) {
   Cubature all;
   for (std::size_t a = 0; a < axis.points.size(); ++a)
@@ -19,7 +19,8 @@ Cubature product(const QuadratureRule& axis) {
   return all;
 }
 
-/// Tensor product of a rule along each axis. The contractions cost O(n⁴) for n points an axis, a matrix O(n⁶).
+/// A projection at the tensor product of a one-dimensional rule along each axis. Contracting one axis after
+/// another costs O(n⁴) for n points per axis; a matrix product would cost O(n⁶).
 class ProductProjection final : public Projection {
  public:
   ProductProjection(const QuadratureRule& axis, int degree)
@@ -40,7 +41,7 @@ class ProductProjection final : public Projection {
   }
 
  private:
-  /// [a][b][k] = Σ_c rows[k][c] samples[a][b][c]
+  /// Contracts the samples along z: result[a][b][k] = Σ_c rows[k][c] samples[a][b][c].
   std::vector<double> contractZ(std::span<const double> samples) const {
     const int n = points_, count = degree_ + 1;
     std::vector<double> result(std::size_t(n) * n * count);
@@ -57,7 +58,7 @@ class ProductProjection final : public Projection {
     return result;
   }
 
-  /// [a][j][k] = Σ_b rows[j][b] alongZ[a][b][k], for j+k ≤ p
+  /// Contracts along y: result[a][j][k] = Σ_b rows[j][b] alongZ[a][b][k], for j+k ≤ p.
   std::vector<double> contractY(const std::vector<double>& alongZ) const {
     const int n = points_, count = degree_ + 1;
     std::vector<double> result(std::size_t(n) * count * count, 0.0);
@@ -74,7 +75,7 @@ class ProductProjection final : public Projection {
     return result;
   }
 
-  /// Coefficient (i, j, k) = Σ_a rows[i][a] alongY[a][j][k], for i+j+k ≤ p
+  /// Contracts along x: coefficient (i, j, k) = Σ_a rows[i][a] alongY[a][j][k], for i+j+k ≤ p.
   std::vector<double> contractX(const std::vector<double>& alongY) const {
     const int n = points_, count = degree_ + 1;
     std::vector<double> result(coefficientCount(degree_), 0.0);
@@ -97,7 +98,7 @@ class ProductProjection final : public Projection {
   std::vector<double> rows_;  ///< [i][q] = (2i+1)/2 · w_q · L_i(x_q)
 };
 
-/// Any cubature, as one matrix.
+/// A projection at the points of any cubature, stored as one matrix.
 class MatrixProjection final : public Projection {
  public:
   MatrixProjection(const Cubature& cubature, int degree)
@@ -127,14 +128,15 @@ class MatrixProjection final : public Projection {
   std::vector<double> matrix_;  ///< [q][coefficient]
 };
 
-/// Index of coefficient (i, j, k) among the coefficients of a degree.
+/// Returns the index of the coefficient (i, j, k) in the coefficients of a polynomial of total degree `degree`.
 int indexOf(int i, int j, int k, int degree) {
   const int rest = degree - i;
   return coefficientCount(degree) - coefficientCount(rest) +
          ((rest + 1) * (rest + 2) - (rest - j + 1) * (rest - j + 2)) / 2 + k;
 }
 
-/// Joins the projections of two halves of a box along an axis into the projection of the box.
+/// Joins the projections of the two halves of a box into the projection of the whole box. The halves are
+/// adjacent along `axis`.
 std::vector<double> joinedAlong(int axis, const std::vector<double>& below, const std::vector<double>& above,
                                 int degree) {
   static const std::array<detail::LegendreRows, 2> shares = halfShares();
@@ -187,7 +189,8 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
 }
 
 std::array<detail::LegendreRows, 2> halfShares() {
-  // On the upper half L_i((t+1)/2) = Σ_a r_ia L_a(t), so that the share is r_ia ‖L_a‖² / ‖L_i‖² / 2.
+  // On the upper half of the interval, L_i((t+1)/2) = Σ_a r_ia L_a(t). Therefore the contribution of the half's
+  // coefficient a to coefficient i of the whole interval is r_ia ‖L_a‖² / ‖L_i‖² / 2.
   const detail::LegendreRows r = detail::legendreOfPart(0.5, 0.5, kMaxDegree + 1);
   std::array<detail::LegendreRows, 2> shares;
   for (int i = 0; i <= kMaxDegree + 1; ++i)

@@ -1,8 +1,8 @@
 #pragma once
-// L2 projection of samples onto the polynomials of total degree p of a cell.
+// L2 projection of samples within a cell onto the polynomials of total degree at most p.
 //
-// Coefficients are those of the products L_i L_j L_k with i+j+k ≤ p, in the order of FieldData: lexicographic in
-// (i, j, k), k fastest.
+// The coefficients belong to the products L_i L_j L_k with i+j+k ≤ p. Their order is that of FieldData:
+// lexicographic in (i, j, k), k fastest.
 
 #include <array>
 #include <memory>
@@ -17,7 +17,8 @@
 
 namespace hpsdf::basis {
 
-/// Calls f(i, j, k, index) for every coefficient of total degree ≤ p, in their order of storage.
+/// Calls f(i, j, k, index) for every coefficient with i + j + k ≤ degree, in the order in which coefficients
+/// are stored.
 template <typename F>
 void forEachCoefficient(int degree, F&& f) {
   int index = 0;
@@ -26,10 +27,11 @@ void forEachCoefficient(int degree, F&& f) {
       for (int k = 0; k <= degree - i - j; ++k) f(i, j, k, index++);
 }
 
-/// ∫ (L_i L_j L_k)² over a cell, divided by its volume.
+/// Returns ∫ (L_i L_j L_k)² over a cell, divided by the volume of the cell.
 inline double squaredNorm(int i, int j, int k) { return 1.0 / ((2 * i + 1) * (2 * j + 1) * (2 * k + 1)); }
 
-/// Squared L2 norm of the terms of exactly total degree p, over a cell of this volume (Koschier et al. 2016, eq. 6).
+/// Returns the squared L2 norm, over a cell of this volume, of those terms of a polynomial whose total degree
+/// is exactly `degree` (Koschier et al. 2016, eq. 6).
 template <typename T>
 double topDegreeError(const T* coefficients, int degree, double volume) {
   double sum = 0;
@@ -45,7 +47,7 @@ double topDegreeError(const T* coefficients, int degree, double volume) {
   return sum * volume;
 }
 
-/// L2 projection of samples at the points of a cubature.
+/// L2 projection of a function onto polynomials, from samples of the function at the points of a cubature.
 class Projection {
  public:
   virtual ~Projection() = default;
@@ -54,10 +56,10 @@ class Projection {
   const std::vector<Vector3>& points() const { return cubature_.points; }
   int degree() const { return degree_; }
 
-  /// The n(p) coefficients for one sample at each point.
+  /// Returns the n(p) coefficients of the projection, given one sample at each point.
   virtual std::vector<double> operator()(std::span<const double> samples) const = 0;
 
-  /// Mean of the squared samples by the same cubature: ∫Φ² / V.
+  /// Returns the mean of the squared samples, ∫Φ² / V, integrated by the cubature of this projection.
   double meanSquare(std::span<const double> samples) const;
 
  protected:
@@ -67,25 +69,29 @@ class Projection {
   int degree_;
 };
 
-/// A projection at the tensor product of an axis rule, computed as a contraction of one axis after another.
+/// Returns a projection at the tensor product of a one-dimensional rule, which is computed by contracting one
+/// axis after another.
 std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, int degree);
 
-/// A projection at the points of any cubature, computed as one matrix product.
+/// Returns a projection at the points of any cubature, which is computed as one matrix product.
 std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int degree);
 
-/// Coefficients of degree p+1: those of degree p from `lower`, those of total degree p+1 from `raised`, because raising
-/// the degree keeps the lower coefficients (Koschier et al. 2016, sec. 3.3).
+/// Returns coefficients of degree p+1: the terms up to total degree p come from `lower`, the terms of total
+/// degree p+1 from `raised`. This is possible because a projection of higher degree has the same lower
+/// coefficients (Koschier et al. 2016, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
 
-/// Returns the coefficients of total degree at most `to`, out of those of `degree`.
+/// Returns the coefficients whose total degree is at most `to`, out of the coefficients of a polynomial of
+/// degree `degree`.
 std::vector<double> truncated(std::span<const double> coefficients, int degree, int to);
 
-/// The matrices that join the projections of an interval's lower [0] and upper [1] half into the projection of the
-/// whole interval: element (i, a) is the contribution of a half's coefficient a ≤ i to coefficient i of the whole.
+/// Returns two matrices that join the projections of the lower half [0] and the upper half [1] of an interval
+/// into the projection of the whole interval. Element (i, a), a ≤ i, is the contribution of a half's
+/// coefficient a to coefficient i of the whole.
 std::array<detail::LegendreRows, 2> halfShares();
 
-/// The cell's projection from those of its eight children (number x + 2y + 4z), all of one degree. The result equals
-/// the projection of all the children's samples.
+/// Joins the projections of a cell's eight children (number x + 2y + 4z), all of one degree, into the cell's
+/// projection. The result equals the projection of all samples of the children.
 std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree);
 
 }  // namespace hpsdf::basis

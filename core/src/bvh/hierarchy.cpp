@@ -17,7 +17,8 @@ namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-/// The branches and blocks of a tree in depth-first order; their positions are the indices of nodes and blocks.
+/// The branches and blocks of a tree in depth-first order. The position of a branch in `nodes` is the index of
+/// its node; the position of a block in `blocks` is the index of the block.
 struct Numbered {
   std::vector<const Branch*> nodes;
   std::vector<std::array<std::uint32_t, kWidth>> children;  ///< `Node::child` of each node
@@ -42,7 +43,7 @@ struct Numbered {
   }
 };
 
-/// A box whose axes are the columns of `axes`.
+/// A box whose axis directions are the columns of the matrix `axes`.
 struct OrientedBox {
   Eigen::Vector3f center = Eigen::Vector3f::Zero(), half = Eigen::Vector3f::Zero();
   Eigen::Matrix3f axes = Eigen::Matrix3f::Zero();
@@ -50,16 +51,18 @@ struct OrientedBox {
   float area() const { return half[0] * half[1] + half[1] * half[2] + half[2] * half[0]; }
 };
 
-/// A box that no search reaches: its half sizes are so negative that every squared distance exceeds kOutOfReach.
+/// Returns a box that no search visits. Its half sizes are negative and so large in magnitude that the computed
+/// squared distance from any point to the box exceeds kOutOfReach.
 OrientedBox unreachableBox() {
   OrientedBox box;
   box.half.setConstant(-2 * std::sqrt(kOutOfReach));
   return box;
 }
 
-/// The box with these axes and these extents along them.
+/// Returns the box that has these axes and these extents along the axes.
 OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
-  // Points, their products with the axes and the sums of the products are rounded; each is at most √3.
+  // This margin covers the rounding of points, of their products with the axes and of the sums of the products.
+  // Each of these numbers is at most √3.
   constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
   const Eigen::Matrix3d asRounded = axes.cast<double>();
   const Vector3 low = extents.lower.head<3>().cast<double>(), high = extents.upper.head<3>().cast<double>();
@@ -71,10 +74,10 @@ OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
   return box;
 }
 
-/// Fits the boxes of nodes to triangles, which are in the tree's order.
+/// Fits the boxes of nodes to triangles. The triangles are in the order of the tree.
 class BoxFitter {
  public:
-  /// `points` are the vertices in local coordinates, with a fourth lane of 0.
+  /// `points` are the vertices in local coordinates. Their fourth lane is 0.
   BoxFitter(const std::vector<Corners>& triangles, const std::vector<Eigen::Array4f>& points)
       : triangles_(triangles), points_(points) {}
 
@@ -108,8 +111,9 @@ class BoxFitter {
     return orientedBox.area() < alignedBox.area() ? orientedBox : alignedBox;
   }
 
-  /// The mean normal, the direction of the greatest extent perpendicular to it, and the third axis. A sample of the
-  /// triangles suffices for large ranges.
+  /// Returns the axes of a box for the triangles of `child`: their mean normal, the direction of the greatest
+  /// extent perpendicular to it, and the direction perpendicular to both. If there are many triangles, a sample
+  /// of them suffices.
   Eigen::Matrix3d axesOf(const Branch::Child& child) const {
     const std::uint32_t step = 1 + (child.end - child.begin) / kSamples;
     const Eigen::Vector4f reference = points_[triangles_[child.begin][0]];
@@ -166,7 +170,8 @@ void requireSurface(const TriangleMesh& mesh) {
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
-  // Corners are halved before they are added, so that center and size of any finite box are finite.
+  // The corners are halved before they are added, because their sum could overflow. The center and size of any
+  // finite box thus are finite.
   center_ = box.min() / 2 + box.max() / 2;
   const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;

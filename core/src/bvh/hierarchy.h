@@ -14,11 +14,11 @@
 
 namespace hpsdf::bvh {
 
-/// Throws `Error` (mesh) unless the mesh has at least one and at most `Hierarchy::kMaxTriangles` triangles, of vertices
-/// that exist, and all coordinates are finite.
+/// Throws `Error` (mesh) unless the mesh has at least one and at most `Hierarchy::kMaxTriangles` triangles, all
+/// their vertices exist, and all coordinates are finite.
 void requireSurface(const TriangleMesh& mesh);
 
-/// The nearest triangle of a point.
+/// The triangle of a mesh that is nearest to a query point.
 struct Nearest {
   std::uint32_t triangleRef = 0;  ///< reference of the triangle, see `Hierarchy::frameAt`
   FramePoint point;               ///< the query point relative to that triangle's frame
@@ -26,22 +26,24 @@ struct Nearest {
 
 constexpr int kPacket = 8;  ///< points of a packet
 
-/// Four oriented boxes in single precision and local coordinates, which map the mesh into [-1, 1]³; 256 bytes.
+/// A node of the hierarchy: four oriented boxes in single precision, 256 bytes. Its local coordinates map the
+/// mesh into [-1, 1]³.
 struct alignas(64) Node {
   enum Field { center = 0, axes = 3, half = 12, fields = 15 };
   float field[fields][kWidth];
-  /// The index of a node, the index of a block with kBlockBit set, or kEmpty, whose box no search reaches.
+  /// For each box: the index of a child node; or the index of a block, with kBlockBit set; or kEmpty, whose box
+  /// no search visits.
   std::uint32_t child[kWidth];
 };
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
-/// A squared distance that exceeds those of all points for which the search uses single precision. The boxes of empty
-/// children are still farther away.
+/// A squared distance that is greater than that of any point for which the search uses single precision. The
+/// boxes of empty children are even farther away.
 constexpr float kOutOfReach = 1e33f;
 
-/// Up to four triangles in single precision and local coordinates: the fields of `TriangleFrame` without the normal.
-/// Unused lanes repeat the last triangle.
+/// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except
+/// the normal. Unused lanes repeat the last triangle.
 struct alignas(32) Block {
   enum Field {
     origin = 0,
@@ -59,8 +61,9 @@ struct alignas(32) Block {
   std::uint32_t count;
 };
 
-/// An array without initial values. Each thread touches memory first where it fills it, so that pages are placed near
-/// that thread and no single thread has to clear them beforehand.
+/// An array whose elements are not initialised. The thread that fills a part of the array is the first to touch
+/// its memory pages. Therefore the pages are placed near this thread, and no single thread has to clear them
+/// beforehand.
 template <typename T>
 class Array {
  public:
@@ -77,47 +80,52 @@ class Array {
   std::size_t size_ = 0;
 };
 
-/// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children a node.
+/// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per
+/// node.
 ///
-/// Nodes and blocks only decide which triangles to skip. They are single precision, and every bound allows for its
-/// rounding, so that no triangle that may be the nearest is skipped. Among the remaining triangles the answer is the
-/// minimum by (squared distance in double, mesh index). It depends neither on the tree nor on the seeds of a search nor
-/// on the instruction set.
+/// Nodes and blocks only decide which triangles a search skips. They are in single precision, and every bound
+/// allows for the rounding, so that no triangle that may be the nearest is skipped. Among the other triangles,
+/// the search returns the minimum by (squared distance in double, mesh index). The result depends neither on
+/// the tree nor on the triangles from which a search starts nor on the instruction set.
 class Hierarchy {
  public:
   Hierarchy() = default;
 
-  /// Builds the hierarchy of a mesh that `requireSurface` accepts; `box` is the mesh's bounding box.
+  /// Builds the hierarchy of a mesh that meets the conditions of `requireSurface`; `box` is the mesh's bounding
+  /// box.
   Hierarchy(const TriangleMesh& mesh, const Box& box);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// Returns the triangle with this reference: number `triangleRef % kWidth` of block `triangleRef / kWidth`.
+  /// Returns the triangle that `triangleRef` refers to: triangle `triangleRef % kWidth` of block `triangleRef /
+  /// kWidth`.
   const TriangleFrame& frameAt(std::uint32_t triangleRef) const { return frames_[slotAt(triangleRef)]; }
 
   std::span<const Node> nodes() const { return nodes_; }
   std::span<const Block> blocks() const { return blocks_; }
 
-  /// The slot of a triangle: its number in the hierarchy's order, in which the triangles of a block are adjacent.
+  /// Returns the slot of a triangle, its position in the order of the hierarchy. The triangles of a block have
+  /// successive slots.
   std::uint32_t slotAt(std::uint32_t triangleRef) const {
     return blocks_[triangleRef / kWidth].first + triangleRef % kWidth;
   }
 
-  // Frames and triangles are indexed by slot: most neighbours on the surface are neighbours in memory.
+  // The arrays of frames and triangles are indexed by slot. Most triangles that are close on the surface are
+  // close in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
   std::span<const Triangle> triangles() const { return triangles_; }  ///< as indices of `vertices`
   std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use
 
   std::size_t bytes() const;
 
-  /// Converts x to the local coordinates in which nodes and blocks are stored.
+  /// Converts x to the local coordinates that nodes and blocks use.
   Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
   double scale() const { return scale_; }
 
  private:
-  /// Fills triangles_ and vertices_ from the mesh, in the tree's order.
+  /// Fills the members triangles_ and vertices_ from the mesh, in the order of the tree.
   void sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order);
-  /// Fills a block with the triangles of slots [begin, end).
+  /// Fills a block with the triangles in the slots from `begin` to `end` - 1.
   void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
 
   Array<TriangleFrame> frames_;

@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bvh/search.cpp"
 #include <hwy/foreach_target.h>
-// Highway requires these after foreach_target.h.
+// Highway requires that these headers come after foreach_target.h.
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
@@ -22,8 +22,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Each of at most 64 levels (see `makeTriangleTree`) leaves at most three children on the stack, and four more entries
-/// are written at its end.
+/// The tree has at most 64 levels (see `makeTriangleTree`). Each level leaves at most three children on the
+/// stack, and four more entries are written above its top.
 constexpr std::size_t kStackSize = 3 * 64 + 8;
 
 template <class V>
@@ -36,7 +36,8 @@ struct SquaredBounds {
   hn::Vec<D> lower, upper;
 };
 
-/// Squared distance to an oriented box; `field(i)` is the i-th field of `Node` for that box.
+/// Returns the squared distance from a point to an oriented box; `field(i)` is the i-th field of `Node` for
+/// this box.
 template <class D, class Fields>
 HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields& field) {
   const auto wx = p.x - field(Node::center), wy = p.y - field(Node::center + 1), wz = p.z - field(Node::center + 2);
@@ -50,8 +51,9 @@ HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields&
   return sum;
 }
 
-/// Bounds of the squared distance to a triangle; `field(i)` is the i-th field of `Block` for that triangle. The bounds
-/// include the rounding of this function, but not that of the point's and the triangle's coordinates to float.
+/// Returns bounds of the squared distance from a point to a triangle; `field(i)` is the i-th field of `Block`
+/// for this triangle. The bounds include the rounding within this function. They do not include the rounding of
+/// the coordinates of the point and the triangle to float.
 template <class D, class Fields>
 HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point, const Fields& field) {
   const auto zero = hn::Zero(d);
@@ -70,8 +72,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   const auto fromB = p - length, rightAlong = apexAlong - length;
   const auto right = unit(hn::MulAdd(fromB, rightAlong, q * apexAcross) * field(Block::inverseRight));
   const auto rightP = hn::NegMulAdd(right, rightAlong, fromB), rightQ = hn::NegMulAdd(right, apexAcross, q);
-  // By rounding, a point beyond a sharp corner may seem to lie on the inner side of both edges there. If its
-  // projection also falls within the base, it is inside up to rounding.
+  // Because of rounding, a point beyond a sharp corner may seem to lie on the inner side of both edges at this
+  // corner. If the point's projection also falls within the base of the triangle, it is inside up to rounding.
   const auto inside = hn::And(hn::And(q > zero, base == zero),
                               hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
   const auto side = hn::Min(hn::MulAdd(base, base, q * q), hn::Min(hn::MulAdd(leftP, leftP, leftQ * leftQ),
@@ -83,22 +85,24 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   return {squared - rounding, squared + rounding};
 }
 
-/// Returns (√upper + δ)²: a triangle or box with a greater lower bound is farther away than a triangle with this
-/// upper bound.
+/// Returns (√upper + δ)². If the lower bound of a triangle or box is greater, it is farther away than the
+/// triangle with this upper bound.
 template <class D>
 HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   const auto distance = hn::Sqrt(upper) + hn::Set(d, delta);
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
-/// Result of `locateLanes`: the squared distances to a triangle and the members of `FramePoint`, for each lane.
+/// The result of `locateLanes` for each lane: the squared distance to a triangle, and the members of
+/// `FramePoint`.
 template <class D>
 struct Located {
   hn::Vec<D> squared, height, side[3], inside;
 };
 
-/// Locates points relative to a triangle, as `locate` of triangle_frame.h does. The operations are the same in the same
-/// order and none is fused, so that every instruction set yields the same bits.
+/// Locates points relative to a triangle, as `locate` of triangle_frame.h does. Both functions perform the same
+/// operations in the same order, and no operations are fused, so that every instruction set yields the same
+/// bits.
 template <class D>
 HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::Vec<D>>& point) {
   const auto number = [&](double value) HWY_ATTR { return hn::Set(d, value); };
@@ -124,7 +128,7 @@ HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::V
   return at;
 }
 
-/// Returns true if the lower bound is within the limit for any of the points.
+/// Returns true if lower[i] ≤ limit[i] for any point i of the packet.
 template <int Lanes>
 HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   const hn::CappedTag<float, Lanes> d;
@@ -135,7 +139,8 @@ HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   return !hn::AllFalse(d, within);
 }
 
-/// Computes the distances to the candidates in double precision, keeps the nearest triangles, and empties the list.
+/// Computes the distances from the points to the candidate triangles in double precision, keeps the nearest
+/// triangle of each point, and empties the list of candidates.
 template <int Lanes>
 HWY_INLINE void settle(Search<Lanes>& s) {
   const hn::CappedTag<double, Lanes> d;
@@ -168,7 +173,7 @@ HWY_INLINE void settle(Search<Lanes>& s) {
   s.count = 0;
 }
 
-/// The search for points that exceed the range of float: every triangle is a candidate.
+/// Searches for points whose coordinates exceed the range of float. Every triangle is a candidate.
 template <int Lanes>
 void tryAll(Search<Lanes>& s) {
   const auto& blocks = s.hierarchy.blocks();
@@ -189,7 +194,7 @@ HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
   return false;
 }
 
-/// Prefetches an object that is probably needed next into the cache.
+/// Prefetches into the cache an object that is probably needed next.
 template <class T>
 HWY_INLINE void prefetch(const T* object) {
   for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(object) + line);
@@ -200,15 +205,16 @@ HWY_INLINE void prefetchChild(const Node* nodes, const Block* blocks, std::uint3
   prefetch(child & kBlockBit ? reinterpret_cast<const Node*>(blocks + (child & ~kBlockBit)) : nodes + child);
 }
 
-/// The children that the traversal still has to visit. Those of one node are pushed farthest first, so that the nearest
-/// is popped next.
+/// The stack of nodes and blocks that the traversal still has to visit. The children of a node are pushed
+/// farthest first, so that the nearest child is popped next.
 template <class Entry>
 class Stack {
  public:
   bool empty() const { return top_ == 0; }
   const Entry& pop() { return entries_[--top_]; }
 
-  /// Returns space for four entries above the top. The caller fills it, and keeps its first entries by `grow(count)`.
+  /// Returns space for four entries above the top of the stack. The caller writes entries into this space and
+  /// then calls `grow(count)`, which keeps the first `count` of them.
   Entry* room() { return entries_.data() + top_; }
   void grow(int count) { top_ += count; }
 
@@ -217,8 +223,9 @@ class Stack {
   std::size_t top_ = 0;
 };
 
-/// The rank of each of four children by descending key; children out of reach have a negative key and come last. All
-/// pairs are compared without branches, most of which would be mispredicted.
+/// Returns the ranks of four children by descending key. Children that are out of reach have a negative key and
+/// come last. All pairs of keys are compared without branches, because the processor would mispredict most of
+/// them.
 HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
@@ -226,8 +233,8 @@ HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
-/// Traverses the hierarchy: visits the seeds, then every node and block that is still within reach when it is popped,
-/// and settles the remaining candidates.
+/// Traverses the hierarchy. It visits the seed blocks first, then each node or block that is still within reach
+/// when it is popped from the stack. At the end it settles the remaining candidates.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
 HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode,
                          const VisitBlock& visitBlock, const InReach& inReach) {
@@ -247,7 +254,7 @@ HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode&
   }
 }
 
-/// A child of a node and the lower bound of its squared distance to the point.
+/// A child of a node, and a lower bound of the squared distance from the query point to the child's box.
 struct Pending {
   float lower;
   std::uint32_t child;
@@ -297,13 +304,13 @@ void runOne(Search<1>& s) {
 using PacketTag = hn::CappedTag<float, kPacket>;
 constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
 
-/// A child of a node and the lower bounds of its squared distances to the points of a packet.
+/// A child of a node, and lower bounds of the squared distances from the points of a packet to the child's box.
 struct PendingOfPacket {
   alignas(32) float lower[kPacket];
   std::uint32_t child;
 };
 
-/// The least lower bound among those within their limit; -1 if none is.
+/// Returns the least of the lower bounds that do not exceed the limit of their lane, or -1 if all exceed it.
 HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
   const auto none = hn::Set(d, kOutOfReach);
   auto all = none;
@@ -315,7 +322,7 @@ HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limi
   return hn::GetLane(hn::IfThenElse(all < none, all, hn::Set(d, -1.0f)));
 }
 
-/// The arrays of a hierarchy as pointers that stay in registers during the search.
+/// Pointers to the arrays of a hierarchy. As local copies they stay in registers during the search.
 struct Arrays {
   explicit Arrays(const Hierarchy& hierarchy)
       : nodes(hierarchy.nodes().data()), blocks(hierarchy.blocks().data()), frames(hierarchy.frames().data()) {}
@@ -331,8 +338,9 @@ HWY_INLINE PacketPoint pointAt(PacketTag d, const Search<kPacket>& s, std::size_
   return {hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
 }
 
-/// Adds the triangles of a block that may be nearest to any of the points to the candidates. All triangles are computed
-/// before any is rejected, without branches, because the outcome is hard to predict.
+/// Adds to the candidates those triangles of a block that may be nearest to a point of the packet. The
+/// distances to all triangles are computed before any triangle is rejected, because branches would be
+/// mispredicted.
 HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std::uint32_t blockIndex) {
   const PacketTag d;
   const Block& block = arrays.blocks[blockIndex];
@@ -358,7 +366,7 @@ HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std
   }
 }
 
-/// Pushes the children of a node that are within reach of any of the points.
+/// Pushes those children of a node onto the stack that are within reach of at least one point of the packet.
 HWY_INLINE void visitNodeOfPacket(const Search<kPacket>& s, const Arrays& arrays, const Node& node,
                                   Stack<PendingOfPacket>& stack) {
   const PacketTag d;
@@ -424,7 +432,7 @@ void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPac
 }
 
 std::string_view instructionSet() {
-  // Highway numbers better instruction sets by lower bits.
+  // Highway gives better instruction sets lower bits. The lowest set bit is therefore the best supported set.
   return hwy::TargetName(static_cast<std::int64_t>(
       std::uint64_t{1} << std::countr_zero(static_cast<std::uint64_t>(hwy::SupportedTargets() & HWY_TARGETS))));
 }

@@ -1,7 +1,7 @@
 #pragma once
-// The SIMD search for nearest triangles. It traverses the hierarchy in single precision, collects the triangles that
-// may be the nearest as candidates, and measures those in double precision by the same operations on every instruction
-// set.
+// SIMD search for the nearest triangles. It traverses the hierarchy in single precision and collects candidate
+// triangles that may be the nearest. It computes the distances to the candidates in double precision, with the
+// same operations on every instruction set.
 
 #include <array>
 #include <cstdint>
@@ -11,19 +11,19 @@
 
 namespace hpsdf::bvh {
 
-/// State of the search for the nearest triangles of `Lanes` points. Single-precision distances are in the hierarchy's
-/// local coordinates and squared.
+/// State of a search for the nearest triangles of `Lanes` points. Its single-precision distances are squared
+/// and in the local coordinates of the hierarchy.
 template <int Lanes>
 struct Search {
   static constexpr int kCapacity = 96;  ///< greatest number of candidates that wait for `settle`
 
   Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
-  /// Adds the block of a triangle that is probably near to those visited first, which gives a tight bound from the
-  /// start.
+  /// Makes the search visit the block of this triangle first. If the triangle is close to the query points, the
+  /// search has a tight distance bound from the start.
   void addSeed(std::uint32_t triangleRef);
 
-  /// The nearest triangle of the point in a lane, once `run` has finished.
+  /// Returns the triangle nearest to the point in this lane. `run` must have finished.
   Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
@@ -39,7 +39,8 @@ struct Search {
   std::array<std::uint32_t, kCapacity> candidates;  ///< triangle references
   alignas(64) float lower[kCapacity][Lanes];        ///< lower bounds of the candidates' squared distances
 
-  // Double precision, in mesh units: the points, and the nearest triangle of each among the settled candidates.
+  // In double precision and mesh units: the query points, and for each point the nearest triangle among the
+  // settled candidates.
   alignas(64) double exact[3][Lanes];
   alignas(64) double squared[Lanes];
   alignas(64) double triangle[Lanes];  ///< index in the mesh
@@ -59,8 +60,9 @@ void run(Search<kPacket>& search);
 /// The triangle nearest to x.
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 
-/// The nearest triangles of a packet of points that lie close to each other, by one search. On entry `nearest` holds
-/// triangles to start from, such as the results for neighbouring points; on return it holds the results.
+/// Finds the nearest triangle of each point of a packet in one search. The points should be close to each
+/// other. On entry `nearest` holds triangles to start from, such as the results of nearby points; on return it
+/// holds the results.
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest);
 

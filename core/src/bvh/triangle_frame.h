@@ -9,13 +9,14 @@
 
 namespace hpsdf::bvh {
 
-/// A triangle in its own right-handed orthonormal frame, longest side first: corner A at the origin, B at (length, 0),
-/// the apex C at (apexAlong, apexAcross) with 0 ≤ apexAlong ≤ length and apexAcross ≥ 0.
+/// A triangle in its own right-handed orthonormal frame. The longest side AB comes first: corner A is the
+/// origin, B is (length, 0), and the apex C is (apexAlong, apexAcross) with 0 ≤ apexAlong ≤ length and
+/// apexAcross ≥ 0.
 ///
-/// The frame is orthonormal to rounding and the plane coordinates are measured in it. Even for a thin or collapsed
-/// triangle the frame therefore represents the triangle to a few roundings of its longest side, and distances need no
-/// special case for slivers. A triangle without area has apexAcross = 0: no point projects strictly into it, and the
-/// distance to its sides applies.
+/// The frame is orthonormal up to rounding, and the plane coordinates are measured in it. Even for a thin or
+/// collapsed triangle, the frame represents the triangle up to a few roundings of its longest side. Distances
+/// therefore need no special case for slivers. A triangle without area has apexAcross = 0: no point projects
+/// strictly into such a triangle, and its distance is that to its sides.
 struct TriangleFrame {
   Vector3 origin;              ///< corner A
   Vector3 along;               ///< unit vector from A to B
@@ -33,19 +34,21 @@ struct TriangleFrame {
 
 inline bool hasArea(const TriangleFrame& frame) { return frame.apexAcross > 0; }
 
-/// The normal of a triangle whose height is below kFlat times its largest coordinate is rounding noise.
+/// If a triangle's height is below kFlat times its largest coordinate, its computed normal is only rounding
+/// noise.
 constexpr double kFlat = 4 * std::numeric_limits<double>::epsilon();
 
 TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t triangle);
 
-/// A point relative to a triangle's frame.
+/// A point in the coordinates of a triangle's frame.
 struct FramePoint {
   double height;               ///< signed distance to the triangle's plane
   std::array<double, 3> side;  ///< squared distances of the point's projection to the sides AB, BC and CA
   bool inside;                 ///< the point projects strictly into the triangle
 };
 
-/// Locates a point relative to a triangle. search.cpp repeats these operations in SIMD; tests compare the two.
+/// Computes the coordinates of point x in the triangle's frame. search.cpp repeats these operations in SIMD,
+/// and tests compare both versions.
 inline FramePoint locate(const TriangleFrame& f, const Vector3& x) {
   const double wx = x[0] - f.origin[0], wy = x[1] - f.origin[1], wz = x[2] - f.origin[2];
   const double p = wx * f.along[0] + wy * f.along[1] + wz * f.along[2];

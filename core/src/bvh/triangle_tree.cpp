@@ -13,8 +13,8 @@ constexpr std::uint32_t kLeafSize = kWidth;
 constexpr int kBins = 16;
 constexpr float kNarrowest = 1e-30f;  ///< smallest extent of centers that bins can divide
 
-/// From this level on ranges are halved by count, so that no input makes the tree deeper than kMaxLevel + 32 levels:
-/// each further level at least halves a range of at most 2^32 triangles.
+/// From this level of the tree on, ranges of triangles are halved by count. Each further level at least halves
+/// a range of at most 2^32 triangles, so that no input makes the tree deeper than kMaxLevel + 32 levels.
 constexpr int kMaxLevel = 32;
 
 constexpr std::uint32_t kSamples = 1024;                              ///< triangles by which a range's split is chosen
@@ -29,7 +29,8 @@ struct Item {
   Eigen::Array4f doubledCenter() const { return box.lower + box.upper; }
 };
 
-/// A range of items, with the box of their boxes and the box of their doubled centers.
+/// A range of triangles, the bounding box of their boxes, and the bounding box of the doubled centers of their
+/// boxes.
 struct Range {
   std::uint32_t begin = 0, end = 0;
   FloatBox box = {};
@@ -42,7 +43,7 @@ struct Range {
   }
 };
 
-/// Maps the centers of a range to numbers from 0 to `count` along each axis.
+/// Maps the centers of a range of triangles to bin coordinates from 0 to `count` along each axis.
 struct Bins {
   explicit Bins(const Range& range)
       : count(static_cast<int>(std::clamp<std::uint32_t>(range.size() / 2, 4, kBins))), origin(range.centers.lower) {
@@ -56,8 +57,8 @@ struct Bins {
   Eigen::Array4f origin, perUnit;
 };
 
-/// Builds a tree top-down. A node's range is split where the surface-area heuristic is least, and then the part of the
-/// largest area is split again until there are four parts.
+/// Builds a tree top-down. The triangle range of a node is split where the cost by the surface-area heuristic
+/// is least. Then the part with the largest surface area is split again until there are four parts.
 class Builder {
  public:
   explicit Builder(std::vector<Item>& items) : items_(items) {}
@@ -147,7 +148,8 @@ class Builder {
     float cost() const { return count > 0 ? box.area() * static_cast<float>(count) : kEmptyCost; }
   };
 
-  /// The axis and the first bin of the upper part at the best split; bin 0 where all centers share one bin.
+  /// Returns the axis of the best split and the first bin of its upper part. The bin is 0 if all centers share
+  /// one bin.
   std::pair<int, int> bestCut(const Range& range, const Bins& bins) const {
     Bin filled[3][kBins];
     const std::uint32_t step = 1 + range.size() / kSamples;

@@ -1,5 +1,6 @@
 #pragma once
-// The topology of a bounding-volume hierarchy: the triangles below each node, before boxes are fitted to them.
+// The tree structure of a bounding-volume hierarchy: which triangles belong to each node, before any boxes are
+// fitted.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,7 +15,7 @@ namespace hpsdf::bvh {
 
 constexpr int kWidth = 4;  ///< children of a node, triangles of a block
 
-/// Axis-aligned box of points with four lanes, the fourth of which is unused. A new box is empty.
+/// Axis-aligned box in four float lanes, of which the fourth is unused. A new box is empty.
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
@@ -34,7 +35,8 @@ struct FloatBox {
   }
 };
 
-/// A node with up to four children. Each child covers a range of `TriangleTree::order` and is a node itself or a block.
+/// A node with up to four children. Each child covers a range of `TriangleTree::order` and is a node or a block
+/// of triangles.
 struct Branch {
   struct Child {
     std::uint32_t begin = 0, end = 0;
@@ -49,8 +51,9 @@ struct TriangleTree {
   std::vector<std::uint32_t> order;  ///< triangle indices, contiguous below each branch
 };
 
-/// Builds the tree of triangles whose vertices are `points`, in coordinates of order 1 and with a fourth lane of 0. No
-/// input makes the tree deeper than 64 levels, and the number of threads does not change it.
+/// Builds the tree of triangles with the vertices `points`. Their coordinates have magnitudes of about 1, and
+/// their fourth lane is 0. No input makes the tree deeper than 64 levels. The result does not depend on the
+/// number of threads.
 TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points, const std::vector<Triangle>& triangles);
 
 }  // namespace hpsdf::bvh

@@ -26,7 +26,7 @@
 namespace hpsdf {
 namespace distance {
 
-/// An inside test with the data that it needs; the data of other tests are empty.
+/// The chosen inside test with the data that it needs. The data of the other inside tests stay empty.
 struct ChosenInsideTest {
   InsideTestChoice choice;
   sign::WindingSign winding = {};
@@ -44,15 +44,16 @@ using sign::Pseudonormals;
 using sign::WindingSign;
 
 constexpr int kLattice = 16;  // points along each axis
-/// Triangles nearer to each other than this, in coordinates of order 1, may have the same rounded distance from a
-/// point.
+/// If two triangles are nearer to each other than this, their rounded distances from a point may be equal. The
+/// unit is that of coordinates with magnitudes of about 1.
 constexpr double kTooNear = 0x1p-44;
-/// Least length of a pseudonormal. At a sharp edge this length is the angle between the two faces. The dot product
-/// that decides the sign near the edge is half the square of the angle, which has to be far above rounding errors.
+/// The least length of a usable pseudonormal. At a sharp edge the length is the angle between the edge's two
+/// faces. Near the edge a dot product decides the sign. It is half the square of the angle and must be far
+/// above rounding errors.
 constexpr double kSharp = 1e-6;
 
-/// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the box, which may be
-/// flat.
+/// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the mesh's
+/// bounding box, because the box may be flat.
 bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
   const Box box(mesh.min() - beyond, mesh.max() + beyond);
@@ -66,8 +67,8 @@ bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   return any;
 }
 
-/// Returns the slot of the largest triangle of each component. Two triangles are connected if only they share an edge
-/// and are consistently oriented there.
+/// Returns the slot of the largest triangle of each connected component. Two triangles are connected if they
+/// share an edge with no third triangle and are consistently oriented at that edge.
 std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
                                                const std::vector<mesh::DirectedEdge>& sides) {
   const auto frames = hierarchy.frames();
@@ -87,7 +88,8 @@ std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
   return slots;
 }
 
-/// Returns the lowest of `count` indices for which test(index) holds, if there is one. Tests them in parallel.
+/// Returns the lowest index below `count` for which test(index) is true, or std::nullopt if there is none.
+/// Tests the indices in parallel.
 template <typename Test>
 std::optional<std::size_t> firstWhere(std::size_t count, const Test& test) {
   std::vector<char> holds(count);
@@ -105,14 +107,16 @@ bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint
              normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
   return sharp;
 }
-/// Chooses pseudonormals where their sign is certain to be that of the winding number, which is more expensive.
+/// Chooses pseudonormals if their sign certainly equals that of the winding number, and else the winding
+/// number, which is more expensive.
 ///
-/// It is certain (Bærentzen & Aanæs 2005) if
+/// The signs are certainly equal (Bærentzen & Aanæs 2005) if
 /// * every edge is balanced, so that the mesh has no holes;
-/// * the mesh neither intersects itself nor comes so near itself that distances to two triangles may round to the same;
-/// * each component has the outside in front of it and the inside behind it. Its triangles are connected by edges of
-///   two consistent triangles, so that one of them decides for the whole component;
-/// * no edge or vertex is so sharp that its pseudonormal is dominated by rounding errors.
+/// * the mesh does not intersect itself, and no two parts of it are so close that distances to them may round
+///   to the same number;
+/// * each component has the outside in front of its triangles and the inside behind them. One triangle decides
+///   for a whole component, because edges between two consistently oriented triangles connect the component;
+/// * no edge or vertex is so sharp that rounding errors dominate its pseudonormal.
 ///
 /// Throws `Cancelled`.
 ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh& mesh, const Progress& progress) {
@@ -122,7 +126,7 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
   };
   const auto frames = hierarchy.frames();
 
-  // Holes need the winding number.
+  // Choose the winding number if the mesh has holes. Holes show as unbalanced edges.
   const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(hierarchy.triangles());
   BoundaryEdges edges(hierarchy, sides);
   if (const std::size_t unbalanced = edges.size(); unbalanced > 0) {
@@ -136,8 +140,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     return byWinding(std::move(reason), std::nullopt, std::move(winding));
   }
 
-  // Rounding errors, or surfaces closer to each other than rounding errors, could yield another surface's
-  // pseudonormals.
+  // Choose the winding number if a triangle is too thin or two surfaces are too close. Rounding errors could then
+  // select the pseudonormal of a wrong surface.
   const auto thin = std::ranges::find_if_not(frames, bvh::hasArea);
   if (thin != frames.end())
     return byWinding("a face is thinner than the rounding errors of its corners", thin->origin,
@@ -147,7 +151,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     return byWinding("the mesh intersects itself, so that normals may mislead", crossings.found[0].position,
                      WindingSign(hierarchy, mesh, std::move(edges)));
 
-  // Components must be nested and oriented like solids and their cavities.
+  // Require that the components are nested and oriented like solids and their cavities. One triangle of each
+  // component decides.
   const std::vector<std::uint32_t> largest = largestOfComponents(hierarchy, sides);
   if (largest.size() > 1) {
     WindingSign winding(hierarchy, mesh, std::move(edges));
@@ -204,15 +209,17 @@ struct ExactDistance::Data {
     hullSources = std::move(hull.sourceTriangles);
   }
 
-  /// Returns the closest point on a nearest triangle. It is computed from the mesh's own vertices, so that a point on a
-  /// vertex has distance 0. The distance has the pseudonormal's sign if that is the inside test.
+  /// Returns the closest point on the nearest triangle. The point is computed from the vertices of the mesh, so
+  /// that a query point on a vertex has distance 0. If the inside test is by pseudonormals, the distance has the
+  /// pseudonormal's sign.
   ClosestPoint resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
     const std::uint32_t slot = triangles.slotAt(nearest.triangleRef);
     const bvh::TriangleFrame& frame = triangles.frames()[slot];
     const bvh::FramePoint& point = nearest.point;
     std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
     if (point.side[2] < point.side[side]) side = 2;
-    // A projection onto an edge, up to rounding errors, is not in the interior of the face.
+    // If the point projects onto an edge up to rounding errors, the closest point is not in the interior of the
+    // face.
     const double rounding = bvh::kFlat * bvh::kFlat * (frame.length * frame.length + point.height * point.height);
     if (point.inside && point.side[side] > rounding)  // adding 0 turns -0 into 0
       return {x - frame.normal * point.height, point.height + 0.0, frame.triangle, Feature::face};
@@ -228,7 +235,7 @@ struct ExactDistance::Data {
     return signedAt(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
-  /// Computes distances to the nearest triangles of a hierarchy, with the signs of `resolve`.
+  /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs.
   void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
     using bvh::kPacket;
     std::array<bvh::Nearest, kPacket> nearest{};  // the previous packet's results, which bound the next search
@@ -241,12 +248,13 @@ struct ExactDistance::Data {
     }
   }
 
-  /// Replaces the results of `toTriangles` by signed distances according to the inside test.
+  /// Turns the distances from `toTriangles` into signed distances according to the chosen inside test.
   void applyInsideTest(std::span<const Vector3> points, std::span<double> distances) const {
     if (inside.choice.insideTest == InsideTest::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
     if (inside.choice.insideTest == InsideTest::outerHull) {
-      // Outside, a triangle nearer than the hull belongs to the hull and was removed only by its limited resolution.
+      // For points outside, find the distance to the whole mesh. A triangle nearer than the hull belongs to the true
+      // hull; it is missing only because the hull has a limited resolution.
       std::vector<double> clearances(points.size());
       toTriangles(wholeMesh, points, clearances);
       for (double& clearance : clearances) clearance = std::abs(clearance);
@@ -275,8 +283,8 @@ struct ExactDistance::Data {
                                                                 : Vector3::Zero();
   }
 
-  /// `difference` is x − closest, computed by the caller without the rounding of `closest`, which is large far from
-  /// the origin.
+  /// Returns the closest point with its signed distance. The caller computes `difference`, which is x − closest,
+  /// without the rounding error of `closest`. That error is large far from the origin.
   static ClosestPoint signedAt(const Vector3& closest, const Vector3& difference, const Vector3& normal,
                                std::uint32_t triangle, Feature feature) {
     const double length = difference.norm();

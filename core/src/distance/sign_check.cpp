@@ -26,7 +26,7 @@ Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random ran
   return foot + random.inBall(0.01 * box.sizes().maxCoeff());
 }
 
-/// Counts over a set of points.
+/// Counts of the points that are too near to the surface to be checked and of the points with a wrong sign.
 struct Tally {
   std::size_t tooNear = 0;
   std::size_t wrong = 0;

@@ -53,7 +53,8 @@ struct Member<std::array<std::uint32_t, 3>> {
   }
 };
 
-/// What a setting accepts and how it takes part in a construction; the other columns of its row complete it.
+/// What values a setting accepts and how it takes part in a construction. The setting's row in the table adds
+/// the rest.
 struct Kind : BuildSetting {
   Kind& atLeast(double limit) { return with(minimum, limit); }
   Kind& above(double limit) { return atLeast(limit).with(minimumExcluded, true); }
@@ -86,27 +87,29 @@ Kind wholeNumbers() { return {{.type = Type::wholeNumbers}}; }
 Kind flag() { return {{.type = Type::flag}}; }
 Kind choice(std::vector<std::string_view> words) { return {{.type = Type::choice, .words = std::move(words)}}; }
 
-/// Reads and changes a setting's value.
+/// Functions that read and change the value of one setting.
 struct Access {
   bool isChecked;
   Numbers (*get)(const BuildOptions&);
   void (*set)(BuildOptions&, Values);
 };
 
-/// The access to a member of `BuildOptions`.
+/// Functions that read and change one member of `BuildOptions`.
 template <auto kMember, typename M = Member<std::remove_reference_t<decltype(std::declval<BuildOptions>().*kMember)>>>
 constexpr Access member = {M::isChecked, [](const BuildOptions& options) { return M::get(options.*kMember); },
                            [](BuildOptions& options, Values numbers) { M::set(options.*kMember, numbers); }};
 
-/// No number where `value` is 0, which stands for a setting that asks for nothing.
+/// Returns the value as the only number of a list, or an empty list if the value is 0. A setting with the value
+/// 0 is unset.
 Numbers unlessZero(double value) { return value == 0 ? Numbers{} : Numbers{value}; }
 
-/// The access to a member for which 0 stands for none.
+/// Functions that read and change a member of `BuildOptions` that is unset if it is 0.
 template <auto kMember>
 constexpr Access positive = {true, [](const BuildOptions& options) { return unlessZero(options.*kMember); },
                              member<kMember>.set};
 
-/// The access to a member of the errors by distance, for which 0 stands for none.
+/// Functions that read and change a member of the target errors by distance (`NearFarError`) that is unset if
+/// it is 0.
 template <auto kMember>
 constexpr Access nearFar = {
     true, [](const BuildOptions& options) { return unlessZero(options.targetError.byDistance().*kMember); },
@@ -120,7 +123,8 @@ constexpr Access kWeightedError = {
     true, [](const BuildOptions& options) { return unlessZero(options.targetError.weighted()); },
     [](BuildOptions& options, Values numbers) { options.targetError = numbers.empty() ? 0 : numbers[0]; }};
 
-/// Both kinds of continuity as one choice: weak has bit 0 of the word's index, exact bit 1.
+/// The setting that combines weak and exact continuity. The index of its word has bit 0 set for weak and bit 1
+/// for exact continuity.
 constexpr Access kContinuity = {
     false,
     [](const BuildOptions& options) {
@@ -151,7 +155,7 @@ struct Row : BuildSetting {
 };
 
 const std::vector<Row> kRows = {
-    // the goal of the construction, and its limits of bytes
+    // settings for the goal of the construction and for its limit of bytes
     {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
      kWeightedError,
      "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "
@@ -189,7 +193,7 @@ const std::vector<Row> kRows = {
      "and a hull's pieces 80 MB at most. Left out: 1e8 besides that distance, some 240,000 cells, where target error, "
      "grid and max-steps are left out too; most meshes take less than 100,000 then. Else three quarters of the "
      "machine's memory, or of what its control group allows."},
-    // the refinement of cells
+    // settings for the refinement of cells
     {"estimator", kMethod, choice({"embedded", "residual"}).stored(8).advanced(), member<&BuildOptions::estimator>,
      "What estimates a cell's error: embedded, the coefficients of the top degree, as in the paper, or residual, the "
      "part of its samples that the fit does not represent. Neither evaluates the distance."},
@@ -218,7 +222,7 @@ const std::vector<Row> kRows = {
     {"trial-samples", kMethod, choice({"children", "own"}).hidden(), member<&BuildOptions::trialSamples>, ""},
     {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,
      "Width of a narrow band: cells farther from the surface than this are not refined and do not count. 0: no band."},
-    // changes to the finished octree, and the number of threads
+    // settings for changes to the finished octree and for the number of threads
     {"enrich", kMethod, flag().stored(12).inJson("enriched").advanced(), member<&BuildOptions::enrich>,
      "Fit every cell anew at the end, one degree higher where max-degree allows: about twice the bytes, with which "
      "weak continuity costs hardly any error."},
@@ -256,7 +260,8 @@ const std::vector<Row> kRows = {
      "Threads to use; 0 for all. The field is the same whatever their number."},
 };
 
-/// Fails to compile when `BuildOptions` gets another member. Then add a row to the table, and a name to this list.
+/// Fails to compile if `BuildOptions` gets another member. In that case, add a row to the table of settings and
+/// a name to the list of members here.
 [[maybe_unused]] void requireAllMembers(const BuildOptions& options) {
   [[maybe_unused]] const auto& [m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18, m19,
                                 m20, m21, m22, m23] = options;

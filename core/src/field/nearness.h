@@ -1,5 +1,6 @@
 #pragma once
-// The weights of the cells' errors, their totals and the goal of a construction.
+// Errors of cells, weighted by nearness to the surface; the totals of these errors; and the error goal of a
+// construction.
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 
 namespace hpsdf::detail {
 
-/// The weight κ of a cell, by the mean of its field (paper, eq. 10).
+/// The weight κ of a cell, which depends on the mean of the field in the cell (paper, eq. 10).
 struct Nearness {
   NearnessKind kind = NearnessKind::polynomial;
   double exponent = 0;  ///< θ
@@ -25,7 +26,7 @@ inline Nearness nearnessOf(const BuildOptions& settings, const Box& domain) {
   return {settings.nearnessKind, settings.nearness, domain.diagonal().norm()};
 }
 
-/// The contribution of a cell to the totals: nothing where it lies outside the narrow band.
+/// The contribution of a cell to the error totals. All numbers are 0 for a cell outside the narrow band.
 struct CellError {
   double weighted = 0;  ///< ε*_e: the squared error times κ, in units^5
   double squared = 0;   ///< ε_e, in units^5
@@ -33,7 +34,7 @@ struct CellError {
   bool near = false;  ///< the cell may hold points near the surface, see `NearFarError::nearDistance`
 };
 
-/// Sums over all leaves, in units^5 and units^3.
+/// Sums of the cell errors and of the volumes over all leaves, in units^5 and units^3.
 struct ErrorTotals {
   double weighted = 0;
   double nearSquared = 0, nearVolume = 0;
@@ -46,7 +47,7 @@ struct ErrorTotals {
   }
 };
 
-/// The errors at which the construction ends, in the field's own units.
+/// The errors at which the construction ends, in the units of the field.
 struct ErrorGoal {
   double weighted = 0;                   ///< τ in units^5; 0 where errors by distance are asked for
   double nearSquare = 0, farSquare = 0;  ///< mean squares to reach, in units^2; 0: not asked for
@@ -57,9 +58,10 @@ struct ErrorGoal {
   bool reached(const ErrorTotals& totals) const {
     return byDistance() ? nearReached(totals) && farReached(totals) : totals.weighted <= weighted;
   }
-  /// The goal with all squares multiplied by a factor.
+  /// Returns the goal with all its squared errors multiplied by `factor`.
   ErrorGoal times(double factor) const { return {weighted * factor, nearSquare * factor, farSquare * factor}; }
-  /// Returns the goal, raised to `factor` times the totals where that is greater.
+  /// Returns a relaxed goal: each error of the goal, or `factor` times the present error in `totals` if that is
+  /// greater.
   ErrorGoal relaxedTo(const ErrorTotals& totals, double factor) const {
     if (!byDistance()) return {std::max(weighted, totals.weighted * factor), 0, 0};
     const auto meanSquare = [](double squared, double volume) { return volume > 0 ? squared / volume : 0; };

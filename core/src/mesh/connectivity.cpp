@@ -8,7 +8,7 @@
 namespace hpsdf::mesh {
 namespace {
 
-/// The triangles across those edges of a triangle that exactly two triangles share.
+/// For each edge of a triangle that exactly two triangles share, the triangle on the other side of the edge.
 struct Neighbours {
   std::array<std::uint32_t, 3> face;
   std::array<char, 3> sameDirection;  ///< 1 where both run along the edge in the same direction, inconsistently
@@ -33,7 +33,8 @@ std::vector<Neighbours> neighboursOf(std::size_t faces, std::span<const Directed
 
 constexpr std::uint32_t kNone = 0xffffffff;
 
-/// Adds the patch of the triangle `lowest` by a search across edges; `pending` is scratch memory.
+/// Adds the patch that contains the triangle `lowest`. Finds the other triangles of the patch by a search
+/// across edges. `pending` is scratch memory.
 void addPatch(std::uint32_t lowest, std::span<const Neighbours> neighbours, Patches& patches,
               std::vector<std::uint32_t>& pending) {
   const auto patch = static_cast<std::uint32_t>(patches.count++);

@@ -1,5 +1,6 @@
 #pragma once
-// How the triangles of a mesh are connected: their edges, and the components and patches that these join.
+// Connectivity of a mesh: the directed edges of its triangles, and the components and patches that edges
+// connect.
 
 #include <algorithm>
 #include <cstddef>
@@ -26,7 +27,8 @@ struct DirectedEdge {
 /// left out.
 std::vector<DirectedEdge> directedEdgesOf(std::span<const Triangle> triangles);
 
-/// Calls visit(directed edges of one undirected edge) for each undirected edge of a list that is sorted by edge.
+/// Calls visit once for each undirected edge of the mesh, with all directed edges that belong to it. The given
+/// list must be sorted by undirected edge.
 template <typename Visit>
 void forEachEdge(std::span<const DirectedEdge> edges, const Visit& visit) {
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
@@ -54,7 +56,7 @@ class DisjointSets {
   /// The number of sets.
   std::size_t count() const { return sets_; }
 
-  /// The lowest element of an element's set.
+  /// Returns the lowest element of the set that contains `element`.
   std::uint32_t first(std::uint32_t element) {
     while (parent_[element] != element) element = parent_[element] = parent_[parent_[element]];
     return element;
@@ -65,12 +67,14 @@ class DisjointSets {
   std::size_t sets_;
 };
 
-/// The components of a surface: sets of triangles that are connected by edges of any number of triangles. `edges` are
-/// the directed edges of `faces` triangles, sorted by edge.
+/// Returns the components of a surface. A component is a set of triangles that are connected by edges, however
+/// many triangles share an edge. `edges` are the directed edges of `faces` triangles, sorted by undirected
+/// edge.
 DisjointSets componentsOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
-/// The patches of a surface: sets of triangles that are connected by edges of exactly two triangles. The triangles of a
-/// patch can be reversed until all agree in orientation, unless the patch is one-sided, as a Möbius strip is.
+/// The patches of a surface. A patch is a set of triangles that are connected by edges of exactly two
+/// triangles. Reversing some triangles of a patch can make all its orientations consistent, unless the patch is
+/// one-sided like a Möbius strip.
 struct Patches {
   std::size_t count = 0;
   std::vector<std::uint32_t> patchOf;  ///< the patch of each triangle; patches are numbered by their lowest triangles
@@ -78,7 +82,8 @@ struct Patches {
   std::vector<char> oneSided;          ///< 1 for patches that have no consistent orientation
 };
 
-/// `edges` are the directed edges of `faces` triangles, sorted by edge.
+/// Returns the patches of a surface. `edges` are the directed edges of `faces` triangles, sorted by undirected
+/// edge.
 Patches patchesOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
 }  // namespace hpsdf::mesh

@@ -18,7 +18,7 @@ Triangle sorted(Triangle t) {
 /// orientation if both are even or both are odd.
 bool isEven(const Triangle& t) { return (t[0] < t[1]) == ((t[1] < t[2]) == (t[0] < t[2])); }
 
-/// The triangles with the same three corners.
+/// A group of duplicates: all triangles with the same three corners.
 struct Group {
   std::uint32_t first;          ///< the lowest triangle
   std::uint32_t firstReversed;  ///< the lowest triangle oriented opposite to `first`, or `first` if there is none
@@ -26,9 +26,10 @@ struct Group {
   int reversed = 0;             ///< number of triangles with the opposite orientation
 
   bool hasBothOrientations() const { return reversed > 0; }
-  /// The first triangle with the more frequent orientation.
+  /// Returns the first triangle of the group that has the more frequent orientation.
   std::uint32_t representative() const { return reversed > same ? firstReversed : first; }
-  /// The number by which more triangles have the representative's orientation than the opposite one.
+  /// Returns by how much the triangles with the representative's orientation outnumber those with the opposite
+  /// one.
   int excess() const { return std::abs(same - reversed); }
 };
 
@@ -38,7 +39,8 @@ struct Groups {
   std::vector<DirectedEdge> edges;     ///< edges of the groups' representatives; `DirectedEdge::face` is the group
 };
 
-/// Groups triangles by their corners. The edges are left out where no two triangles have the same corners.
+/// Groups triangles that have the same corners. The edges of the groups stay empty if no two triangles have the
+/// same corners.
 Groups groupsOf(std::span<const Triangle> triangles) {
   std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // sorted corners, and the triangle
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
@@ -66,8 +68,9 @@ Groups groupsOf(std::span<const Triangle> triangles) {
   return groups;
 }
 
-/// Calls visit(set, directed edges there) for each edge of a chosen group, whose entry in `chosen` is 1; `set` is the
-/// set of the first chosen group at the edge.
+/// Calls visit(set, directed edges) for each undirected edge that has a chosen group, that is, a group whose
+/// entry in `chosen` is 1. The directed edges are all that belong to the undirected edge. `set` is the set of
+/// the first chosen group among them.
 template <typename Visit>
 void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, DisjointSets& sets, const Visit& visit) {
   forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
@@ -76,7 +79,7 @@ void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, Disjoi
   });
 }
 
-/// The sets of chosen groups that are connected by edges.
+/// Returns the disjoint sets of chosen groups that are connected by edges.
 DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen) {
   DisjointSets sets(groups.all.size());
   forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
@@ -86,13 +89,13 @@ DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen
   return sets;
 }
 
-/// The contribution of a directed edge to the balance of its edge, which is 0 where as many triangles run along it in
-/// one direction as in the other.
+/// Returns 1 or −1, which a directed edge adds to the balance of its undirected edge. The balance is 0 if
+/// equally many triangles run along the undirected edge in both directions.
 int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
-/// Marks the groups that are shared walls. A connected set of groups with both orientations is a wall if other
-/// triangles surround it and balance its edges, where these triangles count once for each group or with all their
-/// duplicates.
+/// Returns 1 for each group that is part of a shared wall, else 0. A connected set of groups with both
+/// orientations is a wall if it has surrounding triangles and these balance its edges. It suffices that they do
+/// so counted once for each group, or counted with all their duplicates.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
   for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();
@@ -122,7 +125,7 @@ std::vector<char> wallsOf(const Groups& groups) {
   return walls;
 }
 
-/// The numbers of triangles of a group that stay.
+/// How many triangles of a group are kept.
 struct Kept {
   int same = 1;      ///< triangles with the representative's orientation
   int reversed = 0;  ///< triangles with the opposite orientation
@@ -130,10 +133,10 @@ struct Kept {
   int excess() const { return same - reversed; }
 };
 
-/// Drops triangles of groups in `several` as long as that reduces the number of unbalanced edges. Connected sets of
-/// such groups shrink from their outline inwards.
+/// Drops duplicates from the groups that are marked in `several`, as long as that reduces the number of
+/// unbalanced edges. A connected set of such groups shrinks from its outline inwards.
 void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& several, std::vector<Kept>& kept) {
-  // Number the edges, and compute the balance of each.
+  // Number the undirected edges, and compute the balance of each edge.
   std::vector<int> balances;
   std::vector<std::array<std::size_t, 3>> edgesOfGroup(groups.all.size());
   std::vector<std::array<int, 3>> directions(groups.all.size());
@@ -159,7 +162,8 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
     --kept[g].same;
     return true;
   };
-  // Each round but the last leaves fewer edges unbalanced, so that this ends.
+  // Repeat until no duplicate can be dropped. Each round but the last reduces the number of unbalanced edges, so
+  // that the loop ends.
   for (bool any = true; any;) {
     any = false;
     for (std::size_t g = 0; g < groups.all.size(); ++g)
@@ -167,11 +171,12 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
   }
 }
 
-/// Returns the triangles of each group that stay: at least one, or one of each orientation in a wall. Connected
-/// groups keep all their triangles, except unbalancing duplicates, if dropping the others would leave more edges
-/// unbalanced: bodies then share these groups.
+/// Returns how many triangles of each group are kept. At least one is kept, or one of each orientation in a
+/// shared wall. If dropping all others from a connected set of groups would leave more edges unbalanced, bodies
+/// share these groups. In that case only duplicates that unbalance edges are dropped.
 std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
-  // Find the groups with more triangles than necessary, and drop unbalancing duplicates from them.
+  // Mark in `several` the groups with more triangles than necessary, and drop duplicates that unbalance edges
+  // from them.
   std::vector<char> several(groups.all.size());
   std::vector<Kept> least(groups.all.size()), kept(groups.all.size());
   for (std::uint32_t g = 0; g < several.size(); ++g) {
@@ -183,7 +188,8 @@ std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
   }
   dropUnbalancingDuplicates(groups, several, kept);
 
-  // Reduce connected groups to the least where that unbalances no more edges than it balances.
+  // Reduce each connected set of groups to its fewest triangles, unless that unbalances more edges than it
+  // balances.
   DisjointSets sets = connectedSets(groups, several);
   std::vector<int> unbalancedByLeast(groups.all.size());
   forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {

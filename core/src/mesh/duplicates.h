@@ -10,16 +10,19 @@ namespace hpsdf::mesh {
 /// Returns true for triangles with the same corners, whatever their orientation.
 bool haveSameCorners(const Triangle& one, const Triangle& other);
 
-/// Marks the triangles to drop, with 1, where several triangles have the same corners.
+/// Returns 1 for each triangle to drop and 0 for each triangle to keep. Only triangles that share their three
+/// corners with another triangle are dropped.
 ///
-/// Where all of them have one orientation, one stays. More stay where bodies share them, so that dropping them would
-/// leave more edges unbalanced; of these, duplicates that unbalance edges are dropped.
+/// If all triangles with the same corners have the same orientation, one is kept. More are kept if bodies share
+/// them, so that dropping them would leave more edges unbalanced. Of those, duplicates that unbalance edges are
+/// dropped.
 ///
-/// Where both orientations occur, the triangles that are connected by edges are one of two things:
-/// - a shared wall, if the surrounding triangles balance its edges without it. One triangle of each orientation stays,
-///   so that each body is closed;
-/// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle stays: the first with
-///   the more frequent orientation.
+/// If the triangles with the same corners have both orientations, the set of such triangles that are connected
+/// by edges is one of two things:
+/// - a shared wall, if the surrounding triangles balance its edges without it. One triangle of each orientation
+///   is kept, so that each body is closed;
+/// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle is kept: the
+///   first one with the more frequent orientation.
 std::vector<char> redundantFaces(std::span<const Triangle> triangles);
 
 }  // namespace hpsdf::mesh

@@ -21,7 +21,8 @@ std::size_t countUsedVertices(const TriangleMesh& mesh) {
   return static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
 }
 
-/// The defect of an edge, if it has one.
+/// Returns the defect of an undirected edge, or std::nullopt if the edge has no defect. `edge` holds its
+/// directed edges.
 std::optional<DefectKind> defectOf(std::span<const DirectedEdge> edge) {
   if (edge.size() == 1) return DefectKind::boundaryEdge;
   if (edge.size() > 2) return DefectKind::nonManifoldEdge;
@@ -38,16 +39,17 @@ void addEdges(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std
   });
 }
 
-/// The number of a triangle's corner at a vertex; the corners of all triangles are numbered consecutively.
+/// Returns the number of the corner that the triangle `face` has at the vertex `vertex`. The corners of all
+/// triangles of the mesh are numbered consecutively.
 std::uint32_t cornerOf(const TriangleMesh& mesh, std::uint32_t face, std::uint32_t vertex) {
   const auto& triangle = mesh.triangles[face];
   return 3 * face + static_cast<std::uint32_t>(std::ranges::find(triangle, vertex) - triangle.begin());
 }
 
-/// Adds the vertices at which more than one fan of triangles meets. Corners of one vertex are in one fan where their
-/// triangles share an edge there.
+/// Appends a defect to `found` for each vertex at which more than one fan of triangles meets. Corners of a
+/// vertex belong to one fan if their triangles share an edge at the vertex.
 void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std::vector<Defect>& found) {
-  // Join corners into fans.
+  // Join the corners at each vertex into fans, where two triangles share an edge at the vertex.
   mesh::DisjointSets fans(3 * mesh.triangles.size());
   mesh::forEachEdge(edges, [&](std::span<const DirectedEdge> edge) {
     for (const DirectedEdge& other : edge.subspan(1))
@@ -55,7 +57,7 @@ void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> 
         fans.join(cornerOf(mesh, edge.front().face, vertex), cornerOf(mesh, other.face, vertex));
   });
 
-  // Find a corner of a second fan at each vertex.
+  // At each vertex, find a corner that belongs to another fan than the vertex's first corner.
   constexpr std::uint32_t kNone = 0xffffffff;
   struct Corners {
     std::uint32_t first = kNone, ofOtherFan = kNone;
@@ -73,7 +75,8 @@ void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> 
       found.push_back({DefectKind::pinchedVertex, {first / 3, other / 3}, {mesh.vertices[v], mesh.vertices[v]}});
 }
 
-/// The number of crossings of two triangles of one component, without those of shared walls.
+/// Returns the number of crossings between two triangles of the same connected component. Pairs of
+/// triangles with the same three corners do not count.
 std::size_t countFolds(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, const Crossings& crossings) {
   if (crossings.found.empty()) return 0;
   mesh::DisjointSets components = mesh::componentsOf(mesh.triangles.size(), edges);

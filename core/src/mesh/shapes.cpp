@@ -19,7 +19,8 @@ namespace hpsdf::shapes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Lengths between these limits differ little enough for all parts of a shape to be accurate in double precision.
+// The lengths that a caller may give lie between these limits. Their ratio is small enough for all parts of
+// a shape to be accurate in double precision.
 constexpr double kShortest = 1e-3, kLongest = 1e3;
 
 Parameter length(std::string name, double defaultValue, std::string help) {
@@ -89,7 +90,8 @@ const std::vector<Shape>& shapeList() {
 // ---------------------------------------------------------------------------------------------------------------------
 // Specs
 
-/// The end of a message about an unknown name in a list of shapes or parameters.
+/// Returns the end of an error message about an unknown name: the most similar name in the list, or all
+/// names in the list.
 template <typename List>
 std::string suggestion(std::string_view wanted, const List& list) {
   std::vector<std::string> names;
@@ -107,7 +109,7 @@ std::string format(double x) {
   return {text.data(), end};
 }
 
-/// A parsed spec: the shape and the value of every parameter.
+/// A parsed shape specification: the shape and the value of each of its parameters.
 struct Request {
   std::string spec;  ///< the spec as the caller wrote it
   std::string text;  ///< the spec without prefix
@@ -146,13 +148,15 @@ void assign(Request& request, std::string_view item) {
   request.values[parameter->name] = parseValue(request, *parameter, trimmed(item.substr(equals + 1)));
 }
 
-/// The factor by which a regular polygon of n corners must be scaled to have the area of its circumcircle.
+/// Returns the factor by which a regular polygon of n corners must be scaled to have the area that its
+/// circumcircle has before the scaling.
 double equalAreaFactor(double n) { return std::sqrt((2 * kPi / n) / std::sin(2 * kPi / n)); }
 
 void requireSoundBowl(const Request& request) {
   if (request["depth"] >= request["thickness"])
     request.fail("the relief cuts through the wall; make depth smaller than thickness");
-  // The inner sheet is sound if the wall is thinner than the least radius of curvature, which is that in the middle.
+  // The inner sheet does not intersect itself if the wall is thinner than the smallest radius of curvature of
+  // the paraboloid. The smallest radius is at the paraboloid's lowest point.
   if (request["thickness"] >= request["radius"] * request["radius"] / (2 * request["height"]))
     request.fail("the wall is thicker than the bowl is wide at its bottom; make thickness or height smaller");
 }
@@ -207,7 +211,8 @@ Request parse(std::string_view spec, std::string_view prefix) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Meshes
 
-/// Point `i` of `n` on the unit circle. Points on the axes are exact, so that bounding boxes and symmetry planes are.
+/// Returns point `i` of `n` equally spaced points on the unit circle. Points on the axes are exact, so that
+/// bounding boxes and symmetry planes of the shapes are exact too.
 Eigen::Vector2d onCircle(double i, double n) {
   const double quarters = 4 * i / n;
   if (quarters == std::floor(quarters)) {
@@ -229,7 +234,8 @@ TriangleMesh icosahedron() {
   TriangleMesh mesh;
   mesh.vertices = {{-1, phi, 0},  {1, phi, 0},  {-1, -phi, 0}, {1, -phi, 0}, {0, -1, phi},  {0, 1, phi},
                    {0, -1, -phi}, {0, 1, -phi}, {phi, 0, -1},  {phi, 0, 1},  {-phi, 0, -1}, {-phi, 0, 1}};
-  // Three vertices are a face if their mutual distances are 2, the edge length.
+  // Two vertices are joined by an edge if their distance is 2, the edge length. Three vertices are a face if
+  // each two of them are joined.
   const auto joined = [&](std::uint32_t a, std::uint32_t b) {
     return (mesh.vertices[a] - mesh.vertices[b]).norm() < 2.1;
   };
@@ -245,7 +251,8 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-/// Divides every triangle into four, with new vertices on the unit sphere in the middle of each edge's arc.
+/// Divides every triangle into four. The new vertices lie on the unit sphere, in the middle of each edge's
+/// arc.
 void subdivide(TriangleMesh& mesh) {
   std::unordered_map<std::uint64_t, std::uint32_t> middles;
   middles.reserve(3 * mesh.triangles.size() / 2);
@@ -268,9 +275,9 @@ void subdivide(TriangleMesh& mesh) {
   mesh.triangles = std::move(finer);
 }
 
-// The meshes of sphere and torus have the volume of the smooth shape. With vertices on the smooth surface every face
-// would lie inside it, by up to a sagitta; with equal volumes the deviations cancel on average and their RMS is a third
-// as large.
+// The sphere mesh and the torus mesh have the same volume as the smooth shape. If their vertices lay on the
+// smooth surface, every face would lie inside it, by up to the face's sagitta. With equal volumes the
+// deviations cancel on average, and their RMS is a third as large.
 
 TriangleMesh sphereMesh(const Request& request) {
   TriangleMesh mesh = icosahedron();
@@ -283,8 +290,8 @@ TriangleMesh sphereMesh(const Request& request) {
 TriangleMesh torusMesh(const Request& request) {
   const std::uint32_t segments = request.whole("segments");
   const std::uint32_t sides = request.whole("sides");
-  // By Pappus's theorem the volumes agree if the tube's cross-section has its circle's area. Cross-sections
-  // perpendicular to the axis are polygons as well.
+  // By Pappus's theorem the mesh has the torus's volume if the polygon around the tube has the area of the
+  // tube's circle. The polygon around the axis must have the area of its circle as well.
   const double tube = request["minor"] * equalAreaFactor(sides);
   const double around = equalAreaFactor(segments);
   TriangleMesh mesh;
@@ -329,8 +336,9 @@ struct OutlinePoint {
   double radius;  ///< distance from the axis
 };
 
-/// The outline counter-clockwise. The tip takes 0.26 of a tooth's pitch, each straight flank 0.13, the root the rest.
-/// The angle grows from point to point, so that each corner of the outline has a corner of the bore at the same angle.
+/// Returns the corners of the gear's outline counter-clockwise. Of each tooth's pitch the tip takes 0.26,
+/// each of the two straight flanks 0.13, and the root the rest. The angle grows from corner to corner, so
+/// that each corner of the outline has a corner of the bore at the same angle.
 std::vector<OutlinePoint> gearOutline(unsigned teeth, unsigned segments, double tip, double root) {
   constexpr double kTip = 0.26;
   constexpr double kFlank = 0.13;
@@ -373,12 +381,12 @@ TriangleMesh centred(TriangleMesh mesh) {
   return mesh;
 }
 
-/// Maps a point of the square [-1, 1]² to the unit disc. Cells of a grid keep about the same size, without a pole at
-/// which they would shrink.
+/// Maps a point of the square [-1, 1]² to the unit disc. The cells of a grid on the square keep about the
+/// same size: the map has no pole at which cells would shrink.
 Eigen::Vector2d onDisc(double x, double y) { return {x * std::sqrt(1 - y * y / 2), y * std::sqrt(1 - x * x / 2)}; }
 
-/// A closed wall between two sheets over the unit disc, `inside` above `outside`, which a strip connects along their
-/// boundaries.
+/// Returns a closed wall between two sheets over the unit disc, with the sheet `inside` above the sheet
+/// `outside`. A strip connects the boundaries of the two sheets.
 template <typename Sheet>
 TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& outside) {
   const std::uint32_t n = 2 * cells, row = n + 1, sheet = row * row;
@@ -392,7 +400,8 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
   for (std::uint32_t j = 0; j < n; ++j)
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::array<std::uint32_t, 4> at = {j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i};
-      // Diagonals point towards the square's corners, because two sides of the cells there lie on the boundary.
+      // The diagonal of each cell points towards the nearest corner of the square, because a cell at a corner has
+      // two sides on the boundary.
       const std::uint32_t first = (i < cells) == (j < cells) ? 0 : 1;
       const auto corner = [&](std::uint32_t k) { return at[(first + k) % 4]; };
       addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
@@ -410,7 +419,8 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
   return mesh;
 }
 
-/// The wall of a paraboloid whose inner sheet is lowered by relief(point of the unit disc), a fraction of the depth.
+/// Returns the wall of a paraboloid. The inner sheet is lowered by the parameter `depth` times relief(point
+/// of the unit disc).
 template <typename Relief>
 TriangleMesh bowlMesh(const Request& request, const Relief& relief) {
   const double radius = request["radius"], height = request["height"];
@@ -431,7 +441,7 @@ TriangleMesh helixBowlMesh(const Request& request) {
   return bowlMesh(request, [turns](const Eigen::Vector2d& d) {
     const double fromMiddle = d.norm();
     const double phase = 2 * kPi * turns * fromMiddle - std::atan2(d.y(), d.x());
-    // The groove fades out in the middle, where the spiral has no defined direction.
+    // The groove fades out in the middle of the bowl, where the direction of the spiral is undefined.
     const double fade = std::clamp(2 * turns * fromMiddle - 1, 0.0, 1.0);
     return fade * fade * (3 - 2 * fade) * (0.5 + 0.5 * std::cos(phase));
   });
@@ -449,7 +459,8 @@ TriangleMesh marbleRunMesh(const Request& request) {
   const double outer = request["width"] / 2, inner = outer - request["thickness"];
   const std::uint32_t sides = request.whole("sides"), loop = 2 * (sides + 1);
   const std::uint32_t steps = request.whole("turns") * request.whole("steps");
-  // The cross-section (outwards, upwards) runs along the outside from lip to lip and back along the inside.
+  // Make the points of the channel's cross-section, as (outwards, upwards). They run along the outside of the
+  // channel from lip to lip, and back along its inside.
   std::vector<Eigen::Vector2d> section;
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(outer * onCircle(sides + i, 2.0 * sides));
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(inner * onCircle(2.0 * sides - i, 2.0 * sides));

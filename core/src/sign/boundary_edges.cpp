@@ -19,7 +19,7 @@ constexpr double kCoarsestRatio = 0.25;  // greatest radius of a cluster over it
 
 double cube(double x) { return x * x * x; }
 
-/// Returns the vector ε_ijk M_jk, which is a × b for the matrix a⊗b.
+/// Returns the vector ε_ijk M_jk of a matrix M. For M = a⊗b this vector is a × b.
 Vector3 axial(const Eigen::Matrix3d& m) { return {m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0)}; }
 
 }  // namespace
@@ -44,8 +44,8 @@ BoundaryEdges::BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<
   }
 }
 
-/// Adds a cluster of edges and, recursively, its halves. It is divided along the axis on which the edges' midpoints
-/// extend farthest.
+/// Adds a cluster of the edges [begin, end) and, recursively, the clusters of its two halves. A cluster is
+/// divided along the axis on which the midpoints of its edges extend farthest.
 void BoundaryEdges::addCluster(std::uint32_t begin, std::uint32_t end) {
   const std::size_t self = clusters_.size();
   clusters_.push_back(Cluster{.begin = begin, .end = end});
@@ -98,8 +98,8 @@ inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) cons
   const double below = product * (product + a.dot(b));
   if (below > 0) sum.value += multiplicity * (la + lb) / below * a.cross(b);
   const double nearest = (a + bvh::closestParameter(Vector3::Zero(), a, b) * along).norm();
-  // The integral of 2/r³ along the edge is at most that of an edge that is everywhere as near as its nearest point, and
-  // at most that of an infinite line.
+  // The derivative of the edge's part is at most the integral of 2/r³ along the edge. This integral is at
+  // most the edge's length times 2/nearest³, and at most that of an infinite line at the distance `nearest`.
   sum.derivative += 2 * std::abs(multiplicity) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
   sum.edgeDistance = std::min(sum.edgeDistance, nearest);
   ++sum.terms;

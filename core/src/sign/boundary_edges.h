@@ -11,25 +11,27 @@
 
 namespace hpsdf::sign {
 
-/// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one direction than in
-/// the other. They determine the gradient of the winding number.
+/// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one
+/// direction than in the other. These edges determine the gradient of the mesh's winding number.
 ///
-/// The gradient is the magnetic field of a current along these edges, 1/4π ∫ r/|r|³ × dl, where r runs from the point
-/// to the edge (Biot and Savart), because a solid angle depends on the outline of a surface only. A closed mesh has no
-/// such edges, and its winding number is constant up to the surface.
+/// The gradient is the magnetic field of a current along these edges, 1/4π ∫ r/|r|³ × dl, where r runs from
+/// the point to the edge (Biot and Savart). The reason is that a solid angle depends only on the outline of
+/// a surface. A closed mesh has no such edges, and its winding number is constant up to the surface.
 ///
-/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the cluster's center, up
-/// to second order. If all its edges lie within r of the center, and the center is R away, the truncation error is at
-/// most
+/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the
+/// cluster's center, up to second order. If all edges of the cluster lie within r of its center, and the
+/// center is at the distance R from the point, the truncation error is at most
 ///
-///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl,  d from the center,
+///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl,  d from the center.
 ///
-/// by the solid harmonics of `WindingNumber`: it is the sum of l |d|^(l−1)/R^(l+1) over l ≥ 4.
+/// The bound follows from the solid harmonics in the comment of `WindingNumber`: it is the sum of l
+/// |d|^(l−1)/R^(l+1) over l ≥ 4.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
   explicit BoundaryEdges(const bvh::Hierarchy& hierarchy);
-  /// `sides` are the directed edges of the hierarchy's triangles, as from `mesh::directedEdgesOf`.
+  /// `sides` are the directed edges of all triangles of the hierarchy, as `mesh::directedEdgesOf` returns
+  /// them.
   BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<mesh::DirectedEdge>& sides);
 
   bool empty() const { return edges_.empty(); }
@@ -44,8 +46,8 @@ class BoundaryEdges {
     std::size_t terms = 0;           ///< number of edges and clusters that were summed
   };
 
-  /// Returns the gradient, summed over clusters so coarse that its error is at most `error`; the exact sum if `error`
-  /// is 0.
+  /// Returns the gradient of the winding number, summed over clusters of edges. The clusters are as coarse as
+  /// an error of at most `error` permits. The sum is exact if `error` is 0.
   Gradient gradient(const Vector3& local, double error) const;
 
   std::size_t bytes() const { return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster); }
@@ -55,12 +57,12 @@ class BoundaryEdges {
     Vector3 from, to;
     double multiplicity;  ///< number of triangles that run from `from` to `to`, less those that run back
 
-    /// Adds 4π times the edge's part of the gradient and of the bounds.
+    /// Adds 4π times the contribution of this edge to the gradient, and to its bounds, at the point `local`.
     void addTo(Gradient& sum, const Vector3& local) const;
   };
 
-  /// The edges [begin, end) with their moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl, where dl contains the
-  /// multiplicity.
+  /// The edges [begin, end) with their moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl. Here d runs
+  /// from the cluster's center to the edge, and dl contains the edge's multiplicity.
   struct Cluster {
     std::uint32_t begin = 0, end = 0;
     std::uint32_t next = 0;  ///< index of the first cluster that is not a part of this one
@@ -73,13 +75,15 @@ class BoundaryEdges {
     std::array<Eigen::Matrix3d, 3> third = {second, second, second};
 
     void add(const Edge& edge);
-    /// Returns 4π times the gradient by the series; `toCenter` runs from the point to the center.
+    /// Returns 4π times the cluster's contribution to the gradient, by the Taylor series. `toCenter` runs from
+    /// the point to the cluster's center.
     Vector3 series(const Vector3& toCenter, double squaredDistance) const;
   };
 
   void addCluster(std::uint32_t begin, std::uint32_t end);
   void measure(Cluster& cluster) const;
-  /// Returns the gradient by the series of all clusters with t below `ratio`, and by single edges elsewhere.
+  /// Returns the gradient of the winding number: by the Taylor series for all clusters whose t = r/R is below
+  /// `ratio`, and edge by edge for all other edges.
   Gradient sum(const Vector3& local, double ratio) const;
 
   std::vector<Edge> edges_;

@@ -11,8 +11,8 @@
 namespace hpsdf::sign {
 namespace {
 
-/// The corners of all triangles, as numbers 3·slot + k, grouped by vertex. Those of vertex v are at [first[v],
-/// first[v + 1]), in the order of the mesh's triangles.
+/// The corners of all triangles, grouped by vertex. Corner k of the triangle in slot s has the number 3·s +
+/// k. The corners of vertex v are at [first[v], first[v + 1]), in the order of the mesh's triangles.
 struct CornersByVertex {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> corners;
@@ -29,7 +29,8 @@ CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
   for (const auto& triangle : triangles)
     for (const std::uint32_t v : triangle) ++grouped.first[v];
   for (std::size_t v = 1; v < grouped.first.size(); ++v) grouped.first[v] += grouped.first[v - 1];
-  // Filling each group from its end leaves `first` at the beginning of the group.
+  // Fill each vertex's group of corners from its end. Afterwards first[v] is the beginning of the group of
+  // vertex v.
   for (std::size_t t = slots.size(); t-- > 0;)
     for (std::uint32_t k = 3; k-- > 0;) grouped.corners[--grouped.first[triangles[slots[t]][k]]] = 3 * slots[t] + k;
   return grouped;
@@ -37,7 +38,8 @@ CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
 
 Vector3 unitNormal(const bvh::TriangleFrame& frame) { return hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()); }
 
-/// Computes the pseudonormals of one vertex after another, with buffers that are kept between them.
+/// Computes the pseudonormals of vertices, one vertex after another, and reuses its buffers from vertex to
+/// vertex.
 class VertexVisitor {
  public:
   VertexVisitor(const bvh::Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
@@ -46,8 +48,8 @@ class VertexVisitor {
         vertices_(hierarchy.vertices()),
         nextSide_(nextSide) {}
 
-  /// Returns the vertex's pseudonormal, computed from all its `corners`. Links the sides that run between this vertex
-  /// and vertices whose index is not lower.
+  /// Returns the pseudonormal of a vertex, computed from all `corners` at the vertex. Links the triangle
+  /// sides at each edge between this vertex and a vertex whose index is not lower.
   Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
     sides_.clear();
     numbers_.clear();
@@ -86,8 +88,8 @@ class VertexVisitor {
   std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
-  /// Keys that group sides by edge when sorted: the other vertex in the high half, the index into numbers_ in the low
-  /// half.
+  /// Keys that group the sides at the current vertex by edge when sorted. The high half of a key is the other
+  /// vertex of the side, the low half is the side's index in `numbers_`.
   std::vector<std::uint64_t> sides_;
   std::vector<std::uint32_t> numbers_;  ///< side numbers 3·slot + k
 };

@@ -8,11 +8,13 @@
 
 namespace hpsdf::sign {
 
-/// Angle-weighted pseudonormals (Bærentzen & Aanæs 2005) of a hierarchy's triangles, not normalised, because only the
-/// signs of dot products with them are used. Triangles without area do not contribute.
+/// Angle-weighted pseudonormals (Bærentzen & Aanæs 2005) of a hierarchy's triangles. They are not
+/// normalised, because only the signs of dot products with them are used. Triangles without area do not
+/// contribute.
 ///
-/// Vertex pseudonormals are stored. Edge pseudonormals are summed on demand: a query needs one only where all triangles
-/// at the edge are the nearest, and its search has just visited these.
+/// Vertex pseudonormals are stored. Edge pseudonormals are summed on demand: a query needs an edge
+/// pseudonormal only if all triangles at that edge are the nearest ones, and the search has just visited
+/// these triangles.
 class Pseudonormals {
  public:
   Pseudonormals() = default;
@@ -21,15 +23,17 @@ class Pseudonormals {
   /// Returns the sum of corner angle times unit normal over the triangles at a vertex.
   const Vector3& ofVertex(std::uint32_t vertex) const { return vertices_[vertex]; }
 
-  /// Returns the sum of the unit normals of all triangles at edge k of the triangle in a slot, which runs from corner k
-  /// to corner k + 1. `hierarchy` is that of the constructor.
+  /// Returns the sum of the unit normals of all triangles at an edge. The edge is side k of the triangle in
+  /// `slot`, from the triangle's corner k to its corner k + 1. `hierarchy` is the one that the constructor
+  /// received.
   Vector3 ofEdge(const bvh::Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const;
 
   std::size_t bytes() const;
 
  private:
   std::vector<Vector3> vertices_;
-  /// For each side, number 3·slot + k, the next side at the same edge: a cycle in the order of the mesh's triangles.
+  /// For each triangle side, with the number 3·slot + k, the number of the next side at the same edge. The
+  /// sides at an edge form a cycle in the order of the mesh's triangles.
   std::vector<std::uint32_t> nextSide_;
 };
 

@@ -8,16 +8,16 @@
 
 namespace hpsdf::sign {
 
-/// A sum of angles that needs one arc tangent only: it multiplies complex numbers that have these angles, and counts
-/// the whole turns.
+/// A sum of angles that needs only one arc tangent in all. It multiplies complex numbers that have these
+/// angles, and counts the full turns.
 class AngleSum {
  public:
-  /// Adds the angle of x + iy, in (−π, π]; adds nothing for 0.
+  /// Adds the angle of the complex number x + iy, in (−π, π]. Adds nothing if x and y are 0.
   void add(double x, double y) {
     if (x == 0 && y == 0) return;
     const double real = real_ * x - imaginary_ * y;
     const double imaginary = real_ * y + imaginary_ * x + 0.0;  // the 0.0 turns −0 into 0
-    // The arc tangent of the product jumps where the sum passes an odd multiple of π.
+    // The arc tangent of the product jumps by 2π when the sum of the angles passes an odd multiple of π.
     if (y > 0 && imaginary_ >= 0 && imaginary < 0) ++turns_;
     if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
     const bool addsHalfTurn = y == 0 && x < 0;
@@ -37,8 +37,8 @@ class AngleSum {
   int turns_ = 0;
 };
 
-/// Adds half of the signed solid angle of the triangle abc, seen from the origin (van Oosterom and Strackee 1983). It
-/// is positive where the origin lies behind the triangle.
+/// Adds half of the signed solid angle of the triangle abc, seen from the origin (van Oosterom and Strackee
+/// 1983). The solid angle is positive if the origin lies behind the triangle.
 inline void addHalfSolidAngle(const Vector3& a, const Vector3& b, const Vector3& c, AngleSum& sum) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm(), product = la * lb * lc;
   if (product > 0) sum.add(1 + (a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / product, a.dot(b.cross(c)) / product);

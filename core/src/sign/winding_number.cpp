@@ -12,20 +12,21 @@
 namespace hpsdf::sign {
 namespace {
 
-/// Truncation error that one cluster may have at each level. A sum consists of about a hundred clusters.
+/// The truncation error that one cluster may have at each accuracy level. A winding number is a sum over
+/// about a hundred clusters.
 constexpr std::array<double, WindingNumber::kLevels> kErrors = {1e-2, 5e-4, 2e-5, 5e-7};
 
 double square(double x) { return x * x; }
 
-/// Returns the error bound in the comment of `WindingNumber`, with `ratio` for t; infinite where the series need not
-/// converge.
+/// Returns the bound of the truncation error that the comment of `WindingNumber` states, with `ratio` for
+/// t. Returns infinity if the series need not converge.
 double truncationError(double area, double squaredDistance, double ratio) {
   if (!(ratio < 1)) return HUGE_VAL;
   return area / (4 * std::numbers::pi * squaredDistance) * (1 / square(1 - ratio) - 1 - ratio * (2 + 3 * ratio));
 }
 
-/// Returns the square of the least distance at which the truncation error is at most `error`, by bisection of the ratio
-/// t.
+/// Returns the square of the smallest distance at which the truncation error is at most `error`. Finds it
+/// by bisection of the ratio t = radius / distance.
 double squaredFarDistance(double area, double radius, double error) {
   if (radius == 0) return 0;
   double low = 0, high = 1;
@@ -38,7 +39,8 @@ double squaredFarDistance(double area, double radius, double error) {
 
 }  // namespace
 
-/// Adds the cluster of a node or block and, recursively, those of its children. The slots below it are [begin, end).
+/// Adds the cluster of a node or block of the hierarchy and, recursively, the clusters of its children. The
+/// triangles of the node or block are in the slots [begin, end).
 void WindingNumber::addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end) {
   const auto firstSlot = [&](std::uint32_t of) {
     while ((of & bvh::kBlockBit) == 0) of = hierarchy_->nodes()[of].child[0];

@@ -9,22 +9,24 @@
 
 namespace hpsdf::sign {
 
-/// The generalised winding number of a hierarchy's triangles about a point: a whole number if the mesh is closed, any
-/// number if it has holes (Jacobson, Kavan and Sorkine-Hornung 2013).
+/// The generalised winding number of a hierarchy's triangles about a point (Jacobson, Kavan and
+/// Sorkine-Hornung 2013). It is a whole number if the mesh is closed, and any real number if the mesh has
+/// holes.
 ///
-/// w(x) = 1/4π ∫ n·(q − x)/|q − x|³ dA over the surface. A cluster of triangles that is far enough from x is replaced
-/// by the Taylor series of the integrand about the cluster's center, up to second order (Barill et al. 2018). If all
-/// triangles lie within r of the center, and the center is R from x, the truncation error is at most
+/// w(x) = 1/4π ∫ n·(q − x)/|q − x|³ dA over the surface. A cluster of triangles that is far enough from x
+/// is replaced by the Taylor series of the integrand about the cluster's center, up to second order (Barill
+/// et al. 2018). If all triangles of the cluster lie within r of its center, and the center is at the
+/// distance R from x, the truncation error is at most
 ///
-///   A/4πR² (1/(1−t)² − 1 − 2t − 3t²),  t = r/R,  A = ∫ (|d|/r)³ dA,  d from the center,
+///   A/4πR² (1/(1−t)² − 1 − 2t − 3t²),  t = r/R,  A = ∫ (|d|/r)³ dA,  d from the center.
 ///
-/// because the term of degree l of 1/|R + d| is a solid harmonic, whose gradient is at most l |d|^(l−1)/R^(l+1), and
-/// the series contains the terms up to l = 3.
+/// The reason is that the term of degree l of 1/|R + d| is a solid harmonic, whose gradient is at most l
+/// |d|^(l−1)/R^(l+1). The series contains the terms up to l = 3.
 class WindingNumber {
  public:
   WindingNumber() = default;
 
-  /// Keeps a pointer to the hierarchy, which must neither move nor end before this object.
+  /// Keeps a pointer to the hierarchy, which must not be moved or destroyed before this object.
   explicit WindingNumber(const bvh::Hierarchy& hierarchy);
 
   struct Estimate {
@@ -42,11 +44,11 @@ class WindingNumber {
   /// Returns the winding number without the contribution of one triangle, to within 0.05.
   double withoutTriangle(const Vector3& x, std::uint32_t slot) const;
 
-  /// Returns the sum over all triangles, in the hierarchy's order.
+  /// Returns the winding number as the exact sum over all triangles, in the hierarchy's order.
   double exact(const Vector3& x) const;
 
-  /// Returns the estimate of the coarsest level whose error is at most `error` or for which `isEnough(estimate)` holds;
-  /// the exact sum if there is no such level.
+  /// Returns the estimate of the coarsest level whose error is at most `error` or whose estimate satisfies
+  /// `isEnough(estimate)`. Returns the exact sum if there is no such level.
   template <typename Enough>
   Estimate estimateWithin(const Vector3& x, double error, Enough isEnough) const {
     for (int level = 0; level < kLevels; ++level)
@@ -54,13 +56,15 @@ class WindingNumber {
     return {exact(x), kRounding};
   }
 
-  /// Returns true if the exact sum is above `level`. Uses the coarsest estimate that decides.
+  /// Returns true if the exact winding number is above `level`. Uses the coarsest estimate whose error is
+  /// small enough to decide this.
   bool isAbove(const Vector3& x, double level = 0.5) const;
 
   std::size_t bytes() const;
 
  private:
-  /// A run of triangles, and the distance beyond which a Taylor series replaces the sum over them.
+  /// A contiguous range of triangles, with the distance beyond which a Taylor series replaces the sum over
+  /// these triangles.
   struct Cluster {
     Vector3 center = Vector3::Zero();                     ///< in the hierarchy's local coordinates
     std::array<double, kLevels> squaredFarDistance = {};  ///< distances from the center, by accuracy level
@@ -68,19 +72,21 @@ class WindingNumber {
     std::uint32_t begin = 0, end = 0;                     ///< range of triangle slots
   };
 
-  /// ∫n dA, and the symmetric parts of ∫n⊗d dA (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dA (xxx, yyy, zzz, xxy, xxz, xyy,
-  /// yyz, xzz, yzz, xyz), d from the center. The other parts cancel in the series.
+  /// ∫n dA, and the symmetric parts of ∫n⊗d dA (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dA (xxx, yyy, zzz, xxy,
+  /// xxz, xyy, yyz, xzz, yzz, xyz). Here d runs from the cluster's center to the surface. The remaining parts
+  /// of the tensors cancel in the Taylor series.
   struct Moments {
     Vector3 first = Vector3::Zero();
     std::array<double, 6> second = {};
     std::array<double, 10> third = {};
     double area = 0, radius = 0;  ///< A and r of the error bound
 
-    /// Adds a triangle with corners `v`, relative to the cluster's center.
+    /// Adds the moments of a triangle whose corners `v` are relative to the cluster's center.
     void add(const std::array<Vector3, 3>& v);
-    /// Returns 4π times the winding number by the series; `toCenter` runs from x to the center.
+    /// Returns 4π times the cluster's contribution to the winding number, by the Taylor series. `toCenter` runs
+    /// from the point x to the cluster's center.
     double series(const Vector3& toCenter, double squaredDistance) const;
-    /// Returns a bound of the truncation error of the winding number.
+    /// Returns a bound of the truncation error of the cluster's contribution to the winding number.
     double error(double squaredDistance) const;
   };
 

@@ -12,11 +12,12 @@ namespace hpsdf::sign {
 namespace {
 
 constexpr std::size_t kBatch = 512;  // number of points whose signs may follow from each other's winding numbers
-/// Error of the winding number from which the distance to a hole's closing surface is computed. A greater error would
-/// be noise, which refinement of the field would pursue.
+/// The error of the winding number from which the distance to the surface that closes a hole is computed. A
+/// greater error would be noise in the distance, which refinement of the field would try to resolve.
 constexpr double kExact = 2e-3;
-/// Tolerated errors of the gradient, as the change of the winding number over the distance to the triangles. The
-/// first usually suffices to show that no closing surface is nearer; the second adds little to the noise of `kExact`.
+/// The tolerated errors of the gradient of the winding number: each is a change of the winding number,
+/// divided by the distance to the triangles. `kRoughChange` usually suffices to show that no closing
+/// surface is nearer than the triangles. `kExactChange` adds little to the noise of `kExact`.
 constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
 
 /// Returns the indices of the distances, the greatest first; those that are not finite come last.
@@ -35,7 +36,7 @@ double probeDistance(const Box& box) {
   return 1e-9 * box.sizes().norm() + 1e-14 * largest;
 }
 
-/// The side of a point, and bounds from which the sides of its neighbours follow.
+/// The side (inside or outside) of a point, and bounds from which the sides of nearby points follow.
 struct WindingSign::Sample {
   Vector3 position;
   double clearance;  ///< lower bound of the distance to the triangles
@@ -46,25 +47,27 @@ struct WindingSign::Sample {
   double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
   double edgeDistance = 0;  ///< lower bound of the distance to the boundary edges, at least `clearance`
 
-  /// Returns the sample that follows from this one for a point x with known distances. Its margin is 0, which means
-  /// unknown, if x is too far away.
+  /// Returns the sample for a point x with known distances, derived from this sample. If x is too far away,
+  /// the margin of the new sample is 0, which means unknown.
   Sample movedTo(const Vector3& x, double itsClearance, double itsDistance) const {
     const double squaredStep = (x - position).squaredNorm();
     if (!(squaredStep < 0.998 * clearance * clearance)) return {x, itsClearance, itsDistance, inside};
     return movedBy(std::sqrt(squaredStep), x, itsClearance, itsDistance);
   }
 
-  /// Returns true if all points within `radius` that no triangle separates from this point are on the same side as it.
+  /// Returns true if all points within `radius` of this point are on the same side as this point, except
+  /// points that a triangle separates from it.
   bool holdsWithin(double radius) const {
     return radius < edgeDistance && movedBy(radius, position, 0, radius).margin > 0;
   }
 
-  /// Returns true if the sign is certain, and the surfaces that close holes are farther away than the triangles.
+  /// Returns true if the sign is certain and every surface that closes a hole is farther away than the
+  /// triangles.
   bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
 
  private:
-  /// After a step of length s every boundary edge is at least 1 − s/edgeDistance times as far away as before. The
-  /// bound of the derivative grows at most with the inverse cube of this factor.
+  /// After a step of length s every boundary edge is still at least 1 − s/edgeDistance times as far away as
+  /// before. The bound of the derivative grows at most by the inverse cube of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
     const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;
@@ -123,7 +126,8 @@ void WindingSign::applyTo(std::span<double> distances, std::span<const Vector3> 
 void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vector3> points,
                                std::span<const double> clearances, std::vector<Sample>& samples) const {
   samples.clear();
-  // Points with much clearance come first: their samples decide the sides of the most other points.
+  // Points far from all triangles come first, because their samples decide the sides of the greatest number
+  // of other points.
   for (const std::uint32_t i : farthestFirst(clearances)) {
     Sample here = {points[i], clearances[i], distances[i], false};
     for (const Sample& other : samples)

@@ -8,42 +8,46 @@
 
 namespace hpsdf::sign {
 
-/// Returns the distance from a triangle at which its two sides are probed: beyond the rounding errors of a mesh with
-/// this box.
+/// Returns a distance from a triangle at which points in front of it and behind it can be probed. The
+/// distance exceeds the rounding errors of coordinates in a mesh with the bounding box `box`.
 double probeDistance(const Box& box);
 
-/// The sign of distances by the winding number: inside is where it is above ½.
+/// The sign of distances to a mesh by the winding number: a point is inside if its winding number is above
+/// ½.
 ///
-/// The surface on which the winding number is ½ closes every hole, and counts as surface. Its distance is |w − ½|/|∇w|,
-/// to first order, and replaces the distance to the triangles where it is smaller.
+/// The surface on which the winding number w is ½ closes every hole of the mesh, and counts as surface. The
+/// distance to this surface is |w − ½|/|∇w| to first order. It replaces the distance to the triangles where
+/// it is smaller.
 class WindingSign {
  public:
   WindingSign() = default;
 
-  /// Keeps a pointer to the hierarchy, which must neither move nor end before this object. If a closed mesh is
-  /// oriented inward, the space all around it counts as inside. `edges` are those of the hierarchy.
+  /// Keeps a pointer to the hierarchy, which must not be moved or destroyed before this object. `edges` are
+  /// the unbalanced edges of the same hierarchy. If a closed mesh is oriented inward, the space all around
+  /// the mesh counts as inside.
   WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, BoundaryEdges edges);
 
-  /// Replaces unsigned distances to the triangles by signed distances. The closer the points are to each other, the
-  /// fewer winding numbers are computed. The result of a point does not depend on the other points.
+  /// Replaces unsigned distances to the triangles by signed distances. The closer the points lie together,
+  /// the fewer winding numbers are computed. The result for a point does not depend on the other points.
   void applyTo(std::span<double> distances, std::span<const Vector3> points) const {
     applyTo(distances, points, distances);
   }
 
-  /// Does the same for a mesh in which some triangles do not count as surface. `distances` are those to the nearest
-  /// triangle that counts, `clearances` those to the nearest of all triangles. Outside, the result is the clearance,
-  /// because triangles with the inside on both sides lie behind others.
+  /// Replaces unsigned distances by signed distances for a mesh in which some triangles do not count as
+  /// surface. `distances` are the distances to the nearest triangle that counts, `clearances` those to the
+  /// nearest of all triangles. For outside points the result is the clearance, because a triangle with the
+  /// inside on both of its sides lies behind other triangles.
   void applyTo(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances) const;
 
-  /// Returns true if the triangle in a slot has the outside in front of its centroid and the inside behind it. Compares
-  /// the winding number of all other triangles at the centroid with the mean of both sides: probing a point on each
-  /// side could jump over a wall nearby.
+  /// Returns true if the triangle in `slot` has the outside in front of its centroid and the inside behind
+  /// it. Compares the winding number of all other triangles at the centroid with the mean of the values on
+  /// both sides of the triangle. Probing a point on each side instead could jump over a nearby wall.
   bool separatesOutsideFromInside(std::uint32_t slot) const;
 
   bool isInside(const Vector3& x) const;
 
-  /// Returns true if it is certain that all points within `radius` of x, and not separated from x by a triangle, are on
-  /// the same side as x.
+  /// Returns true if it is certain that all points within `radius` of x are on the same side as x, except
+  /// points that a triangle separates from x.
   bool isSameSideWithin(const Vector3& x, double radius) const;
 
   std::size_t bytes() const { return winding_.bytes() + edges_.bytes(); }

@@ -25,7 +25,8 @@ bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axe
   return std::ranges::all_of(axes, [&](int k) { return std::min(a[k], b[k]) <= x[k] && x[k] <= std::max(a[k], b[k]); });
 }
 
-/// Returns two axes onto whose plane the triangle projects with an area; twice the same axis for a degenerate triangle.
+/// Returns two coordinate axes: the triangle, projected onto the plane of these axes, has an area. Returns
+/// twice the same axis if the triangle is degenerate.
 Axes projectionAxes(const Corners& t) {
   for (const Axes axes : {Axes{0, 1}, Axes{1, 2}, Axes{2, 0}})
     if (orientation(axes, t[0], t[1], t[2]) != 0) return axes;
@@ -79,23 +80,24 @@ bool lieOnOneSide(const Corners& t, std::span<const Vector3> points) {
   return static_cast<std::size_t>(std::abs(sum)) == points.size();
 }
 
-/// Returns true if two triangles that share their first corner have another point in common. Such a point lies on a ray
-/// from the shared corner, and the ray leaves one of the triangles through the opposite edge, within the other
-/// triangle.
+/// Returns true if two triangles that share their first corner have another point in common. The ray from
+/// the shared corner through such a point leaves one of the triangles through the edge opposite to the
+/// corner, at a point of the other triangle.
 bool intersectBeyondCorner(const Corners& one, const Corners& other) {
   if (lieOnOneSide(one, {other.begin() + 1, 2}) || lieOnOneSide(other, {one.begin() + 1, 2})) return false;
   return segmentIntersects(one[1], one[2], other) || segmentIntersects(other[1], other[2], one);
 }
 
-/// Returns true if two triangles that share their first two corners have a point beyond that edge in common: only if
-/// they are folded flat onto each other.
+/// Returns true if two triangles that share their first two corners have a common point that is not on the
+/// shared edge. This is the case only if the triangles are folded flat onto each other.
 bool intersectBeyondEdge(const Corners& one, const Corners& other) {
   if (orientation(one[0], one[1], one[2], other[2]) != 0) return false;
   const Axes axes = projectionAxes(one);
   return orientation(axes, one[0], one[1], one[2]) == orientation(axes, one[0], one[1], other[2]);
 }
 
-/// Moves the corners that both triangles share to the front, and returns their number.
+/// Moves the corners that the two triangles share to the front of both index lists. Returns the number of
+/// shared corners.
 int moveSharedToFront(Indices& one, Indices& other) {
   int shared = 0;
   for (int i = 0; i < 3; ++i) {
@@ -107,7 +109,8 @@ int moveSharedToFront(Indices& one, Indices& other) {
   return shared;
 }
 
-// The tests for nearness below may round, because they only detect triangles that are too near for pseudonormals.
+// The distance tests below may round, because they only detect triangles that are too close together for
+// pseudonormals.
 
 /// Returns the squared distance of the segments ab and cd.
 double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
@@ -139,8 +142,8 @@ bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double m
   return std::max(above, below) == static_cast<int>(points.size());
 }
 
-/// Returns true if a point, a segment or the boundary of a triangle, according to the number of `corners`, comes nearer
-/// to the triangle t than the margin.
+/// Returns true if a point, a segment or the boundary of a triangle comes nearer to the triangle t than
+/// `margin`. The number of `corners` (1, 2 or 3) tells which of the three is given.
 bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   if (lieFarOnOneSide(t, corners, margin)) return false;
   const bvh::TriangleFrame frame = bvh::makeFrame(t, 0);
@@ -154,18 +157,18 @@ bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   return false;
 }
 
-/// Returns true if two triangles come nearer than the margin elsewhere than at the corners they share, which come
-/// first.
+/// Returns true if two triangles come nearer to each other than `margin` at any place except their shared
+/// corners. The `shared` corners come first in both triangles.
 bool areNear(const Corners& one, const Corners& other, int shared, double margin) {
   const auto unshared = [&](const Corners& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
   return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
 }
 
-/// Finds the pairs of triangles that intersect, by a tree of boxes: each box contains up to four boxes of the level
-/// below, which are neighbours in the hierarchy's order.
+/// Finds the pairs of triangles that intersect, by a tree of bounding boxes. Each box contains up to four
+/// boxes of the next lower level, which are neighbours in the hierarchy's order.
 class Finder {
  public:
-  /// `margin` is that of `findCrossings`.
+  /// `margin` has the meaning of the parameter `margin` of `findCrossings`.
   Finder(const bvh::Hierarchy& hierarchy, double margin)
       : hierarchy_(hierarchy), margin_(margin), vertices_(hierarchy.vertices().size()) {
     const double scale = scaleToOne(hierarchy.vertices());
@@ -174,8 +177,8 @@ class Finder {
     makeBoxes();
   }
 
-  /// Returns the crossings of the triangles in slots [begin, end) with those in later slots, in the order of the
-  /// former's slots; nothing if there are `most` or more.
+  /// Returns the crossings of the triangles in the slots [begin, end) with triangles in later slots, sorted
+  /// by the earlier slot. Returns std::nullopt if there are `most` crossings or more.
   std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most,
                                                  const Progress& progress) const {
     std::vector<std::vector<Crossing>> ofSlot(end - begin);
@@ -193,7 +196,7 @@ class Finder {
     return found;
   }
 
-  /// Returns the first `most` crossings of a slot's triangle with those in later slots.
+  /// Returns the first `most` crossings of the triangle in `slot` with triangles in later slots.
   std::vector<Crossing> findFirst(std::uint32_t slot, std::size_t most) const {
     std::vector<Crossing> found;
     find(slot, [&](const Crossing& crossing) {
@@ -204,7 +207,8 @@ class Finder {
   }
 
  private:
-  /// Calls take(crossing) for each crossing with a triangle in a later slot, until it returns false.
+  /// Calls take(crossing) for each crossing of the triangle in `slot` with a triangle in a later slot, until
+  /// `take` returns false.
   template <typename Take>
   void find(std::uint32_t slot, const Take& take) const {
     if (!isDegenerate(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, take);
@@ -314,9 +318,10 @@ Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, doub
   const auto add = [&](const std::vector<Crossing>& found) {
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
   };
-  // Search the slots in ranges that grow to a fiftieth of all. A range with more crossings than `limit` allows is
-  // abandoned as soon as that shows, and halved until the slot is found at which the limit is reached. A heap of
-  // triangles that all intersect is therefore neither searched completely nor stored.
+  // Search the slots in ranges whose size grows up to a fiftieth of all slots. If a range has more crossings
+  // than `limit` allows, its search is stopped early and the range is halved, until the slot is found at
+  // which the limit is reached. Therefore a heap of triangles that all intersect each other is neither
+  // searched completely nor stored.
   constexpr std::uint32_t kLeast = 64;
   const std::uint32_t largest = std::max(kLeast, count / 50);
   std::uint32_t size = kLeast;

@@ -8,7 +8,7 @@
 namespace hpsdf::surface {
 namespace {
 
-/// The unevaluated sum of a rounded result and its rounding error.
+/// An exact result of an operation: the unevaluated sum of the rounded result and its rounding error.
 struct Exact {
   double value, rest;
 };
@@ -25,8 +25,8 @@ Exact productOf(double a, double b) {
   return {product, std::fma(a, b, -product)};
 }
 
-/// An exact sum of doubles, stored as non-overlapping parts, the smallest first. Zero parts are removed (Shewchuk 1997,
-/// "Grow-Expansion").
+/// An exact sum of doubles, stored as non-overlapping parts from the smallest to the greatest. Parts that
+/// are 0 are removed (Shewchuk 1997, "Grow-Expansion").
 class ExactSum {
  public:
   void add(double value) {
@@ -40,7 +40,7 @@ class ExactSum {
     count_ = kept;
   }
 
-  /// Adds sign·a·b exactly.
+  /// Adds the product sign·a·b to this sum exactly.
   void add(const Exact& a, const Exact& b, double sign) {
     for (const double x : {a.value, a.rest})
       for (const double y : {b.value, b.rest}) {
@@ -49,7 +49,7 @@ class ExactSum {
         add(product.value);
       }
   }
-  /// Adds sign·a·b·c exactly.
+  /// Adds the product sign·a·b·c to this sum exactly.
   void add(const Exact& a, const Exact& b, const Exact& c, double sign) {
     for (const double x : {a.value, a.rest})
       for (const double y : {b.value, b.rest}) {
@@ -69,7 +69,8 @@ class ExactSum {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon() / 2;
 
-/// Returns the sign of a rounded value if `bound` times `magnitude` exceeds its rounding error (Shewchuk 1997), else 2.
+/// Returns the sign of a rounded value if the sign is certain, else 2. The rounding error of the value is
+/// at most `bound` times `magnitude` (Shewchuk 1997).
 int roundedSign(double value, double magnitude, double bound) {
   if (value > bound * magnitude) return 1;
   if (-value > bound * magnitude) return -1;

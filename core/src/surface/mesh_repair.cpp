@@ -23,9 +23,10 @@ namespace hpsdf {
 namespace surface {
 namespace {
 
-/// The bodies of a surface. Patches form one body if they are closed only in union: at each of their edges as many
-/// triangles run in one direction as in the other, and a solid lies between them. Solids that touch along an edge or in
-/// a shared wall (`redundantFaces`) are different bodies. Every other patch is a body of its own.
+/// The bodies of a surface. Several patches form one body if only their union is closed. At each edge of
+/// the union as many triangles run in one direction as in the other, and solid material lies between the
+/// patches. Solids that touch along an edge or in a shared wall (`redundantFaces`) are different bodies.
+/// Every other patch is a body of its own.
 struct Bodies {
   std::vector<std::uint32_t> ofPatch;  ///< for each patch its body: the lowest index of the body's patches
   std::vector<char> closed;            ///< for each patch 1 if its body is closed; such bodies have no one-sided patch
@@ -34,15 +35,16 @@ struct Bodies {
 /// Angle in radians below which two faces count as coplanar.
 constexpr double kSameAngle = 1e-9;
 
-/// Returns true if the edge lies within one patch, as most do, between two faces that run along it in opposite
-/// directions.
+/// Returns true if an edge has exactly two faces, both of the same patch, which run along the edge in
+/// opposite directions. Most edges are like this.
 bool isWithinPatch(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   return edge.size() == 2 && edge[0].rising != edge[1].rising &&
          patches.patchOf[edge[0].face] == patches.patchOf[edge[1].face];
 }
 
-/// Returns the directed edges at an edge that remain after pairs of one patch with opposite directions have cancelled.
-/// The order of cancellation does not matter, because only the patch of a remaining one is used.
+/// Returns the directed edges that remain at an edge after pairs of opposite directed edges of the same
+/// patch have cancelled. Which of the directed edges cancel does not matter, because only the patch of a
+/// remaining directed edge is used.
 std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   std::vector<mesh::DirectedEdge> sides(edge.begin(), edge.end());
   std::ranges::stable_sort(sides, {}, [&](const mesh::DirectedEdge& side) { return patches.patchOf[side.face]; });
@@ -55,18 +57,20 @@ std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::sp
   return remaining;
 }
 
-/// A face at an edge in the radial order around it. In a correctly oriented mesh, solid material lies between a falling
-/// face and the next rising one, counterclockwise.
+/// A face at an edge, in the radial order of the faces around the edge. In a correctly oriented mesh solid
+/// material lies between a face with `rising` = false and the next face with `rising` = true,
+/// counterclockwise.
 struct RadialFace {
   double angle;  ///< in radians, around the edge
   bool rising;
   std::uint32_t patch;
 };
 
-/// Sorts faces counterclockwise, as seen with the edge pointing to the viewer. Coplanar faces get the same angle;
-/// those that end a solid precede those that begin one. Coincident faces of one orientation are sorted by patch, so
-/// that solids are matched with the same patches at all edges of a shared wall. A face begins a solid if its `rising`
-/// equals `begins`.
+/// Sorts the faces at an edge counterclockwise, as seen with the edge pointing to the viewer. A face begins
+/// a solid if its `rising` equals `begins`, else it ends a solid. Coplanar faces get the same angle: the
+/// faces that end a solid come first, then those that begin a solid. Coincident faces of the same
+/// orientation are sorted by patch, so that solids are matched with the same patches at all edges of a
+/// shared wall.
 void sortAround(std::vector<RadialFace>& faces, bool begins) {
   std::ranges::sort(faces, {}, &RadialFace::angle);
   const auto before = [begins](const RadialFace& a, const RadialFace& b) {
@@ -81,7 +85,7 @@ void sortAround(std::vector<RadialFace>& faces, bool begins) {
   }
 }
 
-/// Returns the faces at an edge with their angles, measured from the first of them.
+/// Returns the faces at an edge with their angles about the edge, measured from the first of these faces.
 std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patches& patches,
                                     std::span<const mesh::DirectedEdge> sides) {
   const Vector3& low = mesh.vertices[sides.front().low()];
@@ -106,8 +110,8 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 /// Two faces at an edge with solid material between them.
 using Wedge = std::array<RadialFace, 2>;
 
-/// Matches each face that begins a solid with the face that ends it, as parentheses are matched, in two passes around
-/// the edge. As many faces begin a solid as end one.
+/// Matches each face that begins a solid with the face that ends the same solid, as parentheses are
+/// matched, in two passes around the edge. The numbers of beginning and ending faces are equal.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;
@@ -129,9 +133,9 @@ bool anyIsFlat(const std::vector<Wedge>& wedges) {
   return std::ranges::any_of(wedges, [](const Wedge& wedge) { return wedge[0].angle == wedge[1].angle; });
 }
 
-/// Joins patches that have solid material between them at an edge. If coplanar faces would form a flat body, touching
-/// solids may all be oriented inward: then solid and empty are exchanged. If that leads to a flat body too, all
-/// patches at the edge are joined.
+/// Joins patches that have solid material between them at an edge. If coplanar faces would then form a flat
+/// body, the touching solids may all be oriented inward; in this case the roles of solid and empty space
+/// are exchanged. If a flat body results again, all patches at the edge are joined.
 void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies) {
   std::vector<Wedge> wedges = wedgesOf(faces, false);
   if (anyIsFlat(wedges)) wedges = wedgesOf(faces, true);
@@ -142,8 +146,8 @@ void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies
   }
 }
 
-/// The faces of each patch must be oriented alike, except those of one-sided patches. `sides` are the directed edges of
-/// the mesh, grouped by edge.
+/// Finds the bodies that the patches form. All faces of a patch must have the same orientation, except in
+/// one-sided patches. `sides` are the directed edges of the mesh, grouped by edge.
 Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::span<const mesh::DirectedEdge> sides) {
   mesh::DisjointSets joined(patches.count);
   std::vector<char> open = patches.oneSided;
@@ -160,7 +164,7 @@ Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::s
   const auto count = static_cast<std::uint32_t>(patches.count);
   for (std::uint32_t patch = 0; patch < count; ++patch)
     if (open[patch]) open[joined.first(patch)] = 1;
-  // The patches of an open body become bodies of their own.
+  // Make each patch of an open body a body of its own.
   Bodies bodies;
   for (std::uint32_t patch = 0; patch < count; ++patch) {
     const std::uint32_t body = joined.first(patch);
@@ -170,7 +174,7 @@ Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::s
   return bodies;
 }
 
-/// The faces of a body, which are reversed as a whole.
+/// The faces of one body. If the body is reversed, all its faces are reversed.
 struct Body {
   std::vector<std::uint32_t> faces;
   double area = 0, volume = 0;
@@ -187,8 +191,8 @@ Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
 
 void reverse(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
 
-/// Orients the faces of each patch like the greater part of its area, except those of one-sided patches. Returns the
-/// number of reversed faces.
+/// Orients all faces of a patch alike, like the faces that cover the greater part of the patch's area.
+/// Skips one-sided patches. Returns the number of reversed faces.
 std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   std::vector<double> area(patches.count), against(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
@@ -204,8 +208,9 @@ std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   return reversed;
 }
 
-/// Returns the bodies, each at the index of its lowest patch; entries of other patches have no faces. Volumes are sums
-/// of the tetrahedra between the triangles and the center of the body's box. One-sided bodies are not solid.
+/// Returns one entry per patch. Each body is at the index of its lowest patch; the entries of the other
+/// patches have no faces. The volume of a body is the sum of the tetrahedra between its triangles and the
+/// center of its box. One-sided bodies are not solid.
 std::vector<Body> measureBodies(const TriangleMesh& mesh, const mesh::Patches& patches, const Bodies& bodies) {
   std::vector<Body> measured(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
@@ -232,7 +237,7 @@ void reverseBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
       for (const std::uint32_t f : body.faces) reverse(mesh, f);
 }
 
-/// Evaluates the winding number of those bodies of a list that are solid.
+/// Evaluates the winding number of the solid bodies among the given bodies.
 class BodyWinding {
  public:
   BodyWinding(const TriangleMesh& mesh, std::span<const Body> bodies)
@@ -240,14 +245,14 @@ class BodyWinding {
   BodyWinding(const BodyWinding&) = delete;
   BodyWinding& operator=(const BodyWinding&) = delete;
 
-  /// Returns the winding number to within 0.25.
+  /// Returns the winding number of the solid bodies at x, to within 0.25.
   double windingNumber(const Vector3& x) const {
     return winding_.estimateWithin(x, 0.25, [](const auto&) { return false; }).value;
   }
 
  private:
-  /// Returns the faces of the solid bodies, each with corners of its own, so that a small body of a large mesh costs
-  /// little.
+  /// Returns a mesh of the faces of the solid bodies. Each face gets three vertices of its own; the other
+  /// vertices are not copied, so that a small body of a large mesh costs little.
   static TriangleMesh surfaceOf(const TriangleMesh& mesh, std::span<const Body> bodies) {
     TriangleMesh surface{.vertices = {}, .triangles = {}, .name = mesh.name};
     for (const Body& body : bodies) {
@@ -266,8 +271,8 @@ class BodyWinding {
   sign::WindingNumber winding_;
 };
 
-/// Returns points that are spread evenly over the area of a body, at `offset` along the normals, by Roberts' R2
-/// sequence.
+/// Returns points beside the faces of a body, at the distance `offset` along the face normals. The points
+/// are spread evenly over the body's area by Roberts' R2 sequence.
 std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, double offset) {
   constexpr int kPoints = 32;
   constexpr double kStepAlong = 0.7548776662466927, kStepAcross = 0.5698402909980532;
@@ -292,8 +297,9 @@ std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, do
 
 enum class Orientation { undecided, outward, inward };
 
-/// Returns the orientation of a body that follows from the winding numbers of the imported mesh, by step 4 of
-/// `repaired`. `byVolume` is the orientation by the body's own volume.
+/// Returns the orientation of a body according to the winding numbers of the imported mesh, by step 4 of
+/// `repaired`. `before` and `behind` are points in front of the body's faces and behind them. `byVolume` is
+/// the orientation according to the sign of the body's own volume.
 Orientation importedOrientation(const BodyWinding& imported, const std::vector<Vector3>& before,
                                 const std::vector<Vector3>& behind, Orientation byVolume) {
   std::ptrdiff_t outward = 0, inward = 0, left = std::ssize(before), all = left;
@@ -310,8 +316,9 @@ Orientation importedOrientation(const BodyWinding& imported, const std::vector<V
   return isMost(outward) ? Orientation::outward : isMost(inward) ? Orientation::inward : Orientation::undecided;
 }
 
-/// Decides again which bodies are reversed, by steps 4 and 5 of `repaired`, where there are several solid bodies and
-/// any of them is to be reversed. All solid bodies of `outward` are oriented outward.
+/// Decides again which bodies are reversed, by steps 4 and 5 of `repaired`. Changes nothing unless there
+/// are at least two solid bodies and at least one body that is to be reversed. In the mesh `outward` all
+/// solid bodies are oriented outward.
 void keepCavityOrientation(const TriangleMesh& imported, const TriangleMesh& outward, std::vector<Body>& bodies) {
   if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::reversed)) return;
   const BodyWinding allOutward(outward, bodies), asImported(imported, bodies);
@@ -324,7 +331,7 @@ void keepCavityOrientation(const TriangleMesh& imported, const TriangleMesh& out
     const Orientation orientation =
         importedOrientation(asImported, before, behind, body.reversed ? Orientation::inward : Orientation::outward);
     if (orientation == Orientation::undecided && body.reversed) {
-      // The body is oriented inward: `behind` are the points outside it.
+      // The faces of this body are oriented inward, so that the points `behind` them are outside the body.
       const BodyWinding itself(outward, {&body, 1});
       const auto within = std::ranges::count_if(behind, [&](const Vector3& x) {
         return std::lround(allOutward.windingNumber(x) - itself.windingNumber(x)) % 2 != 0;
@@ -344,7 +351,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   bvh::requireSurface(mesh);
   RepairedMesh result;
 
-  // Orient the patches, then measure the bodies that they form.
+  // Orient the faces of each patch alike, find the bodies that the patches form, and measure these bodies.
   const mesh::Patches patches = mesh::patchesOf(mesh.triangles.size(), mesh::directedEdgesOf(mesh.triangles));
   result.reversedFaces = surface::orientPatches(mesh, patches);
   const surface::Bodies bodies = surface::findBodies(mesh, patches, mesh::directedEdgesOf(mesh.triangles));
@@ -358,7 +365,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   result.reversedPatches = static_cast<std::size_t>(
       std::ranges::count_if(bodies.ofPatch, [&](std::uint32_t body) { return measured[body].reversed; }));
 
-  // Update what depends on orientation in the report.
+  // Update the entries of the mesh report that depend on the orientation of the faces.
   const MeshReport now = inspect(mesh);
   imported.report.inconsistentEdges = now.inconsistentEdges;
   imported.report.unbalancedEdges = now.unbalancedEdges;

@@ -22,11 +22,11 @@
 namespace hpsdf::surface {
 namespace {
 
-/// Length of the smallest pieces divided by the mesh's longest side. It starts at `kFinest` and doubles, up to
-/// `kCoarsest`, as long as there are too many pieces.
+/// The length of the smallest pieces of triangles, divided by the longest side of the mesh. It starts at
+/// `kFinest`. While there are too many pieces it is doubled, up to `kCoarsest`.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
-/// Factor by which the smallest pieces are longer if they are uncertain only because of holes, which do not merit as
-/// many pieces.
+/// The factor by which the smallest pieces are longer if only holes of the mesh make their sides uncertain.
+/// Holes do not merit as many pieces as intersections.
 constexpr double kCoarserBesideHoles = 8;
 constexpr std::size_t kMostPairs = 2'000'000;
 constexpr std::size_t kMostPieces = 250'000;  // in addition to the mesh's triangles
@@ -51,8 +51,8 @@ struct Cutter {
   std::uint32_t triangle;
   Corners corners;
   bool isCoplanar;  ///< true if both triangles lie in one plane
-  /// Marks the edges of a coplanar cutter that can cut. Where a neighbour continues the plane across an edge, inside
-  /// and outside do not change there.
+  /// For each edge of a coplanar cutter, whether the edge can cut. It cannot if a neighbour of the cutter
+  /// continues the cutter's plane across the edge, because inside and outside do not change at such an edge.
   std::array<bool, 3> counts = {true, true, true};
 };
 
@@ -78,21 +78,23 @@ std::array<Corners, 4> quarters(const Corners& t) {
 
 struct TooManyPieces {};
 
-/// Returns the triangle, shrunk by a millionth towards its centroid: triangles that share only its boundary do not
-/// intersect it.
+/// Returns the triangle t, shrunk by a millionth towards its centroid. Triangles that share only the
+/// boundary of t do not intersect the shrunk triangle.
 Corners shrunk(const Corners& t) {
   const Vector3 middle = (t[0] + t[1] + t[2]) / 3;
   constexpr double kLess = 1e-6;
   return {t[0] + kLess * (middle - t[0]), t[1] + kLess * (middle - t[1]), t[2] + kLess * (middle - t[2])};
 }
 
-/// Subdivides triangles where others intersect them. All coordinates are scaled to order 1.
+/// Subdivides triangles that other triangles intersect. All coordinates are scaled to a magnitude of about
+/// 1.
 class Subdivider {
  public:
   Subdivider(double finest, const Progress& progress) : finest_(finest), progress_(progress) {}
 
-  /// Appends a piece or, recursively, its quarters: undecided ones that no cutter intersects, and intersected ones of
-  /// the smallest size. Can be called from any thread. Throws `TooManyPieces`, `Cancelled`.
+  /// Appends the piece to `pieces`, as undecided, if no cutter intersects it, or, as intersected, if it has
+  /// the smallest size. Otherwise subdivides its quarters recursively. Can be called from any thread. Throws
+  /// `TooManyPieces` and `Cancelled`.
   void subdivide(Piece piece, const std::vector<Cutter>& cutters, std::vector<Piece>& pieces) {
     progress_.throwIfCancelled();
     const Corners corners = shrunk(piece.corners);
@@ -108,7 +110,7 @@ class Subdivider {
     for (const Corners& quarter : quarters(piece.corners)) subdivide({quarter, piece.triangle, false}, cutting, pieces);
   }
 
-  /// Replaces an undecided piece by its quarters, which are appended. Throws `TooManyPieces`.
+  /// Marks an undecided piece as replaced, and appends its quarters to `pieces`. Throws `TooManyPieces`.
   void refine(std::size_t index, std::vector<Piece>& pieces) {
     countQuarters();
     pieces[index].kind = PieceKind::replaced;
@@ -131,7 +133,8 @@ class Subdivider {
 
 using Pair = std::array<std::uint32_t, 2>;
 
-/// Returns each pair of triangles that intersect, in both orders, sorted.
+/// Returns the pairs of triangles that intersect. Each pair is listed in both orders, and the list is
+/// sorted.
 std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh,
                                     const Progress& progress) {
   const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0, progress);
@@ -146,8 +149,9 @@ std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const Trian
   return pairs;
 }
 
-/// Clears `counts` of coplanar cutters at edges across which another one continues the plane. Neighbours that are
-/// folded onto each other do not continue it: they intersect, and are among the pairs.
+/// Clears `counts` of each coplanar cutter at the edges across which another coplanar cutter continues the
+/// plane. A neighbour that is folded onto the cutter does not continue the plane: the two triangles
+/// intersect and are one of the pairs.
 void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Cutter>& cutters) {
   using DirectedEdge = std::array<std::uint32_t, 3>;  // from vertex, to vertex, triangle
   std::vector<DirectedEdge> edges;
@@ -169,14 +173,15 @@ void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, 
   }
 }
 
-/// Returns the pieces of all triangles, in their order, with coordinates times `scale`. Throws `TooManyPieces`.
+/// Returns the pieces of all triangles, in the order of the triangles. The coordinates of the pieces are
+/// multiplied by `scale`. Throws `TooManyPieces`.
 std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
                                       Subdivider& subdivider) {
   const auto scaledCorners = [&](std::uint32_t t) {
     const auto [a, b, c] = cornersOf(mesh, mesh.triangles[t]);
     return Corners{scale * a, scale * b, scale * c};
   };
-  // Subdivide the triangles that others intersect, in parallel.
+  // Subdivide each triangle that other triangles intersect, in parallel over these triangles.
   std::vector<std::size_t> firsts;  // index of the first pair of each such triangle, and the number of pairs
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (i == 0 || pairs[i][0] != pairs[i - 1][0]) firsts.push_back(i);
@@ -195,7 +200,7 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
     ignoreInnerEdges(mesh, pairs, cutters);
     subdivider.subdivide({corners, t, true}, cutters, parts[n]);
   });
-  // Merge the pieces with the triangles that no other triangle intersects.
+  // Merge the pieces of the subdivided triangles with the triangles that no other triangle intersects.
   std::vector<Piece> pieces;
   auto next = parts.begin();
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -209,7 +214,8 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
   return pieces;
 }
 
-/// Probes the sides of pieces. Pieces have coordinates times `scale`; `offset` from the surface is in mesh units.
+/// Probes whether the two sides of pieces are inside or outside. The coordinates of pieces are multiplied
+/// by `scale`. The probes' distance `offset` from the surface is in mesh units.
 struct SideProbe {
   const sign::WindingSign& winding;
   double scale, offset;
@@ -218,8 +224,8 @@ struct SideProbe {
 
   Vector3 step(const Corners& t) const { return offset * (t[1] - t[0]).cross(t[2] - t[0]).stableNormalized(); }
 
-  /// Classifies a piece that no triangle intersects. Degenerate pieces are inner, because their neighbours contain
-  /// their edges.
+  /// Classifies a piece that no triangle intersects. A degenerate piece is classified as inner, because the
+  /// neighbouring pieces contain its edges.
   PieceKind classify(const Corners& corners) const {
     const Vector3 middle = centroid(corners), aside = step(corners);
     const Vector3 before = middle + aside, behind = middle - aside;
@@ -231,8 +237,9 @@ struct SideProbe {
     return isCertain ? PieceKind::inner : PieceKind::undecided;
   }
 
-  /// Returns true if an intersected piece is surrounded by inside: on both sides of its quarters, and in fourteen
-  /// directions at the distance of its length.
+  /// Returns true if an intersected piece is surrounded by the inside: all probes on both sides of its
+  /// quarters are inside, and all probes around its centroid, in fourteen directions at the distance of the
+  /// piece's longest side.
   bool isSurrounded(const Corners& corners) const {
     const Vector3 aside = step(corners);
     for (const Corners& quarter : quarters(corners))
@@ -262,7 +269,8 @@ struct SideProbe {
   }
 };
 
-/// Returns all pieces with their kinds, or nothing if there are too many. Pieces remain undecided only near holes.
+/// Returns all pieces with their kinds, or std::nullopt if there are too many pieces. Pieces remain
+/// undecided only near holes of the mesh.
 std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, double scale,
                                                    const std::vector<Pair>& pairs, const sign::WindingSign& winding,
                                                    double finest, const Progress& progress) {
@@ -273,7 +281,8 @@ std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, dou
   try {
     std::vector<Piece> pieces = subdivideTriangles(mesh, scale, pairs, subdivider);
     probe.classify(pieces, progress, task);
-    // Refine undecided pieces: near holes the winding number varies along a piece.
+    // Refine undecided pieces repeatedly. Pieces are undecided near holes, where the winding number varies
+    // along a piece.
     for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
         if (pieces[i].kind == PieceKind::undecided && subdivider.canSubdivide(pieces[i].corners, kCoarserBesideHoles))

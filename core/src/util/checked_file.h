@@ -32,7 +32,7 @@ std::span<const std::byte> bytesOf(const T& value) {
   return std::as_bytes(std::span(&value, 1));
 }
 
-/// XXH3 hash (64 bits) of all bytes added.
+/// The XXH3 hash (64 bits) of all bytes that are added with `add`.
 class Checksum {
  public:
   Checksum();
@@ -46,14 +46,14 @@ class Checksum {
   std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
-/// The first bytes of a file, by which its kind is known.
+/// The first bytes of a file. They identify the type of the file.
 using Magic = std::array<char, 8>;
 
-/// Writes numbers and then their checksum. `CheckedReader` has members of the same names, so that one function template
-/// can list the items of a file for both directions.
+/// Writes numbers to a file and then the checksum of these numbers. `CheckedReader` has members of the same
+/// names, so that one function template can list the items of a file for reading and writing.
 class CheckedWriter {
  public:
-  /// All members throw as `OutputFile` does.
+  /// All members of this class throw the same errors as `OutputFile`.
   explicit CheckedWriter(const std::filesystem::path& file) : output_(file) {}
 
   template <typename T>
@@ -62,7 +62,7 @@ class CheckedWriter {
   }
   void flag(bool value) { item(std::uint8_t{value}); }
   void text(std::string_view value);
-  /// Writes an array whose size is known from other items.
+  /// Writes an array without its size. The reader derives the size from other items of the file.
   template <typename T>
   void array(const std::vector<T>& values, std::uint64_t) {
     put(std::as_bytes(std::span(values)));
@@ -74,7 +74,8 @@ class CheckedWriter {
     array(values, values.size());
   }
   void begin(const Magic& magic, std::uint32_t version);
-  /// Does nothing: what is written is right.
+  /// Does nothing, because values that are written are valid. `CheckedReader::require` checks values that are
+  /// read.
   void require(bool, const char*) const {}
   /// Writes the checksum and commits the file.
   void finish();
@@ -86,15 +87,15 @@ class CheckedWriter {
   Checksum checksum_;
 };
 
-/// Words for a file in the messages of `CheckedReader`.
+/// The words by which the messages of `CheckedReader` describe a kind of file.
 struct FileKind {
   std::string_view name;    ///< the file itself, such as "field file"
   std::string_view wanted;  ///< the file to give, such as "a .hpsdf file"
   std::string_view remedy;  ///< what to do about a damaged file, such as "build or copy it again"
 };
 
-/// Reads what `CheckedWriter` wrote. Every member throws `Error` (file) where the file ends too early or holds a value
-/// that is not possible.
+/// Reads a file that `CheckedWriter` wrote. Every member throws `Error` (of the kind `file`) if the file
+/// ends too early or contains an impossible value.
 class CheckedReader {
  public:
   /// Throws `Error` (file) for a file that is missing, not a regular file, or cannot be opened.
@@ -106,7 +107,8 @@ class CheckedReader {
   }
   void flag(bool& value);
   void text(std::string& value);
-  /// Reads an array. A size that exceeds the rest of the file is refused before memory is allocated.
+  /// Reads an array of `count` elements. If they need more bytes than remain in the file, throws before
+  /// memory is allocated.
   template <typename T>
   void array(std::vector<T>& values, std::uint64_t count) {
     require(count <= remaining() / sizeof(T), "it ends too early");
@@ -119,13 +121,15 @@ class CheckedReader {
     item(count);
     array(values, count);
   }
-  /// Reads the beginning of a file and returns its version; nothing where the file begins otherwise.
+  /// Reads the first bytes of the file and its version. Returns the version, or std::nullopt if the first
+  /// bytes differ from `magic`.
   std::optional<std::uint32_t> begin(const Magic& magic);
-  /// Compares the checksum and expects the end of the file.
+  /// Throws unless the stored checksum matches the bytes read and the file ends after the checksum.
   void finish();
 
   std::uint64_t remaining() const { return size_ - position_; }
-  /// Throws `Error` with `how` the file is damaged unless `holds`.
+  /// Throws `Error` unless `holds` is true. `how` is the part of the message that tells how the file is
+  /// damaged.
   void require(bool holds, const char* how) const;
   [[noreturn]] void damaged(const std::string& how) const;
   [[noreturn]] void refuse(const std::string& why) const;

@@ -1,5 +1,6 @@
 #pragma once
-// Parallel work on many items in chunks, whose boundaries do not depend on the number of threads.
+// Parallel processing of many items in chunks. The boundaries of the chunks do not depend on the number of
+// threads.
 
 #include <tbb/parallel_for.h>
 
@@ -35,7 +36,8 @@ class Parts {
   std::size_t done_ = 0;
 };
 
-/// The number of chunks of `size` items that hold all items.
+/// Returns the number of chunks of `size` items each that are needed for `items` items. The last chunk may
+/// be smaller.
 inline std::size_t chunksOf(std::size_t items, std::size_t size) { return (items + size - 1) / size; }
 
 /// Calls work(chunk, first item, number of items) for all chunks in parallel.
@@ -45,7 +47,8 @@ void forEachChunk(std::size_t items, std::size_t size, const Work& work) {
                     [&](std::size_t chunk) { work(chunk, chunk * size, std::min(size, items - chunk * size)); });
 }
 
-/// Calls work(chunk, first item, number of items) for all chunks in parallel, and reports the chunks done.
+/// Calls work(chunk, first item, number of items) for all chunks in parallel, and reports the fraction of
+/// finished chunks.
 template <typename Work>
 void forEachChunk(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                   const Work& work) {
@@ -75,13 +78,14 @@ struct Sums {
     max = std::max(max, other.max);
   }
 
-  // Mean and root mean square are 0 without any value.
+  // The mean and the root mean square are 0 if there are no values.
   double mean() const { return count == 0 ? 0 : sum / static_cast<double>(count); }
   double rms() const { return count == 0 ? 0 : std::sqrt(squares / static_cast<double>(count)); }
 };
 
-/// Adds up the sums of all chunks, to which work(sum, first item, number of items) adds in parallel. They are added in
-/// the order of the chunks, so that rounding does not depend on the number of threads.
+/// Returns the total of all chunks. In parallel, work(sum, first item, number of items) computes the sum of
+/// each chunk. The sums are then added in the order of the chunks, so that rounding does not depend on the
+/// number of threads.
 template <typename Sum, typename Work>
 Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                 const Work& work) {
@@ -93,8 +97,8 @@ Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, s
   return all;
 }
 
-/// Adds up the sums of all chunks as `sumOfChunks` does, but in any order and without keeping them: for sums that do
-/// not depend on the order.
+/// Returns the total of all chunks like `sumOfChunks`, but adds the chunks' sums in any order and does not
+/// store them. Suitable for sums that do not depend on the order of addition.
 template <typename Sum, typename Work>
 Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                          const Work& work) {
@@ -109,7 +113,8 @@ Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& pr
   return all;
 }
 
-/// Joins the lists of all chunks, to which work(list, first item, number of items) appends in parallel.
+/// Returns the concatenation of the lists of all chunks. In parallel, work(list, first item, number of
+/// items) fills the list of each chunk.
 template <typename Item, typename Work>
 std::vector<Item> listOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                                const Work& work) {

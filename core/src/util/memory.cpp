@@ -19,15 +19,16 @@ namespace fs = std::filesystem;
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-/// The number that the file holds; "max", or no file, means no limit.
+/// Returns the number in the file. Returns `kNoLimit` if the file holds "max" or does not exist.
 double limitIn(const fs::path& file) {
   std::ifstream text(file);
   double bytes = 0;
   return text >> bytes ? bytes : kNoLimit;
 }
 
-/// The least limit in the files of this name from a group's folder up to the root of the groups. Within a container the
-/// group's own folder may be invisible; the topmost visible folder is then the container's.
+/// Returns the lowest limit in the files named `file`, in the folders from the control group's folder up to
+/// the root of the control groups. Within a container the control group's own folder may be invisible. In
+/// that case the topmost visible folder is that of the container.
 double leastLimit(const fs::path& groups, fs::path group, const char* file) {
   double least = kNoLimit;
   for (;; group = group.parent_path()) {
@@ -42,7 +43,7 @@ double memoryOfControlGroups(const fs::path& root) {
   const fs::path groups = root / "sys/fs/cgroup";
   std::ifstream lines(root / "proc/self/cgroup");
   double least = kNoLimit;
-  // A line is number:controllers:group, with no controllers in version 2.
+  // Each line has the form number:controllers:group. In version 2 of control groups, controllers is empty.
   for (std::string line; std::getline(lines, line);) {
     const std::size_t first = line.find(':'), second = line.find(':', first + 1);
     if (first == std::string::npos || second == std::string::npos) continue;

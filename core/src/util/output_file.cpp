@@ -26,8 +26,9 @@ std::string reason(int error) { return std::generic_category().message(error); }
 
 constexpr std::string_view kTemporary = ".part-";  ///< a process id, "-" and a number follow
 
-/// The beginning of the names of a file's temporary files, without their path. A long name leaves no room for a suffix;
-/// it is replaced by its first characters (whole ones in UTF-8) and a hash of the name.
+/// Returns the beginning that the names of all temporary files of `file` share, without a folder. If the
+/// name of `file` is too long for a suffix, the beginning contains its first characters (whole UTF-8
+/// characters) and a hash of the name.
 std::string beginningOfTemporaries(const std::filesystem::path& file) {
   constexpr std::size_t kLongest = 100, kKept = 60;
   std::string name = file.filename();
@@ -41,7 +42,8 @@ std::string beginningOfTemporaries(const std::filesystem::path& file) {
   return name + std::string(kTemporary);
 }
 
-/// A temporary name that no other writer of the same file uses, in this process or in another.
+/// Returns a name for a temporary file in the folder of `file`. No other writer of `file` uses this name,
+/// neither in this process nor in another process.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
@@ -49,8 +51,8 @@ std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   return name;
 }
 
-/// Returns the target of a symbolic link, so that the rename replaces the target and keeps the link. Other files are
-/// returned as they are.
+/// Returns the target of `file` if `file` is a symbolic link, else `file` itself. Renaming a temporary file
+/// to the target replaces the target and keeps the link.
 std::filesystem::path resolved(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_symlink(file, ignored)) return file;
@@ -58,8 +60,8 @@ std::filesystem::path resolved(const std::filesystem::path& file) {
   return target.empty() ? file : target;
 }
 
-/// Names of the existing temporary files, for `removeUnfinished`. Beyond 16 files at once, further names are not
-/// stored.
+/// The names of the existing temporary files of this process, which `removeUnfinished` removes. At most 16
+/// names are stored at a time.
 std::array<std::atomic<const char*>, 16> unfinished{};
 static_assert(std::atomic<const char*>::is_always_lock_free, "a signal handler reads these");
 
@@ -77,7 +79,7 @@ void forget(const char* name) {
   }
 }
 
-/// Returns true for the name, without its path, of a temporary file that this process is writing.
+/// Returns true if `name` is the name, without a folder, of a temporary file that this process is writing.
 bool isOurs(const std::filesystem::path& name) {
   return std::ranges::any_of(unfinished, [&](const auto& slot) {
     const char* ours = slot.load();
@@ -85,7 +87,8 @@ bool isOurs(const std::filesystem::path& name) {
   });
 }
 
-/// The id of the process that wrote a temporary file of `file`, from the name; empty for other names.
+/// Returns the id of the process that wrote a temporary file of `file`, as found in the temporary file's
+/// name. Returns std::nullopt for any other name.
 std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
   const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;
@@ -124,14 +127,16 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   const auto refuse = [&](int why) {
     throw Error(ErrorKind::file, file.string(), "cannot be written (" + reason(why) + "); check the folder");
   };
-  // A name that is too long is refused here, because the name of its temporary file is short enough.
+  // Refuse a file name that is too long. Opening the temporary file would not fail, because its name is short
+  // enough.
   if (error == std::errc::filename_too_long) refuse(error.value());
   if (std::filesystem::is_directory(status))
     throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw Error(ErrorKind::file, file.string(), "is not a regular file; give another name");
   if (!file_.has_filename()) throw Error(ErrorKind::file, file.string(), "names a folder; give a file name");
-  // A name may be taken by the file of a killed process that had the same process id; then the next name is tried.
+  // Try names until the temporary file can be created. A name may be taken by a file that a killed process
+  // with the same process id left behind.
   for (int tries = 100; tries > 0 && stream_ == nullptr; --tries) {
     temporary_ = temporaryBeside(file_);
     stream_ = std::fopen(temporary_.c_str(), "wbx");

@@ -7,7 +7,7 @@
 
 namespace hpsdf::detail {
 
-/// Joins the parts of a message.
+/// Returns one message that consists of all parts.
 template <typename... Parts>
 std::string messageOf(const Parts&... parts) {
   std::ostringstream message;
@@ -21,7 +21,8 @@ template <typename... Parts>
   throw Error(messageOf(parts...));
 }
 
-/// Throws the `Error` "NAME: problem" about a mesh; a mesh without a name is called "mesh".
+/// Throws an `Error` about a mesh with the message "NAME: problem". NAME is the mesh's name, or "mesh" for
+/// a mesh without a name.
 template <typename... Parts>
 [[noreturn]] void refuseMesh(const std::string& name, const Parts&... parts) {
   throw Error(ErrorKind::mesh, name.empty() ? "mesh" : name, messageOf(parts...));

@@ -34,10 +34,11 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// The first sampled point of a node's path in one step whose distance from the field's body is less than `near`,
-/// or the path's end if there is none. Sampling the path keeps nodes from passing through thin bodies.
+/// Returns the first sampled point, on a node's path in one step, whose distance from the field's body is
+/// less than `near`. Returns the end of the path if there is no such point. Sampling the path keeps nodes
+/// from passing through thin bodies.
 Vector3 firstContact(const Field& field, const Vector3& from, const Vector3& to, double near) {
-  // A path whose length is NaN or too great has the greatest number of pieces.
+  // Choose the number of pieces of the path. A path whose length is NaN or too great gets the maximum number.
   const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;
   if (pieces == 1) return to;
   std::array<Vector3, kPieces> points;
@@ -163,11 +164,11 @@ void RigidFieldAlgorithm::withPlane(const btCollisionObject& field, const btColl
 }
 
 void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
-  // Bullet may have changed the order of the bodies since the algorithm was created, so the current order is taken.
+  // Take the current order of the two bodies: Bullet may have changed it since this algorithm was created.
   const btCollisionObject* one = first.getCollisionObject();
   const btCollisionObject* other = second.getCollisionObject();
 
-  // Remember the previous contacts, and make room for the new ones.
+  // Store the contacts of the previous step, and make room in the manifolds for the new contacts.
   previous_.clear();
   for (btPersistentManifold* manifold : manifolds_) {
     for (int i = 0; i < manifold->getNumContacts(); ++i) previous_.push_back(manifold->getContactPoint(i));
@@ -175,7 +176,8 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
   }
   while (4 * manifolds_.size() < contacts_.size()) manifolds_.push_back(m_dispatcher->getNewManifold(one, other));
 
-  // Each contact starts from the impulse of the nearest previous one.
+  // Add the new contacts to the manifolds. Each contact starts with the impulse of the nearest previous
+  // contact, if that is closer than `near`.
   const double near = 0.1 * size_;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const BodyContact& contact = contacts_[i];
@@ -199,7 +201,7 @@ void RigidFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCo
   }
 }
 
-/// A soft body and a field in one step. Positions are in the field's coordinates.
+/// A soft body and a field that may touch in one step. Positions are in the field's coordinates.
 struct SoftFieldAlgorithm::Pair {
   Pair(const btSoftBody& body, const btCollisionObject& object)
       : soft(body),
@@ -280,7 +282,7 @@ void SoftFieldAlgorithm::keepTouching(const Pair& pair, const Candidates& all, s
     const double steepness = answers[i].gradient.norm();
     if (!(steepness > 0)) continue;
     const Vector3 normal = answers[i].gradient / steepness;
-    // Beyond the point of contact the surface is approximated by its tangent plane there.
+    // Beyond the point of contact, the field's surface is approximated by its tangent plane at this point.
     const double distance = answers[i].value + normal.dot(all.ends[i] - all.at[i]);
     if (distance < pair.margin)
       touching.push_back({all.nodes[i], pair.worldFromField.linear() * normal, distance, -values[i]});
@@ -289,10 +291,11 @@ void SoftFieldAlgorithm::keepTouching(const Pair& pair, const Candidates& all, s
 
 void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
   if (parts_.empty()) return;
-  // Fill in the fields that btSoftBody's solver of rigid contacts reads.
+  // Fill in the contact data that the solver of btSoftBody reads for its contacts with rigid bodies.
   const bool fieldIsFirst = fieldOf(*first.getCollisionObject()) != nullptr;
   const btCollisionObject& object = *(fieldIsFirst ? first : second).getCollisionObject();
-  // Bullet passes const objects to algorithms, which are expected to change them.
+  // Remove const from the soft body: Bullet passes const objects to algorithms, although it expects
+  // algorithms to change them.
   btSoftBody& soft = *const_cast<btSoftBody*>(btSoftBody::upcast((fieldIsFirst ? second : first).getCollisionObject()));
   btRigidBody* rigid = const_cast<btRigidBody*>(btRigidBody::upcast(&object));
   const double step = soft.m_sst.sdt, margin = soft.getCollisionShape()->getMargin();
@@ -310,14 +313,14 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       contact.t2.setZero();
       contact.m_cti.m_colObj = &object;
       contact.m_cti.m_normal = toBullet(touching.normal);
-      // Half of the margin is the thickness of the soft body.
+      // Half of the margin is the thickness of the soft body; subtract it from the node's distance.
       const double height = touching.distance - margin / 2;
       contact.m_cti.m_offset = height - contact.m_cti.m_normal.dot(node.m_x);
       const btVector3 arm = node.m_x - transform.getOrigin();
       const btVector3 bodyMotion = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
       if (height > contact.m_cti.m_normal.dot(bodyMotion)) continue;
-      // The solver cancels the node's motion towards the surface, measured from the position m_q. With m_q on the
-      // surface this motion is exactly the penetration, and the correction adds no velocity.
+      // The solver cancels the node's motion towards the surface, measured from the node's position m_q. If m_q
+      // is on the surface, this motion is exactly the penetration, and the correction adds no velocity.
       node.m_q -= (contact.m_cti.m_normal.dot(node.m_q) + contact.m_cti.m_offset) * contact.m_cti.m_normal;
       const btVector3 relative = node.m_x - node.m_q - bodyMotion;
       const btScalar along = relative.dot(contact.m_cti.m_normal);

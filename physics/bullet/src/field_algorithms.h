@@ -1,5 +1,5 @@
 #pragma once
-// Bullet's collision algorithms for fields.
+// Bullet collision algorithms for bodies whose shape is a signed distance field.
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btActivatingCollisionAlgorithm.h>
@@ -17,7 +17,7 @@ class btSoftBody;
 
 namespace hpsdf::physics {
 
-/// Figures of the contacts of one pair, as in `DispatchFigures`.
+/// Statistics of the contacts of one pair of bodies. The members mean the same as in `DispatchFigures`.
 struct Findings {
   std::size_t penetrating = 0, contacts = 0;
   double deepest = 0;
@@ -25,18 +25,18 @@ struct Findings {
   void add(double depth);  ///< counts a contact of this depth if it penetrates
 };
 
-/// An algorithm whose contacts can be found before Bullet asks for them.
+/// A collision algorithm that can find its contacts before Bullet asks for them.
 class FieldAlgorithm : public btActivatingCollisionAlgorithm {
  public:
   FieldAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* first,
                  const btCollisionObjectWrapper* second)
       : btActivatingCollisionAlgorithm(info, first, second) {}
 
-  /// Finds the contacts without changing any object of Bullet. Exceptions are stored, and `processCollision` throws
-  /// them.
+  /// Finds the contacts of two bodies without changing any Bullet object. If an exception occurs, it is
+  /// stored, and `processCollision` throws it.
   void prepare(const btCollisionObject& first, const btCollisionObject& second) noexcept;
 
-  /// Hands the contacts to Bullet's solvers; finds them first if `prepare` was not called.
+  /// Passes the contacts to Bullet's solvers. If `prepare` was not called before, finds the contacts first.
   void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                         const btDispatcherInfo& info, btManifoldResult* result) final;
 
@@ -87,7 +87,7 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
   void getAllContactManifolds(btManifoldArray&) override {}
 
  private:
-  /// A node within the margin.
+  /// A node of the soft body whose distance from the field's surface is less than the margin.
   struct Touching {
     int node;
     Vector3 normal;   ///< unit normal of the contact plane, in the world
@@ -100,7 +100,7 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
   void find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) override;
   void fill(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) override;
 
-  /// The nodes from `begin` to `end` (exclusive) that may touch the field.
+  /// Returns those nodes from `begin` to `end` (exclusive) that may touch the field.
   Candidates candidates(const Pair& pair, int begin, int end);
   /// Replaces `touching` by those candidates that touch the field.
   void keepTouching(const Pair& pair, const Candidates& all, std::vector<Touching>& touching);

@@ -13,8 +13,9 @@
 
 namespace hpsdf::physics {
 
-/// Bullet's algorithm for two spheres, with a contact that keeps its impulse. Bullet's own discards it in each step, so
-/// that the solver starts from zero and a pile of spheres never comes to rest.
+/// Bullet's algorithm for two spheres, except that the contact keeps its impulse. Bullet's own algorithm
+/// discards the contact in each step, so that the solver starts from zero and a pile of spheres never comes
+/// to rest.
 class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
  public:
   SpherePairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* first,
@@ -78,7 +79,7 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
     return object.getCollisionShape()->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
   };
 
-  // Collect the pairs with a field, and create algorithms for new pairs.
+  // Collect the pairs of bodies of which at least one is a field, and create algorithms for new pairs.
   btBroadphasePairArray& array = pairs->getOverlappingPairArray();
   for (int i = 0; i < array.size(); ++i) {
     btBroadphasePair& pair = array[i];
@@ -100,7 +101,7 @@ void FieldDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pairs, c
       prepared.push_back({algorithm, first, second});
   }
 
-  // Find the contacts in parallel, then let Bullet fill the manifolds.
+  // Find the contacts of all collected pairs in parallel, then let Bullet fill the manifolds.
   tbb::parallel_for(std::size_t{0}, prepared.size(),
                     [&](std::size_t i) { prepared[i].algorithm->prepare(*prepared[i].first, *prepared[i].second); });
   figures_.querySeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -29,7 +29,8 @@ FieldShape::FieldShape(const FieldCollider& field, const SurfaceSamples& samples
       halfSize_(toBullet(Vector3(mass.box.sizes() / 2))),
       inertia_(toBullet(mass.inertia)) {
   if (!(margin > 0) || !std::isfinite(margin)) throw Error("field shape: the margin must be a number above 0");
-  // CUSTOM_CONCAVE_SHAPE_TYPE is not free: Bullet uses it for its own grids.
+  // Use FAST_CONCAVE_MESH_PROXYTYPE, because CUSTOM_CONCAVE_SHAPE_TYPE is taken: Bullet uses it for its own
+  // grids.
   m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
   m_collisionMargin = margin;
 }

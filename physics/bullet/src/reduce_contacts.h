@@ -1,5 +1,5 @@
 #pragma once
-// A subset of two bodies' contacts for the solver.
+// Selects a subset of the contacts between two bodies for the solver.
 
 #include <cstddef>
 #include <vector>
@@ -15,9 +15,11 @@ struct BodyContact {
   double distance;   ///< distance from `onSecond` to the first body along the normal, negative where they penetrate
 };
 
-/// Reduces the contacts to at most `most`: first the deepest one, then repeatedly the contact that is farthest
-/// from those already chosen, by position and normal (an angle of one radian counts as the length `size`). Among
-/// equals the first is chosen. A few contacts around the touching area support a body as well as all of them.
+/// Reduces the contacts to at most `most`. Keeps the deepest contact first, then repeatedly the contact
+/// that is farthest from those already kept. The distance of contacts takes both position and normal into
+/// account: an angle of one radian between normals counts as the length `size`. Among equally distant
+/// contacts the first is kept. A few contacts around the touching area support a body as well as all
+/// contacts do.
 void reduceContacts(std::size_t most, double size, std::vector<BodyContact>& contacts);
 
 }  // namespace hpsdf::physics

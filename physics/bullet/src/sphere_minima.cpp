@@ -11,7 +11,8 @@ namespace {
 constexpr std::size_t kDirections = 128;  // number of points at which a search samples the sphere
 constexpr std::size_t kStarts = 24;       // greatest number of descents
 constexpr int kRounds = 4;                // steps of each descent
-// Directions count as the same if the cosine of their angle is greater: at the start, and after the descents.
+// Two directions count as the same if the cosine of the angle between them exceeds these limits:
+// `kSameStart` before the descents, `kSameMinimum` after the descents.
 constexpr double kSameStart = 0.93, kSameMinimum = 0.97;
 
 /// Directions along a spiral that cover the sphere evenly: every direction is within about 0.2 radians of one of them.
@@ -28,7 +29,7 @@ const std::array<Vector3, kDirections>& directionsAllAround() {
   return directions;
 }
 
-/// Evaluates the field at the points.
+/// Evaluates the field at the points of the sphere in the directions of `minima`, and sets their values.
 void evaluateValues(const Field& field, const Vector3& center, double radius, std::span<SphereMinimum> minima) {
   std::array<Vector3, kDirections + SphereMinima::kMost> points;
   std::array<double, points.size()> values;
@@ -37,7 +38,7 @@ void evaluateValues(const Field& field, const Vector3& center, double radius, st
   for (std::size_t i = 0; i < minima.size(); ++i) minima[i].value = values[i];
 }
 
-/// Evaluates the field and its slope at the points.
+/// Evaluates the field and its slope along the sphere at the points in the directions of `minima`.
 void evaluateSlopes(const Field& field, const Vector3& center, double radius, std::span<SphereMinimum> minima) {
   std::array<Vector3, kStarts> points;
   std::array<ValueAndGradient, kStarts> answers;
@@ -50,7 +51,8 @@ void evaluateSlopes(const Field& field, const Vector3& center, double radius, st
   }
 }
 
-/// Sorts the minima by value and keeps only the lowest of those with nearly the same direction.
+/// Sorts the minima by value. Of minima with nearly the same direction, keeps only the lowest. Keeps at
+/// most `most` minima.
 void keepLowest(std::size_t most, double sameCosine, std::vector<SphereMinimum>& minima) {
   std::ranges::sort(minima, {}, &SphereMinimum::value);
   std::size_t kept = 0;
@@ -62,8 +64,8 @@ void keepLowest(std::size_t most, double sameCosine, std::vector<SphereMinimum>&
   minima.resize(kept);
 }
 
-/// Moves each point by one step of gradient descent, and sets the length of the next step as Barzilai and Borwein
-/// (1988) do.
+/// Moves each point by one step of gradient descent over the sphere. Sets the length of the next step by
+/// the method of Barzilai and Borwein (1988).
 void descend(const Field& field, const Vector3& center, double radius, std::span<SphereMinimum> minima) {
   std::array<SphereMinimum, kStarts> tried;
   const std::span<SphereMinimum> next{tried.data(), minima.size()};
@@ -85,7 +87,8 @@ std::span<const SphereMinimum> SphereMinima::find(const Field& field, const Vect
   for (SphereMinimum& minimum : minima_) minimum.step = 1;
   for (const Vector3& direction : directionsAllAround()) minima_.push_back({direction});
   evaluateValues(field, center, radius, minima_);
-  // Keep points up to 0.2 radii above the margin, because the field may be lower between the directions.
+  // Keep points whose value is at most 0.2 radii above the margin, because the field may be lower between the
+  // sampled directions.
   std::erase_if(minima_, [&](const SphereMinimum& minimum) { return !(minimum.value <= margin + 0.2 * radius); });
   keepLowest(kStarts, kSameStart, minima_);
   evaluateSlopes(field, center, radius, minima_);

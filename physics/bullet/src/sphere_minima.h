@@ -1,5 +1,6 @@
 #pragma once
-// The points at which a sphere penetrates a field most deeply: one for each side on which the sphere touches it.
+// The points of a sphere at which it penetrates a field most deeply: one point for each side on which the
+// sphere touches the field.
 
 #include <span>
 #include <vector>
@@ -16,12 +17,14 @@ struct SphereMinimum {
   double step = 1;                       ///< next step against the slope, in radii
 };
 
-/// Finds the minima of one sphere that moves a little from step to step: each search starts at the previous minima too.
+/// Finds the minima of a field over a sphere that moves a little from step to step. Each search also starts
+/// from the minima of the previous search.
 class SphereMinima {
  public:
   static constexpr std::size_t kMost = 12;
 
-  /// The minima with a value of at most `margin`, the lowest first. Allocates nothing after the first calls.
+  /// Returns the minima whose value is at most `margin`, the lowest first. Allocates no memory after the
+  /// first few calls.
   std::span<const SphereMinimum> find(const Field& field, const Vector3& center, double radius, double margin);
   void forget() { minima_.clear(); }
 

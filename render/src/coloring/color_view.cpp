@@ -31,14 +31,17 @@ constexpr double kIsoStrength = 0.42;
 constexpr double kZeroWidth = 2.4;
 constexpr double kSurfaceWidth = 1.6;
 constexpr double kCasingWidth = 3.4;
-// Outlines fade in cells that are narrower than this many thin lines, because they would cover the cells' colours.
+// Cell outlines fade if the cell is narrower than this many widths of a thin line, because outlines would
+// cover the colours of such cells.
 constexpr double kOutlineFadesBelow = 10;
 constexpr double kOutlineGoneBelow = 3;
-// The least slope of the distance that counts. Where the distance is almost constant in the plane of a slice (along a
-// medial axis, on a tangent plane) lines would otherwise grow into blots.
+// The smallest slope of the distance that is used for drawing lines. Where the distance is almost constant
+// in the plane of a slice (along a medial axis, on a tangent plane), lines would grow into blots with the
+// true slope.
 constexpr double kFlattestSlope = 0.25;
 
-// Averages the samples of each pixel in several threads, where colorOf(x, y, i) is the colour of sample i at (x, y).
+// Returns a picture in which each pixel is the mean of its samples' colours, where colorOf(x, y, i) is the
+// colour of sample i at (x, y). Uses several threads.
 template <typename ColorOf>
 Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   Image image(buffers.width / samples, buffers.height / samples, kPaper);
@@ -53,21 +56,24 @@ Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   return image;
 }
 
-// Coverage of a sample by a line whose centre line is `distance` away; lengths in samples.
+// Returns how much of a sample a line covers, 0 to 1. The centre line of the line is at `distance` from the
+// sample; lengths are in samples.
 float coverage(double distance, double width) {
   return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
 }
 
-// Sections and planes are flat: they are unlit and show the outlines of their cells.
+// Returns true if sample i shows a section or a plane. Both are drawn flat: unlit, with the outlines of
+// their cells.
 bool isFlat(const ViewBuffers& buffers, std::size_t i) {
   return buffers.shows(i, Shown::section) || buffers.shows(i, Shown::plane);
 }
 
-// Outlines of cells. They cover the leftmost and the topmost samples of each cell, so that they are as crisp as the
-// samples allow, and two neighbours never both draw their common edge.
+// The outlines of cells. An outline covers the leftmost and the topmost samples of a cell. Outlines are
+// therefore as crisp as the samples allow, and two neighbouring cells never both draw their common edge.
 class CellOutlines {
  public:
-  /// `inScene` restricts the outlines to sections and planes; otherwise the buffers are those of a slice.
+  /// If `inScene` is true, outlines are drawn only on sections and planes of a scene. Otherwise the buffers
+  /// are those of a slice.
   CellOutlines(const ViewBuffers& buffers, const Sampling& sampling, bool inScene)
       : buffers_(buffers), inScene_(inScene), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
     if (inScene) {
@@ -80,7 +86,7 @@ class CellOutlines {
     measureCells();
   }
 
-  /// Coverage of sample (x, y), 0 to 1.
+  /// Returns how much of sample (x, y) outlines cover, 0 to 1.
   float operator()(int x, int y) const {
     return std::max(alongAxis(x, y, x, -1), alongAxis(x, y, y, -std::ptrdiff_t(buffers_.width)));
   }
@@ -110,13 +116,15 @@ class CellOutlines {
     strengths_[kNoCell] = 0;
   }
 
-  // Coverage by outlines across one axis. `position` is the number of samples before this one along the axis, `step`
-  // the index offset to the previous sample.
+  // Returns how much of sample (x, y) is covered by outlines perpendicular to one axis. `position` is the
+  // number of samples before this sample along the axis. `step` is the index offset from a sample to the
+  // previous sample along the axis.
   float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     const std::uint32_t* cell = &cell_[i];
     const int most = std::min(widthUp_, position);
-    // Cells are convex: if both ends lie in one cell, so does everything between them.
+    // Cells are convex: if two samples lie in the same cell, all samples between these two lie in this cell
+    // too.
     if (most == 0 || cell[most * step] == *cell) return 0;
     int k = 1;
     while (cell[k * step] == *cell) ++k;
@@ -125,8 +133,8 @@ class CellOutlines {
     return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
   }
 
-  // Tells if a plane ends between these two samples because something nearer covers it. Such an end is no edge of a
-  // cell.
+  // Returns true if a plane or section ends between the samples i and j because something nearer covers it.
+  // Such an end is not the edge of a cell.
   bool hidden(std::size_t i, std::size_t j) const {
     if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
     const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
@@ -142,7 +150,7 @@ class CellOutlines {
   std::unordered_map<std::uint32_t, float> strengths_;
 };
 
-// Slopes and zero lines of the values in a slice, or on a plane in front of a camera.
+// Computes the slopes and the zero line of the values in a slice, or on a plane in front of a camera.
 class Contours {
  public:
   /// The zero line is where the value equals `zero`.
@@ -156,8 +164,8 @@ class Contours {
     return std::max(std::hypot(dx, dy), kFlattestSlope * sampleSize);
   }
 
-  /// Distance of sample (x, y) from the zero line, in samples. Where the field jumps over zero from one cell to the
-  /// next, the line runs between the two samples.
+  /// Returns the distance from sample (x, y) to the zero line, in samples. If the field jumps across zero
+  /// between two cells, the zero line runs between the neighbouring samples of these cells.
   double toZero(int x, int y, double slopeHere) const {
     const std::size_t i = index(x, y);
     double distance = std::abs(buffers_.value[i] - zero_) / slopeHere;
@@ -171,7 +179,8 @@ class Contours {
  private:
   std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
 
-  // Prefers differences within one cell, because a jump at a face is not a slope.
+  // Returns the derivative of the value along one axis, per sample. Prefers differences within one cell,
+  // because a jump at a cell's face is not a slope.
   double derivative(std::size_t i, std::size_t step, bool hasBefore, bool hasAfter) const {
     const auto& cell = buffers_.cell;
     const auto& value = buffers_.value;
@@ -193,7 +202,7 @@ class Contours {
     return std::abs(here) / (std::abs(here) + std::abs(there));
   }
 
-  // Tells if a neighbour belongs to the same plane.
+  // Returns true if the two samples belong to the same slice, section or plane.
   bool joined(std::size_t i, std::size_t neighbour) const {
     return buffers_.hit(neighbour) && (buffers_.shown.empty() || buffers_.shown[i] == buffers_.shown[neighbour]);
   }
@@ -202,12 +211,13 @@ class Contours {
   double zero_;
 };
 
-// The line along which a plane meets the surface: white with dark borders.
+// The line along which a plane meets the field's surface. It is drawn white with dark borders.
 class SurfaceLine {
  public:
   explicit SurfaceLine(const Sampling& sampling) : thin_(sampling.lineWidth * sampling.samples) {}
 
-  /// Draws the line over a colour at this distance from the centre line, in samples.
+  /// Returns the colour `ground` of a sample with the line drawn over it. The sample is at `distance` from
+  /// the centre line, in samples.
   LinearColor operator()(const LinearColor& ground, double distance) const {
     const LinearColor cased = mix(ground, casing_, 0.8F * coverage(distance, kCasingWidth * thin_));
     return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));

@@ -1,6 +1,6 @@
 #pragma once
-// From the buffers of a view to the colours of its pixels. Only the buffers are read, so that views from OpenGL
-// and from the reference renderer are coloured alike.
+// Converts the buffers of a view to the colours of the view's pixels. The conversion reads only the
+// buffers, so that views from OpenGL and from the reference renderer are coloured alike.
 
 #include <functional>
 #include <span>
@@ -12,44 +12,50 @@
 
 namespace hpsdf::render {
 
-/// The buffers hold samples × samples points for each pixel. Their colours are averaged in linear light.
+/// The sampling of a view. Its buffers hold samples × samples points for each pixel of the picture. The
+/// colours of these points are averaged in linear light.
 struct Sampling {
   int samples = 1;
   double lineWidth = 1;   ///< width of thin lines, pixels of the finished picture
   double sampleSize = 1;  ///< distance between neighbouring samples of a slice, world units
 };
 
-/// The colour of a sample, by its index in the buffers.
+/// A function that returns the colour of a sample, given the sample's index in the buffers.
 using SampleColor = std::function<LinearColor(std::size_t)>;
 
-/// Colours by degree or depth; empty for `ColorBy::normal`. The buffers must outlive the result.
+/// Returns a function that colours samples by degree or depth. The function is empty for `ColorBy::normal`.
+/// The buffers must outlive the function.
 SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color);
-/// Colours by the value of a quantity at each sample.
+/// Returns a function that colours each sample by its value of a quantity.
 SampleColor quantityColors(std::vector<float> quantity, ColorScale scale);
 
-/// Colours the samples of a slice, with thin outlines of the cells and the surface as a white line.
+/// Colours the samples of a slice. Draws thin outlines of the cells over them, and the field's surface as a
+/// white line.
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
 
-/// Colours the distances of a slice with the diverging map, with iso-lines and a bold zero line.
+/// Colours the distances of a slice with the diverging colour map. Draws iso-lines over them, and a bold
+/// line at distance zero.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have one material, else
-/// the given colours with soft shading. Sections and planes are unlit, with the outlines of their cells; on a
-/// plane the surface f = offset is a line. `lines` is empty, or holds for each sample how strongly the lines along
-/// cells cover it (0 to 1). `bodies` are the materials of the bodies in the buffers.
+/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have the colour
+/// of one material, else the given colours with soft shading. Sections and planes are unlit and show the
+/// outlines of their cells. On a plane, the surface f = offset is a line. `lines` is empty, or holds for
+/// each sample how strongly the lines along cell edges cover the sample (0 to 1). `bodies` are the
+/// materials of the bodies in the buffers.
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
                    double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
 
-/// The colour outside of the domain in a slice, and behind legend and caption.
+/// The background colour of a picture: around the domain in a slice, and behind the legend and the caption.
 Color paperColor();
 
-/// The backdrop of a surface, a soft gradient from the top (0) to the bottom (1) of the view.
+/// The backdrop of a picture of a surface: a soft gradient. `fromTop` is 0 at the top of the view, 1 at the
+/// bottom.
 LinearColor backdropColor(double fromTop);
 
-/// A picture of paper with the backdrop of surfaces in its upper `viewHeight` rows.
+/// A picture in the paper colour, with the backdrop of surfaces in its upper `viewHeight` rows.
 Image backdropPicture(int width, int height, int viewHeight);
 
-/// Copies the view into the picture's upper left corner.
+/// Copies the pixels of `view` into the upper left corner of the picture.
 void pasteView(Image& picture, const Image& view);
 
 }  // namespace hpsdf::render

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <span>
 
 #include "hpsdf/error.h"
@@ -13,7 +14,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Evaluates a quantity of points, in one batch.
+/// Evaluates a quantity at all points, in one batch, and writes the values to `out`.
 void measure(const Field& field, ColorBy quantity, const ReferenceData& reference, std::span<const Vector3> points,
              std::span<double> out) {
   if (quantity == ColorBy::slope) {
@@ -31,13 +32,13 @@ void measure(const Field& field, ColorBy quantity, const ReferenceData& referenc
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - expected[i]);
 }
 
-/// A value with its weight in the choice of a scale.
+/// A value of a quantity, with its weight when the limits of a colour scale are chosen.
 struct Weighted {
   double value, weight;
 };
 
-/// The least and the greatest value above 0, without the lowest hundredth and the highest thousandth by weight:
-/// with a few outliers included, everything else would have one colour.
+/// The smallest and the largest positive value, without the lowest 1 % and the highest 0.1 % of the total
+/// weight. If a few outliers set the limits of a scale, all other values would have one colour.
 std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
   if (values.empty()) return {0, 0};
@@ -53,14 +54,15 @@ std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   return {quantile(0.01), quantile(0.999)};
 }
 
-/// Weights cells by their volume, so that many tiny ones in a corner do not decide.
+/// Weights each cell's value by the volume of the cell, so that many tiny cells in a corner do not decide the
+/// scale.
 std::vector<Weighted> weighted(const Field& field, const std::vector<double>& ofCells) {
   std::vector<Weighted> values;
   field.forEachCell([&](const Cell& cell) { values.push_back({ofCells[cell.id], cell.box.volume()}); });
   return values;
 }
 
-/// Picks at most a million samples at even intervals, which represent all of them.
+/// Picks at most a million samples at even intervals, which represent all samples. Each has the weight 1.
 std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
   constexpr std::size_t kMost = 1'000'000;
   std::vector<Weighted> values;
@@ -69,6 +71,17 @@ std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
 }
 
 }  // namespace
+
+std::span<const std::string> titlesOf(ColorBy quantity) {
+  static const std::map<ColorBy, std::vector<std::string>> titles = {
+      {ColorBy::valueJump, {"worst jump of the value", "jump of value", "value jump"}},
+      {ColorBy::gradientJump, {"worst jump of the gradient", "jump of gradient", "gradient jump"}},
+      {ColorBy::slope, {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"}},
+      {ColorBy::error, {"error |f − exact|", "error"}},
+      {ColorBy::difference, {"difference |f − other|", "difference"}},
+      {ColorBy::cellError, {"estimated cell error", "cell error"}}};
+  return titles.at(quantity);
+}
 
 void requireReferenceData(ColorBy color, const ReferenceData& reference) {
   if ((color == ColorBy::valueJump || color == ColorBy::gradientJump) && reference.jumps == nullptr)

@@ -1,7 +1,9 @@
 #pragma once
-// The quantities that colours stand for, at the samples of a view.
+// The quantities that the colours of a picture show, evaluated at the samples of a view.
 
 #include <functional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "hpsdf/render/picture_settings.h"
@@ -9,20 +11,24 @@
 
 namespace hpsdf::render {
 
-/// Throws `Error` if the reference data that the colour needs is missing.
+/// The names of a quantity, from the longest to the shortest. The first name that fits is the title of the
+/// colour bar, the last name is for captions.
+std::span<const std::string> titlesOf(ColorBy quantity);
+
+/// Throws `Error` if `reference` lacks the data that colouring by `color` needs.
 void requireReferenceData(ColorBy color, const ReferenceData& reference);
 
-/// The values of a quantity that belongs to whole cells, by `Cell::id`; empty for other quantities.
+/// The values of a quantity that is constant in each cell, indexed by `Cell::id`. Empty for any other quantity.
 std::vector<double> quantityOfCells(const Field& field, ColorBy quantity, const ReferenceData& reference);
 
-/// The quantity at each sample of the buffers; NaN where a sample does not show the field. `pointAt(x, y)` returns the
-/// point of a sample; `ofCells` is the result of `quantityOfCells`.
+/// The value of the quantity at each sample of the buffers. It is NaN if the sample does not show the field.
+/// `pointAt(x, y)` returns the point of a sample. `ofCells` is the result of `quantityOfCells`.
 std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buffers,
                                      const std::function<Vector3(int, int)>& pointAt, ColorBy quantity,
                                      const ReferenceData& reference, const std::vector<double>& ofCells);
 
-/// The scale with the limits of the options, or with limits chosen from `ofCells` if there are any, else from
-/// `ofSamples`. Throws `Error` for limits that make no scale.
+/// The colour scale for a quantity. If the options set no limits, the limits are chosen from `ofCells`, or from
+/// `ofSamples` if `ofCells` is empty. Throws `Error` if the limits make no valid scale.
 ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,
                       const std::vector<float>& ofSamples);
 

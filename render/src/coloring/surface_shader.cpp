@@ -18,8 +18,8 @@ constexpr double kOcclusionRadius = 0.035;  // radius of the outer ring of taps,
 constexpr double kFlatRise = 0.06;  // sine of the angle above the tangent plane up to which a tap counts as flat
 constexpr double kOcclusionStrength = 2.6;
 
-/// Positions and normals that the samples of a view show, in the camera's frame: x right, y up, z towards the eye. The
-/// origin is the eye; for parallel rays, the centre of the plane where they start.
+/// The positions and normals at the samples of a view, in the camera's frame: x right, y up, z towards the eye.
+/// The origin of the frame is the eye. For parallel rays it is the centre of the plane where the rays start.
 class CameraFrame {
  public:
   CameraFrame(const ViewBuffers& buffers, const Camera& camera)
@@ -42,15 +42,16 @@ class CameraFrame {
     return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
   }
 
-  /// The normal that a sample shows. At jumps of the field a normal may point away from the eye. It is replaced by
-  /// the nearest one perpendicular to the ray; otherwise single dark samples would speckle the silhouettes.
+  /// The surface normal at a sample. Where the field jumps, the normal may point away from the eye. Such a normal
+  /// is replaced by the nearest normal perpendicular to the ray. Otherwise single dark samples would speckle the
+  /// silhouettes.
   Eigen::Vector3f normal(int x, int y, const Eigen::Vector3f& toEye) const {
     const Eigen::Vector3f n = axes_ * buffers_.normal[std::size_t(y) * buffers_.width + x];
     const float facing = n.dot(toEye);
     return facing >= 0 ? n : (n - facing * toEye).normalized();
   }
 
-  /// Height of the view at this depth in front of the eye.
+  /// World height of the part of the scene that the view shows at a depth in front of the eye.
   float heightAt(float depth) const { return parallel_ ? 2 * halfHeight_ : 2 * halfHeight_ * depth; }
 
  private:
@@ -66,8 +67,9 @@ class CameraFrame {
   float halfWidth_, halfHeight_;  // half the view's extent, in perspective at depth 1
 };
 
-/// Lamps that move with the camera, in its frame, as in portrait photography: a warm key light from the upper left, a
-/// cool fill light from the right, a rim light from behind, and the sky above the ground.
+/// Light sources that move with the camera, given in the camera's frame, as in portrait photography: a warm key
+/// light from the upper left, a cool fill light from the right, a rim light from behind, and light from sky and
+/// ground.
 struct Lights {
   Eigen::Vector3f key = Eigen::Vector3f(-0.55F, 0.62F, 0.56F).normalized();
   Eigen::Vector3f fill = Eigen::Vector3f(0.85F, 0.10F, 0.52F).normalized();
@@ -78,12 +80,13 @@ struct Lights {
   LinearColor sky = {0.26F, 0.29F, 0.34F};
   LinearColor ground = {0.10F, 0.08F, 0.07F};
 
-  /// Light on a matt surface with unit normal n, at a point that the share `open` of the ambient light reaches.
+  /// Light that a matt surface with unit normal n reflects. `open` is the share of ambient light that reaches the
+  /// point.
   LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
     const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
     const LinearColor lamps =
         keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
-    // Occlusion removes all of the sky's light and a part of the lamps'.
+    // Occlusion removes up to all ambient light of sky and ground, but only a part of the light of the lamps.
     return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
   }
 
@@ -102,7 +105,8 @@ class SurfaceShader {
   SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const std::function<LinearColor(std::size_t)>& color,
                 std::span<const LinearColor> bodies)
       : buffers_(buffers), frame_(buffers, camera), color_(color), bodies_(bodies) {
-    // Rotate each ring of taps against the one within it. All pixels have the same taps, so that there is no noise.
+    // Place the taps, the neighbours that occlusion samples, in rings. Each ring is rotated against the next
+    // smaller ring. All pixels have the same taps, so that the picture has no noise.
     for (int ring = 1; ring <= kRings; ++ring)
       for (int i = 0; i < kTapsInRing; ++i) {
         const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;
@@ -121,16 +125,16 @@ class SurfaceShader {
       const LinearColor& material = materialAt(i);
       return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
     }
-    // Colours that stand for a quantity are lit softly and with white light, so that they match those of the legend.
+    // Colours that show a quantity get soft white light, so that they match the colours of the legend.
     const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
     return color_(i) * light * (0.35F + 0.65F * open) +
            LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
   }
 
  private:
-  /// The share of ambient light that arrives: 1 on open ground, towards 0 in a deep fold. Neighbours on the screen that
-  /// rise above a point's tangent plane take ambient light from it. Folds and contacts darken, which shows shape better
-  /// than lamps do.
+  /// The share of ambient light that reaches a point: 1 on open ground, close to 0 in a deep fold. Neighbouring
+  /// samples that rise above the tangent plane at the point block ambient light. Folds and contacts darken, which
+  /// shows the shape better than lamps do.
   float openness(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
     const float radius = float(kOcclusionRadius) * frame_.heightAt(-position.z());
     float occluded = 0;
@@ -141,7 +145,7 @@ class SurfaceShader {
       const Eigen::Vector3f towards = frame_.position(tapX, tapY) - position;
       const float distance = towards.norm();
       if (distance <= 0) continue;
-      // Something far in front of the point hides it from the eye but not from the light.
+      // A neighbour far in front of the point hides the point from the eye but does not block its ambient light.
       const float near = std::max(0.0F, 1 - distance / (3 * radius));
       occluded += near * std::max(0.0F, towards.dot(normal) / distance - float(kFlatRise));
     }

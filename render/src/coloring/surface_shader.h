@@ -1,5 +1,5 @@
 #pragma once
-// The light on the surface, boxes and bodies in the picture of a camera.
+// The lighting of the surface, of cell boxes and of bodies in a camera's picture.
 
 #include <functional>
 #include <span>
@@ -9,8 +9,9 @@
 
 namespace hpsdf::render {
 
-/// The colour of a sample that shows the surface, a box or a body. `color` returns the colour of a sample by its index;
-/// an empty function stands for the materials. The result refers to all arguments except the camera.
+/// Returns a function for the lit colour of sample (x, y), which shows the surface, a box or a body. `color`
+/// returns the unlit colour of a sample by its index; if `color` is empty, the colours of the materials are
+/// used. The returned function refers to all arguments except the camera.
 std::function<LinearColor(int x, int y)> surfaceShader(const ViewBuffers& buffers, const Camera& camera,
                                                        const std::function<LinearColor(std::size_t)>& color,
                                                        std::span<const LinearColor> bodies);

@@ -67,7 +67,7 @@ class BodyView {
   }
 
  private:
-  /// The vertices of a body, in the world and in the picture.
+  /// The vertices of a body, in world coordinates and projected to the picture.
   struct ProjectedBody {
     std::vector<Vector3> points;
     std::vector<PicturePoint> inPicture;
@@ -82,15 +82,15 @@ class BodyView {
     return result;
   }
 
-  /// The pixels that may see the hull of some points. Points behind the eye of parallel rays have a place in the
-  /// picture too.
+  /// The pixels that may see the convex hull of the points. With parallel rays, points behind the eye have a
+  /// position in the picture too.
   PixelRect pixelsOf(std::span<const PicturePoint> points) const {
     const bool parallel = camera_.projection == Projection::orthographic;
     return pixelsAround(points, parallel ? -std::numeric_limits<double>::infinity() : leastDepth_, buffers_.width,
                         buffers_.height);
   }
 
-  /// Draws a body into the rows from y0 to y1 − 1, to which the rays belong.
+  /// Draws a body into the rows y0 to y1 − 1 of the picture. `rays` are the rays of the pixels in these rows.
   void draw(std::uint32_t body, int y0, int y1, const std::vector<BodyRay>& rays, std::vector<double>& nearest) {
     const auto [points, inPicture] = project(bodies_[body]);
     const std::vector<Triangle>& triangles = meshes_[bodies_[body].mesh].triangles();

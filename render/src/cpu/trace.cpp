@@ -7,7 +7,8 @@
 namespace hpsdf::render {
 namespace {
 
-// Lengths are in domain diagonals. The shaders use the same kNudge, kPastFace and kGrain.
+// These lengths are in units of the domain's diagonal unless noted. The shaders use the same kNudge, kPastFace
+// and kGrain.
 constexpr double kNudge = 1e-6;  // distance by which steps end behind a face; also the shortest step
 constexpr double kPastFace =
     4e-7;  // greatest distance behind a face at which rays enter the next node, in parts of the grid
@@ -16,13 +17,13 @@ constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes
 constexpr int kMostSteps = 1 << 16;
 constexpr int kMostRefinements = 24;
 
-/// Calls f(coefficients) with a pointer to the leaf's coefficients, which are float or double.
+/// Calls f(coefficients) with a pointer to a leaf's coefficients. Their type is float or double.
 template <typename F>
 auto withCoefficients(const FieldData& field, std::uint32_t leaf, F&& f) {
   return std::visit([&](const auto& c) { return f(c.data() + node::offset(field.nodes[leaf])); }, field.coefficients);
 }
 
-/// L_i(x) and L_i'(x) for i = 0..degree.
+/// The Legendre polynomials L_i(x) and their derivatives L_i'(x) for i = 0 to `degree`.
 struct Legendre {
   Legendre(double x, int degree) {
     value[0] = 1;
@@ -37,7 +38,7 @@ struct Legendre {
   std::array<double, kMaxDegree + 1> derivative;
 };
 
-/// The value of a polynomial and, where asked for, its gradient.
+/// The value of a leaf's polynomial and, if `withGradient`, its gradient.
 template <bool withGradient, typename T>
 Sample evaluate(const T* c, int degree, const Vector3& local) {
   const Legendre x(local.x(), degree), y(local.y(), degree), z(local.z(), degree);
@@ -59,9 +60,9 @@ Sample evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length from the point to where the ray leaves the node's box, or a box whose faces are `margin` node
-/// edges further inside. The length ends slightly behind the face. Otherwise a ray that runs along a face, and
-/// lies on it up to rounding, would leave the box again at every step.
+/// World length along the ray from a point to the exit from its node's box. With a margin, the faces of the box
+/// lie `margin` node edges further inside. The length ends slightly behind the face. Otherwise a ray that runs
+/// along a face, and lies on it up to rounding, would leave the box again at every step.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -73,7 +74,7 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
   return exit;
 }
 
-/// The length over which a height whose slope is at least `steepest` cannot fall to zero.
+/// Length of the step over which the height certainly stays positive, if its slope is at least `steepest`.
 double certainlyAbove(double height, double steepest) {
   if (!(height > 0)) return 0;
   return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
@@ -194,7 +195,7 @@ CellPoint TraceField::leafAt(const Vector3& p) const {
 double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) const {
   const int p = degree(leaf);
   if (p == 0) return 0;
-  // Coefficients are in lexicographic order: these are c_100, c_010 and c_001.
+  // Coefficients are in lexicographic order. The pointers below are to c_100, c_010 and c_001.
   return withCoefficients(field_, leaf, [&](const auto* c) {
     return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
            c[1] * direction.z();
@@ -244,7 +245,8 @@ class TraceField::March {
   }
 
  private:
-  /// The point at t in a leaf, and bounds of the height of the leaf's polynomial along the ray.
+  /// The point at parameter t of the ray, in a leaf, with bounds along the ray for the height of the leaf's
+  /// polynomial.
   struct LeafPoint {
     CellPoint at;
     Vector3 localDirection;  ///< change of the local coordinates per world unit
@@ -271,8 +273,8 @@ class TraceField::March {
     return leaf.inBlendZone ? stepInBlendZone(leaf) : stepInLeaf(leaf);
   }
 
-  /// Steps past a node whose range excludes the offset. A node on the other side of the surface is a hit on its
-  /// face.
+  /// Steps past a node whose range of values excludes the offset. If the node lies on the other side of the
+  /// surface, returns a hit on the face where the ray enters the node.
   std::optional<Hit> passNode(const CellPoint& at) {
     const double side = field_.bounds_[at.node].lo > offset_ ? 1 : -1;
     if (side_ == 0) side_ = side;
@@ -281,7 +283,7 @@ class TraceField::March {
     return std::nullopt;
   }
 
-  /// Evaluates the height where the ray enters a leaf.
+  /// Evaluates the height at the point where the ray enters a leaf.
   void enterLeaf(const CellPoint& at) {
     const double value = field_.value(at, localFromFraction(at.fraction)) - offset_;
     if (side_ == 0) side_ = value >= 0 ? 1 : -1;
@@ -308,8 +310,8 @@ class TraceField::March {
             .inBlendZone = inBlendZone};
   }
 
-  /// Steps where other leaves have a weight: as far as the height is certainly positive, or by a small part of the
-  /// zone.
+  /// Takes a step where neighbouring leaves have a weight: as far as the height is certainly positive, but at
+  /// least a small part of the blend zone.
   std::optional<Hit> stepInBlendZone(const LeafPoint& leaf) {
     const double grain = kGrain * field_.zones_[leaf.at.node].extent / leaf.localDirection.norm();
     const double length = std::min(leaf.toLeave, std::max(certainlyAbove(leaf.clear, leaf.steepest), grain) + nudge_);
@@ -319,8 +321,8 @@ class TraceField::March {
     return std::nullopt;
   }
 
-  /// Steps where the leaf's polynomial is the field. Over a step the height sags below its chord by at most curve ·
-  /// length² / 8, and it is monotone if it falls by more than curve · length² / 2.
+  /// Takes a step where the leaf's polynomial alone is the field. Over a step the height sags below its chord by
+  /// at most curve · length² / 8. The height is monotone if it falls by more than curve · length² / 2.
   std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
     const bool falling = leaf.shallowest < 0;  // throughout the leaf, so that there is one root at most
@@ -354,8 +356,8 @@ class TraceField::March {
     lastLeaf_ = kNoCell;
   }
 
-  /// Finds the only root in a leaf between a, where the height is positive, and b, where it is not: regula falsi,
-  /// Illinois variant.
+  /// Finds the only root in a leaf by regula falsi, Illinois variant. The height is positive at parameter a of
+  /// the ray, and not positive at b.
   Hit refine(const CellPoint& leaf, double a, double heightA, double b, double heightB) const {
     double t = b;
     for (int i = 0; i < kMostRefinements; ++i) {
@@ -396,7 +398,7 @@ class TraceField::March {
   const double nudge_;
   double t_ = 0;
   double side_ = 0;  ///< sign of f − offset where the ray starts; 0 until it is known
-  // The last step's state, for a step that stays in its leaf.
+  // The state after the last step, for the next step in the same leaf.
   std::uint32_t lastLeaf_ = kNoCell;
   double lastHeight_ = 0;   ///< height at t
   double longestStep_ = 0;  ///< longest step to try, world units

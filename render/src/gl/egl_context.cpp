@@ -15,13 +15,13 @@
 namespace hpsdf::render {
 namespace {
 
-/// A device to try.
+/// An EGL display to try, with its name.
 struct Candidate {
   std::string name;  ///< name of the device for messages
   std::function<EGLDisplay()> display;
 };
 
-/// `list` separates names by spaces, or is null.
+/// Returns true if `list` contains the extension `name`. `list` is null, or names separated by spaces.
 bool hasExtension(const char* list, const std::string& name) {
   return (" " + std::string(list == nullptr ? "" : list) + " ").find(" " + name + " ") != std::string::npos;
 }
@@ -38,7 +38,8 @@ bool isSoftware(std::string_view renderer) {
   return false;
 }
 
-/// Names the missing libraries, or returns an empty text. libepoxy would end the program where a library is missing.
+/// Names the OpenGL libraries that are missing, or returns an empty text. Without this check libepoxy would end
+/// the program.
 std::string missingLibraries() {
   const auto opens = [](const char* name) {
     void* library = dlopen(name, RTLD_LAZY | RTLD_LOCAL);
@@ -50,7 +51,8 @@ std::string missingLibraries() {
   return {};
 }
 
-/// Adds the software or the hardware devices to the candidates. If there are none, adds the reason to `tried`.
+/// Adds the software devices or the hardware devices to `candidates`. If it finds none, it adds the reason to
+/// `tried`.
 void addDevices(const char* clientExtensions, bool software, std::vector<Candidate>& candidates, std::string& tried) {
   const char* kind = software ? "software" : "hardware";
   const bool enumerates = hasExtension(clientExtensions, "EGL_EXT_device_base") ||
@@ -76,7 +78,7 @@ void addDevices(const char* clientExtensions, bool software, std::vector<Candida
   if (found == 0) tried += std::string("; ") + kind + " devices: none among " + std::to_string(count);
 }
 
-/// The candidates in the order of docs/rendering.md.
+/// The EGL displays to try for a choice, in the order that docs/rendering.md states.
 std::vector<Candidate> candidatesFor(GlChoice choice, std::string& tried) {
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   std::vector<Candidate> candidates;
@@ -92,11 +94,11 @@ std::vector<Candidate> candidatesFor(GlChoice choice, std::string& tried) {
   return candidates;
 }
 
-/// Throws `Error` with the reason why the display gives no context.
+/// Creates an OpenGL context on a display. Throws `Error` with the reason if that fails.
 EGLContext createContext(EGLDisplay display) {
   if (display == EGL_NO_DISPLAY) throw Error("no such display");
-  // The display is never terminated: it belongs to the whole process, EGL does not count its initialisations, and
-  // another part of the program may use it.
+  // The display is initialised but never terminated: it belongs to the whole process, EGL does not count its
+  // initialisations, and another part of the program may use it.
   if (!eglInitialize(display, nullptr, nullptr)) throw Error("does not initialise, " + eglErrorText());
   const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
   for (const char* needed : {"EGL_KHR_no_config_context", "EGL_KHR_surfaceless_context", "EGL_KHR_create_context"})

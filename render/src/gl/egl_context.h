@@ -8,7 +8,8 @@
 
 namespace hpsdf::render {
 
-/// An OpenGL 4.5 core context without a surface, on the first of the choice's devices that offers one.
+/// An OpenGL 4.5 core context without a window surface. It is created on the first device of the `GlChoice`
+/// that offers such a context.
 class EglContext {
  public:
   /// Throws `Error` that names the devices tried and the reason why each failed.
@@ -20,8 +21,8 @@ class EglContext {
   /// The string GL_RENDERER.
   const std::string& renderer() const { return renderer_; }
 
-  /// Makes the context current on this thread for the lifetime of the object. The destructor restores the previous
-  /// context.
+  /// Makes the context current on this thread for the lifetime of this object. The destructor restores the
+  /// context that was current before.
   class Current {
    public:
     explicit Current(const EglContext& context);
@@ -35,7 +36,8 @@ class EglContext {
   };
 
  private:
-  /// Creates the context on a display. Throws `Error` with the reason why the display does not serve the choice.
+  /// Creates the context on a display. Throws `Error` with the reason if the display cannot provide what `choice`
+  /// asks for.
   void open(void* display, GlChoice choice);
 
   void* display_ = nullptr;
@@ -43,7 +45,8 @@ class EglContext {
   std::string renderer_;
 };
 
-/// Deletes objects of a context, or leaves them to the context's end where it is current on another thread.
+/// Deletes OpenGL objects of a context. If the context is current on another thread, the objects remain until
+/// the context is destroyed.
 template <typename Objects>
 void deleteObjects(const EglContext& context, std::unique_ptr<Objects>& objects) {
   try {

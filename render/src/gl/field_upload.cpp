@@ -32,8 +32,9 @@ std::size_t uploadedCount(const FieldData& field) {
   return count;
 }
 
-/// Writes the coefficients of a leaf; those that it lacks remain zero. A leaf of degree kLowDegree has the terms
-/// of that degree last, so that all leaves up to this degree have their lower terms in the same order.
+/// Writes the coefficients of a leaf to `out`. Entries for coefficients that the leaf lacks remain zero. A leaf
+/// of degree kLowDegree has its terms of that degree last, so that the lower terms of all leaves up to this
+/// degree have the same order.
 template <typename T>
 void uploadLeaf(const T* c, int degree, float* out) {
   const int all = std::max(degree, kLowDegree - 1);
@@ -97,7 +98,7 @@ std::vector<NodeTexel> zoneTexels(const std::vector<BlendZoneBounds>& zones,
 template <typename T>
 void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum format, const std::vector<T>& data) {
   const std::size_t bytes = data.size() * sizeof(T);
-  // Discard earlier errors.
+  // Discard OpenGL errors of earlier calls.
   while (glGetError() != GL_NO_ERROR) {
   }
   glNamedBufferStorage(buffer.name(), static_cast<GLsizeiptr>(bytes), data.data(), 0);

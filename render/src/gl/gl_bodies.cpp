@@ -1,4 +1,5 @@
-// OpenGL decides which triangle of which body each pixel sees; distances and normals are computed in double precision.
+// OpenGL finds the body and the triangle that each pixel sees. The CPU computes the distances and normals in
+// double precision.
 
 #include <algorithm>
 #include <array>
@@ -19,21 +20,22 @@ namespace {
 
 /// The locations of the vertex attributes in shaders/bodies.vert.
 enum : GLuint { kPosition = 0, kTargetFromMesh = 1, kIndex = 5 };
-/// The bindings of the buffers from which attributes are read.
+/// The binding points of the buffers that contain the vertex attributes.
 enum : GLuint { kVertexBinding = 0, kInstanceBinding = 1 };
 
 /// The indices of the body and the triangle that a pixel sees.
 using BodyTriangle = std::array<std::uint32_t, 2>;
 
-/// A body in the layout of the vertex shader's attributes.
+/// The data of a body, in the layout of the attributes of the vertex shader.
 struct Instance {
   std::array<float, 16> targetFromMesh;  ///< column-major
   std::uint32_t body;
 };
 
-/// The transform from points relative to the eye to a tile's clip space, in which rows run downwards and nearer
-/// points have greater depths. In perspective the depth in clip space is leastDepth / depth, for which floats have
-/// the same relative precision near and far. For parallel rays it falls linearly with the distance.
+/// The transform from points relative to the eye to the clip space of a tile. In this clip space rows run
+/// downwards and nearer points have greater depths. In perspective the depth in clip space is
+/// leastDepth / depth, for which floats have the same relative precision near and far. For parallel rays it
+/// falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =
@@ -64,8 +66,8 @@ Ball ballAround(const BodyMesh& mesh) {
   return ball;
 }
 
-/// Returns true if a ball may be visible, that is, if it extends inside the left, right, lower and upper planes of the
-/// frustum and the far plane. `center` is relative to the eye.
+/// Returns true if a ball may be visible: some of it lies inside each of the left, right, lower, upper and far
+/// planes of the frustum. `center` is relative to the eye.
 bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
   constexpr double kRounding = 1e-6;
   for (const auto& [axis, sign] : {std::pair(0, 1), {0, -1}, {1, 1}, {1, -1}, {2, -1}}) {
@@ -86,7 +88,7 @@ struct MeshUpload {
     upload(mesh);
   }
 
-  /// Uploads the vertices relative to the ball's centre, so that single precision suffices.
+  /// Uploads the vertices of the mesh relative to the centre of its ball, so that single precision suffices.
   void upload(const BodyMesh& mesh) {
     ball = ballAround(mesh);
     std::vector<Eigen::Vector3f> positions;
@@ -99,7 +101,7 @@ struct MeshUpload {
   Ball ball;
 };
 
-/// The objects on the device. The context must be current when they are created and destroyed.
+/// The OpenGL objects of a body renderer. Their context must be current when they are created and destroyed.
 struct BodyResources {
   explicit BodyResources(const BodyMeshes& bodyMeshes) : program(linkedProgram({"bodies.vert"}, {"bodies.frag"})) {
     for (std::size_t i = 0; i < bodyMeshes.size(); ++i) {
@@ -130,8 +132,9 @@ struct BodyResources {
   std::vector<MeshUpload> meshes;
 };
 
-/// Moves the ray's intersection with the triangle's plane into the triangle: OpenGL rounds corners, so that the
-/// triangle that it reports may begin slightly beside the pixel's middle. All vectors are in the mesh's frame.
+/// The point of a triangle that a pixel's ray meets. OpenGL rounds corners, so that the ray may pass slightly
+/// beside the triangle. The ray's intersection with the triangle's plane is then moved into the triangle. All
+/// vectors are in the mesh's frame.
 BodyPoint pointOn(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction,
                   const BodyTriangle& seen) {
   const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];

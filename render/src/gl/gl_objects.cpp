@@ -21,7 +21,7 @@ std::string names(std::initializer_list<std::string_view> files) {
   return result;
 }
 
-/// Throws `Error` that starts with `what` and contains the compiler's log, unless `ok`.
+/// Throws `Error` unless `ok`. The message starts with `what` and contains the log of the shader compiler.
 template <typename GetLog>
 void checkLog(GLint ok, const std::string& what, const GetLog& getLog, GLuint name) {
   if (ok) return;
@@ -36,7 +36,7 @@ void checkLog(GLint ok, const std::string& what, const GetLog& getLog, GLuint na
 GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
   std::string text = "#version 450 core\n";
   int number = 1;
-  // The compiler's messages name lines as NUMBER:LINE, where files are numbered in the order of the list.
+  // Number the files in the order of the list, because the compiler's messages name lines as NUMBER:LINE.
   for (const std::string_view file : files) {
     text += "#line 1 " + std::to_string(number++) + "\n";
     text += shaderText(file);

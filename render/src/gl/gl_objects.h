@@ -1,5 +1,6 @@
 #pragma once
-// OpenGL objects that are deleted with their owner. Their context must be current when they are created and deleted.
+// OpenGL objects that are deleted when their C++ owner is destroyed. Their context must be current when they
+// are created and deleted.
 
 #include <epoxy/gl.h>
 
@@ -67,12 +68,13 @@ using GlVertexArray = GlObject<VertexArrayKind>;
 using GlQuery = GlObject<QueryKind>;
 using GlProgram = GlObject<ProgramKind>;
 
-/// A linked program of a vertex shader and a fragment shader, each of which is the concatenation of files in shaders/.
-/// Throws `Error` with the compiler's log.
+/// Links a program of a vertex shader and a fragment shader. Each shader is the concatenation of some files in
+/// shaders/. Throws `Error` with the compiler's log.
 GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
                         std::initializer_list<std::string_view> fragmentFiles);
 
-/// Throws `Error` where OpenGL reports an error since the last call. `what` completes "the OpenGL device fails to".
+/// Throws `Error` if OpenGL has reported an error since the last call. `what` completes the sentence "the
+/// OpenGL device fails to".
 void checkGl(const char* what);
 
 }  // namespace hpsdf::render

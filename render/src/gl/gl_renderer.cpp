@@ -31,18 +31,18 @@ constexpr GLint kRefinementLimit = kMostSteps;
 constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, the same as on the CPU
 constexpr int kRefinementsInAll = 24;
 
-/// Greatest number of loop iterations of a shader: llvmpipe ends all loops of a shader silently once the sum of their
-/// iterations is 65535, of which the compiler's own loops may take some.
+/// Greatest total number of loop iterations in one run of a shader. llvmpipe silently ends all loops of a
+/// shader once the sum of their iterations is 65535, and the compiler's own loops may take some of these.
 constexpr int kLoopBudget = 60000;
 
-/// The number of loop iterations of one evaluation, including the last test of each loop.
+/// The number of loop iterations in one evaluation of a leaf, including the last test of each loop.
 constexpr int evaluationLoops(int degree) {
   const int rows = (degree + 1) * (degree + 2) / 2;
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
 
-/// The number of loop iterations of one evaluation in a blend zone: eight candidates at each depth, the descent to
-/// the candidates of the first depth, and the evaluation of at most sixteen leaves.
+/// The number of loop iterations in one evaluation in a blend zone. It counts eight candidates at each depth,
+/// the descent to the candidates of the first depth, and the evaluation of at most sixteen leaves.
 constexpr int blendedEvaluationLoops(int evaluation) {
   return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2;
 }
@@ -50,7 +50,7 @@ constexpr int blendedEvaluationLoops(int evaluation) {
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// The smallest part of a view that contains all blocks, of which there must be at least one.
+/// The smallest rectangle of a view that contains all blocks. There must be at least one block.
 Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
   const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);
@@ -66,7 +66,7 @@ int highestDegree(const FieldData& field) {
   return degree;
 }
 
-/// The objects on the device. The context must be current when they are created and destroyed.
+/// The OpenGL objects of the renderer. Their context must be current when they are created and destroyed.
 struct Resources {
   Resources(const Field& whole, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones)
       : field(whole, bounds, zones),
@@ -83,7 +83,7 @@ struct Resources {
     glVertexArrayAttribBinding(blocks.name(), 0, 0);
   }
 
-  /// The shader that evaluates leaves with or without blending.
+  /// The shader file for the evaluation of the field, with or without blending.
   static std::string_view leaves(const Field& field) {
     return field.data().blend > 0 ? "leaves_blended.glsl" : "leaves_alone.glsl";
   }
@@ -124,7 +124,8 @@ class GlRenderer final : public Renderer {
     octree_.nodes = field.data().nodes;
     const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
     bounds_ = surfaceBounds(field.data(), zones);
-    // Limit the steps and refinements of one pass so that the shaders stay within the loop budget.
+    // Limit the number of steps and of root refinements in one pass, so that the shaders stay within the loop
+    // budget.
     const int unblended = evaluationLoops(highestDegree(field.data()));
     const int evaluation = zones.empty() ? unblended : blendedEvaluationLoops(unblended);
     const int loopsOfStep = unblended + kMaxDepth + 4;
@@ -181,7 +182,7 @@ class GlRenderer final : public Renderer {
     glProgramUniform1i(resources_->march.name(), kMostSteps, stepsInPass_);
     glProgramUniform1i(resources_->hit.name(), kRefinementLimit, refinements_);
 
-    // Upload the blocks that may see the surface.
+    // Find the blocks of pixels that may see the surface, and upload them.
     ViewBuffers buffers = emptyBuffers(width, height, true);
     const SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
     if (found.blocks.empty()) return buffers;
@@ -190,7 +191,7 @@ class GlRenderer final : public Renderer {
     glVertexArrayVertexBuffer(resources_->blocks.name(), 0, blocks.name(), 0, sizeof(Block));
     glProgramUniform1f(resources_->march.name(), kStartSide, found.side);
 
-    // Draw them, tile after tile.
+    // Draw the blocks, tile after tile.
     const Tile part = boundingTile(found.blocks, width, height);
     const RenderTarget state(part, GL_RGBA32UI, GL_RGBA32F), target(part, GL_RGBA32UI, GL_RGBA32F);
     resources_->field.bind();
@@ -210,7 +211,8 @@ class GlRenderer final : public Renderer {
 
  private:
   void setTile(const Tile& tile) const {
-    // The viewport consists of whole blocks, because a point whose centre lies outside is not drawn.
+    // Extend the viewport to whole blocks: a block is drawn as a point, and OpenGL omits points whose centre lies
+    // outside.
     const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
     glViewport(0, 0, wholeBlocks(tile.width), wholeBlocks(tile.height));
     for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
@@ -219,8 +221,8 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  /// Traces the rays of a tile and reads what they hit. After the first pass of the march, further passes continue
-  /// only the pixels whose march has not ended.
+  /// Traces the rays of a tile and reads the hits. The first pass of the march starts all rays. Further passes
+  /// continue only the pixels whose march has not ended.
   void drawTile(const Tile& tile, GLsizei blocks, const RenderTarget& state, const RenderTarget& target) {
     state.bindForDrawing();
     march(blocks);
@@ -243,7 +245,7 @@ class GlRenderer final : public Renderer {
     glTextureBarrier();
   }
 
-  /// Draws the march again until no pixel is under way or all steps are used up.
+  /// Repeats the march pass until the march of every pixel has ended or all steps are used up.
   void continueMarch(GLsizei blocks) const {
     const GLuint query = resources_->anyPixels.name();
     glUseProgram(resources_->march.name());
@@ -252,7 +254,7 @@ class GlRenderer final : public Renderer {
       glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
       glDrawArrays(GL_POINTS, 0, blocks);
       glEndQuery(GL_ANY_SAMPLES_PASSED);
-      // Each pass reads the texels that the pass before has written, each pixel its own.
+      // Each pass reads the texels that the pass before it has written. Each pixel reads only its own texel.
       glTextureBarrier();
       GLuint any = GL_FALSE;
       glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);

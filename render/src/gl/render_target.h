@@ -17,7 +17,7 @@ namespace hpsdf::render {
 /// Greatest width and height of a tile in pixels, small enough for the render targets of any device.
 constexpr int kTile = 2048;
 
-/// A part of a view that is drawn in one piece.
+/// A rectangle of pixels of a view that is drawn in one piece.
 struct Tile {
   int left, top, width, height;
 };
@@ -32,8 +32,8 @@ inline std::vector<Tile> tiles(const Tile& part) {
   return result;
 }
 
-/// Calls f(index, x, y) for each pixel of a tile, in several threads: its index within the tile and its place in the
-/// view. Rows of a target run downwards, as in a view.
+/// Calls f(index, x, y) for each pixel of a tile, in several threads. `index` is the pixel's index within the
+/// tile, and (x, y) its place in the view. Rows of a render target run downwards, as in a view.
 template <typename F>
 void forEachPixel(const Tile& tile, const F& f) {
   tbb::parallel_for(0, tile.height, [&](int y) {
@@ -41,10 +41,12 @@ void forEachPixel(const Tile& tile, const F& f) {
   });
 }
 
-/// The render target of the tiles of a part of a view: integers, and four floats or a depth a pixel.
+/// A render target for the tiles of a part of a view. Each pixel has integers and either four floats or a
+/// depth.
 class RenderTarget {
  public:
-  /// `integers` and `other` are the formats of the two. Throws `Error` where the device cannot draw into the target.
+  /// `integers` is the format of the integers, `other` that of the floats or depths. Throws `Error` if the device
+  /// cannot draw into such a target.
   RenderTarget(const Tile& part, GLenum integers, GLenum other) : hasDepth_(other == GL_DEPTH_COMPONENT32F) {
     const int width = std::min(part.width, kTile), height = std::min(part.height, kTile);
     glTextureStorage2D(integers_.name(), 1, integers, width, height);
@@ -64,7 +66,8 @@ class RenderTarget {
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
-  /// Sets all pixels to no cell or body, and to no normal or an infinite distance.
+  /// Clears all pixels: the integers to no cell or no body, the floats to no normal, the depth to an infinite
+  /// distance.
   void clear() const {
     static_assert(kNoCell == kNoBody);
     constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
@@ -79,7 +82,7 @@ class RenderTarget {
     glBindTextureUnit(3, other_.name());
   }
 
-  /// Reads the integers or the floats of a tile's pixels.
+  /// Reads the integers or the floats of all pixels of a tile. The type of `out` decides which.
   template <typename Channel, std::size_t channels>
   void read(const Tile& tile, std::vector<std::array<Channel, channels>>& out) const {
     constexpr bool kIntegers = std::is_integral_v<Channel>;

@@ -9,7 +9,7 @@
 namespace hpsdf::render {
 namespace {
 
-// decodeChannel and encodeChannel are the transfer curve of sRGB (IEC 61966-2-1).
+// decodeChannel and encodeChannel are the transfer function of sRGB (IEC 61966-2-1) and its inverse.
 double decodeChannel(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
@@ -17,7 +17,8 @@ double encodeChannel(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-// A step of the table is at most 1/20 of an 8-bit code, so that it rounds like the curve itself.
+// The number of steps of the table for encodeChannel. A step is at most 1/20 of an 8-bit code, so that the
+// table rounds like the function itself.
 constexpr int kEncodeSteps = 65535;
 
 const std::vector<std::uint8_t>& encodeTable() {
@@ -78,7 +79,7 @@ Oklab toOklab(const LinearColor& color) {
 
 LinearColor fromOklab(const Oklab& color) {
   LinearColor linear = oklabToLinear(color);
-  // Bisect for the largest fraction of the chroma that can be displayed.
+  // If the colour cannot be displayed, bisect for the largest fraction of its chroma that can.
   if (!displayable(linear)) {
     double inside = 0, outside = 1;
     for (int i = 0; i < 24; ++i) {

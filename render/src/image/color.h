@@ -13,7 +13,7 @@ using LinearColor = Eigen::Vector3f;
 
 LinearColor decodeSrgb(Color color);
 
-/// Clamps values outside 0 to 1.
+/// Converts linear sRGB to 8-bit sRGB. Clamps channels to the range 0 to 1.
 Color encodeSrgb(const LinearColor& color);
 
 /// A perceptually uniform colour space (Ottosson, "A perceptual color space for image processing", 2020): lightness 0
@@ -26,9 +26,10 @@ struct Oklab {
 
 Oklab toOklab(const LinearColor& color);
 
-/// Reduces the chroma of a colour beyond the gamut of sRGB, at the same lightness and hue, until it can be displayed.
+/// Converts an Oklab colour to linear sRGB. If the gamut of sRGB does not contain the colour, its chroma is
+/// reduced, at the same lightness and hue, until it can be displayed.
 LinearColor fromOklab(const Oklab& color);
-/// The same in polar coordinates: a = chroma · cos(hue), b = chroma · sin(hue).
+/// Converts an Oklab colour in polar coordinates to linear sRGB: a = chroma · cos(hue), b = chroma · sin(hue).
 LinearColor fromOklch(double lightness, double chroma, double hueDegrees);
 
 /// Euclidean distance in Oklab. About 0.02 is just noticeable side by side.
@@ -36,12 +37,12 @@ double colorDifference(const Oklab& a, const Oklab& b);
 
 inline LinearColor mix(const LinearColor& a, const LinearColor& b, float t) { return a + t * (b - a); }
 
-/// Mixes a share of a colour, 0 to 1, into a pixel, in linear light.
+/// Mixes a colour into a pixel, in linear light. `share` is the share of the new colour, 0 to 1.
 inline void mixInto(Color& pixel, const LinearColor& color, float share) {
   pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share));
 }
 
-/// Rises from 0 at `low` to 1 at `high` with a slope of 0 at both ends.
+/// A function of x that rises smoothly from 0 at `low` to 1 at `high`. Its slope is 0 at both ends.
 inline float smoothStep(double low, double high, double x) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
   return static_cast<float>(t * t * (3 - 2 * t));

@@ -31,9 +31,10 @@ double niceStep(double span, double lines) {
 LinearColor orderedColor(double t) {
   t = std::clamp(t, 0.0, 1.0);
   const double lightness = 0.385 + 0.565 * t;
-  // The hue runs from violet to yellow over blue, teal and green; the shorter arc would cross muddy pinks.
+  // The hue runs from violet over blue, teal and green to yellow. The shorter way around the hue circle would
+  // pass through muddy pinks.
   const double hue = 302 - 204 * std::pow(t, 0.92);
-  // The chroma is least in the middle, where the gamut of sRGB is narrow and greens would stand out.
+  // The chroma is lowest in the middle of the map, where the gamut of sRGB is narrow and greens would stand out.
   const double chroma = 0.103 + 0.034 * (2 * t - 1) * (2 * t - 1);
   return fromOklch(lightness, chroma, hue);
 }
@@ -83,7 +84,8 @@ std::vector<double> scaleMarks(const ColorScale& scale) {
 }
 
 LinearColor divergingColor(double t) {
-  // Each arm is a quadratic Bézier curve through a light, saturated colour, so that the sign shows close to zero.
+  // The colours from white to each end form a quadratic Bézier curve, whose control point is a light, saturated
+  // colour. The sign of t is then visible even close to zero.
   const Oklab white = {0.985, 0, 0};
   const Oklab middle = t < 0 ? Oklab{0.77, -0.045, -0.105} : Oklab{0.80, 0.070, 0.085};
   const Oklab end = t < 0 ? Oklab{0.36, -0.015, -0.135} : Oklab{0.40, 0.125, 0.070};
@@ -102,7 +104,8 @@ DistanceScale distanceScale(double minimum, double maximum) {
   const double largest = std::max(std::abs(minimum), std::abs(maximum));
   if (largest > 0) {
     scale.range = niceCeil(largest);
-    // A section of constant value has no span to divide, so the range is divided instead.
+    // Divide the span of the values by the iso-lines. If the values are constant, divide the range of the colours
+    // instead.
     const double span = maximum - minimum;
     scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range, kIsoLines);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// Colour maps and the scales that map numbers to them.
+// Colour maps, and the scales that map numbers to positions on a colour map.
 
 #include <array>
 #include <span>
@@ -13,12 +13,14 @@ namespace hpsdf::render {
 /// throughout.
 LinearColor orderedColor(double t);
 
-/// Colours of degrees or depths (levels, 0 to 255), spread evenly over the ordered map.
+/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the ordered colour
+/// map.
 class LevelMap {
  public:
   explicit LevelMap(std::span<const int> levels);
 
-  /// Magenta, which the map does not contain, for a level that is not in `levels`: a fault of the buffers must show.
+  /// The colour of a level. A level that is not in `levels` gets magenta, which the colour map does not contain,
+  /// so that a fault in the buffers is visible.
   const LinearColor& operator()(int level) const { return colors_[static_cast<std::uint8_t>(level)]; }
   const std::vector<int>& levels() const { return levels_; }
 
@@ -27,21 +29,22 @@ class LevelMap {
   std::array<LinearColor, 256> colors_;
 };
 
-/// Maps a quantity to the ordered map: values up to `low` to its dark end, values from `high` on to its light end.
+/// Maps values of a quantity to the ordered colour map. Values up to `low` get the dark end of the map, values
+/// from `high` on get the light end.
 class ColorScale {
  public:
-  /// Requires low < high, and 0 < low on a logarithmic scale.
+  /// Requires low < high. A logarithmic scale also requires 0 < low.
   ColorScale(double low, double high, bool logarithmic);
 
-  /// A scale for values from `least` (above 0) to `greatest`. A logarithmic scale lies between powers of ten and
-  /// spans at most six decades; a linear one runs from 0 to a number of one or two digits. Its high end is 1 where
+  /// A scale for values from `least` (above 0) to `greatest`. The ends of a logarithmic scale are powers of ten,
+  /// at most six decades apart. A linear scale runs from 0 to a number of one or two digits. Its high end is 1 if
   /// `greatest` is 0.
   static ColorScale around(double least, double greatest, bool logarithmic);
 
   LinearColor operator()(double value) const {
     return table_[static_cast<std::size_t>(fraction(value) * kSteps + 0.5)];
   }
-  /// The value's position on the scale, clamped: 0 at `low`, 1 at `high`; 0 for NaN.
+  /// The position of a value on the scale, clamped to the range 0 (at `low`) to 1 (at `high`). Returns 0 for NaN.
   double fraction(double value) const;
 
   double low() const { return low_; }
@@ -55,8 +58,8 @@ class ColorScale {
   std::vector<LinearColor> table_;
 };
 
-/// Values to mark on a scale, ascending: the powers of ten if the scale contains at least two, else about five even
-/// steps.
+/// The values to mark on a colour scale, ascending: powers of ten if a logarithmic scale contains at least two
+/// of them, else about five values at even steps.
 std::vector<double> scaleMarks(const ColorScale& scale);
 
 /// The step of the form {1, 2, 5} · 10^n that divides `span` into a number of parts as near to `lines` as possible.
@@ -68,15 +71,15 @@ double powerOfTenBelow(double x);
 /// The diverging map for distances: deep blue at −1 (inside), white at 0, deep red at 1 (outside).
 LinearColor divergingColor(double t);
 
-/// The colours and iso-lines of distances.
+/// The range of the colours and the spacing of the iso-lines that show distances in a slice.
 struct DistanceScale {
   double range = 1;                 ///< the colours span [−range, range]
   double step = 0.1;                ///< iso-lines are at the multiples of this value
   double minimum = 0, maximum = 0;  ///< least and greatest value shown
 };
 
-/// Chooses a range of one or two digits and about twelve iso-lines with a step of {1, 2, 5} · 10^n for values within
-/// [minimum, maximum].
+/// Chooses the scale for values within [minimum, maximum]: a range of one or two digits, and about twelve
+/// iso-lines whose step is {1, 2, 5} · 10^n.
 DistanceScale distanceScale(double minimum, double maximum);
 
 }  // namespace hpsdf::render

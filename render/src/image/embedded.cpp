@@ -2,7 +2,8 @@
 
 #include <cassert>
 
-// The assembler includes each file unchanged (.incbin), which allows any file size and needs no generated source.
+// Embeds a file in the library. The assembler includes the file unchanged (.incbin), which allows any file size
+// and needs no generated source.
 #define HPSDF_EMBED(symbol, file)                                                                   \
   asm(".pushsection .rodata\n"                                                                      \
       ".balign 16\n"                                                                                \

@@ -1,5 +1,5 @@
 #pragma once
-// Files that are built into the library, so that no file has to be found at run time.
+// Files that are built into the library, so that the program needs no separate files at run time.
 
 #include <string_view>
 
@@ -7,8 +7,8 @@
 
 namespace hpsdf::render {
 
-/// The text of shaders/<name>, unchanged, so that line numbers in compiler messages match the file. `name` must be one
-/// of the files in that folder.
+/// The text of the file shaders/<name>, unchanged, so that line numbers in compiler messages match the file.
+/// The folder shaders/ must contain a file `name`.
 std::string_view shaderText(std::string_view name);
 
 }  // namespace hpsdf::render

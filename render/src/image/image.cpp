@@ -12,7 +12,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 
-// Makes the functions static, so that an application that contains its own copy of stb can be linked.
+// Makes stb's functions static, so that the library can be linked to an application with its own copy of stb.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_PNG
@@ -31,8 +31,8 @@ static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed byt
 constexpr int kSmallestSize = 16;
 constexpr int kLargestSize = 16384;
 constexpr int kMostSamples = 8;
-// A sample of a surface takes 27 bytes in the buffers, and as much again while a renderer fills them; bodies take 28
-// more, and 12 while they are drawn.
+// Limits the memory for all samples of a picture. A sample of a surface takes 27 bytes in the buffers, and 27
+// more while a renderer fills them. Bodies take 28 bytes more, and 12 while they are drawn.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }

@@ -35,7 +35,7 @@ void forEachPixelNear(const Eigen::Vector2d& from, const Eigen::Vector2d& to, do
   const double squared = along.squaredNorm(), length = std::sqrt(squared);
   for (int y = bounds.y0; y < bounds.y1; ++y) {
     double left = bounds.x0, right = bounds.x1;
-    // Restrict the row to the band about the infinite line.
+    // Restrict the pixel row to the band of half-width `reach` around the infinite line through the segment.
     if (std::abs(along.y()) > 1e-6 * length) {
       const double x = from.x() + (y + 0.5 - from.y()) / along.y() * along.x();
       const double half = reach * length / std::abs(along.y());

@@ -29,7 +29,8 @@ const stbtt_fontinfo& font() {
   return info;
 }
 
-// Length in bytes of the UTF-8 sequence that starts with this byte; 1 for a byte that starts none.
+// Length in bytes of the UTF-8 sequence that starts with the byte `first`; 1 if no sequence starts with this
+// byte.
 std::size_t sequenceLength(unsigned char first) {
   if (first >= 0xf0 && first < 0xf8) return 4;
   if (first >= 0xe0) return first < 0xf0 ? 3 : 1;
@@ -70,8 +71,8 @@ struct Line {
 
 float scaleFor(double size) { return stbtt_ScaleForMappingEmToPixels(&font(), static_cast<float>(size)); }
 
-// Baselines are rounded to whole rows, which keeps horizontal strokes crisp; columns are not, which keeps the spacing
-// even.
+// Lays out a line of text. Baselines are rounded to whole pixel rows, which keeps horizontal strokes crisp.
+// Columns are not rounded, which keeps the spacing even.
 Line layOut(std::string_view text, double size, double x, double baseline) {
   const float scale = scaleFor(size);
   const int row = static_cast<int>(std::lround(baseline));
@@ -96,7 +97,8 @@ Line layOut(std::string_view text, double size, double x, double baseline) {
   return line;
 }
 
-// Blends encoded values instead of linear light: dark text on light ground keeps its weight.
+// Blends a colour into a pixel in encoded sRGB values instead of linear light, so that dark text on a light
+// background keeps its weight.
 void blend(Color& pixel, Color color, int coverage) {
   for (int i = 0; i < 3; ++i) {
     const int mixed = (pixel[i] * (255 - coverage) + color[i] * coverage + 127) / 255;
@@ -151,7 +153,7 @@ std::string fitText(std::string_view text, double size, double width) {
   std::vector<std::size_t> ends = {0};  // byte offset after each code point
   for (std::string_view rest = text; !rest.empty(); ends.push_back(text.size() - rest.size())) takeCodePoint(rest);
   const auto shortened = [&](std::size_t count) { return std::string(text.substr(0, ends[count])) + "…"; };
-  // Bisect, because a name may be as long as a path.
+  // Find the longest part that fits by bisection, because a name may be as long as a path.
   std::size_t fits = 0, tooLong = ends.size() - 1;
   if (measureText(shortened(0), size).advance > width) return {};
   while (fits + 1 < tooLong) {

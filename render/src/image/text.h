@@ -18,20 +18,20 @@ struct TextMeasure {
 
 TextMeasure measureText(std::string_view text, double size, double x = 0, double baseline = 0);
 
-/// The advance of `measureText`.
+/// The advance width of a text in pixels, as `measureText` returns it.
 inline double advanceOf(std::string_view text, double size) { return measureText(text, size).advance; }
 
-/// Height in pixels of capitals and digits above the baseline, by which text is centred vertically.
+/// Height in pixels of capitals and digits above the baseline. It serves to centre text vertically.
 double capHeight(double size);
 
-/// Skips pixels outside of the image.
+/// Draws a text into an image. Leaves out pixels outside of the image.
 void drawText(Image& image, std::string_view text, double size, double x, double baseline, Color color);
 
-/// The text if it is at most `width` pixels wide; else the longest beginning that fits with an ellipsis; empty if not
-/// even the ellipsis fits.
+/// Returns the text if it is at most `width` pixels wide. Else returns the longest beginning of the text that
+/// fits together with an ellipsis, or an empty text if not even the ellipsis fits.
 std::string fitText(std::string_view text, double size, double width);
 
-/// The text that `printf` prints, of at most 63 characters.
+/// Returns the text that `printf` would print, cut to at most 63 characters.
 template <typename... Arguments>
 std::string printed(const char* format, Arguments... arguments) {
   char text[64];

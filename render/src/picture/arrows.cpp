@@ -13,7 +13,7 @@ namespace {
 constexpr Color kCore = {22, 20, 34};
 constexpr Color kCasing = {252, 251, 246};
 constexpr float kCasingStrength = 0.75F;
-// Lengths are in multiples of a thin line's width.
+// Lengths of an arrow's parts are in multiples of the width of a thin line.
 constexpr double kCoreWidth = 1.3;
 constexpr double kCasingBorder = 1.0;  // width of the casing on either side
 constexpr double kHeadLength = 5.5;
@@ -74,7 +74,8 @@ class Shape {
   double length_, head_, half_;
 };
 
-/// Blends a colour over the pixels that the arrows, grown by `border`, cover.
+/// Blends a colour over the pixels that arrows cover. The arrows' outlines are first moved outwards by
+/// `border`.
 void paintShapes(Image& image, const PixelRect& rect, const std::vector<Arrow>& arrows, double thin, double border,
                  const LinearColor& color, float opacity) {
   const double reach = border + kHeadHalfWidth * kHeadLength * thin + 2;
@@ -116,7 +117,8 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
     if (const double length = along.norm(); length > longest) along *= longest / length;
     const PicturePoint to = project(camera, pixel.point + along, width, height);
     if (!(to.depth > 0)) continue;
-    // The tolerance is the rise of a slanted surface within one or two pixels.
+    // A surface hides the arrow only if it is nearer by more than a tolerance. The tolerance is the rise of a
+    // slanted surface within one or two pixels.
     const auto strength = [&buffers, from, to, samples, tolerance = 2 * longest / spacing](double t, int x, int y) {
       const double distance = from.distance + t * (to.distance - from.distance);
       return hides(buffers, samples, x, y, distance, tolerance) ? kHidden : 1.0F;
@@ -127,7 +129,8 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
 }
 
 void paintArrows(Image& image, const PixelRect& rect, const std::vector<Arrow>& arrows, double lineWidth) {
-  // Paint all casings before the cores, so that no casing covers a neighbour.
+  // Paint the light casings of all arrows before their dark cores, so that no casing covers the core of a
+  // neighbour.
   paintShapes(image, rect, arrows, lineWidth, kCasingBorder * lineWidth, decodeSrgb(kCasing), kCasingStrength);
   paintShapes(image, rect, arrows, lineWidth, 0, decodeSrgb(kCore), 1);
 }

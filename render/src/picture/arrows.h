@@ -14,21 +14,23 @@ namespace hpsdf::render {
 
 constexpr double kArrowShare = 0.8;  ///< length of an arrow, as a share of the spacing, where the gradient has length 1
 
-/// An arrow in pixels from the picture's upper left corner.
+/// An arrow in a picture. Its ends are in pixels from the upper left corner of the picture.
 struct Arrow {
   Eigen::Vector2d from, to;
-  /// The opacity, 0 to 1, at t along the arrow (0 to 1), at pixel (x, y); an empty function stands for 1.
+  /// The opacity of the arrow, 0 to 1, at pixel (x, y), which lies at parameter t along the arrow (0 to 1). If
+  /// the function is empty, the opacity is 1.
   std::function<float(double t, int x, int y)> strength = {};
 };
 
-/// Arrows that show the gradient's projection onto the plane. They are centred on those pixels that show the
-/// field, of every `spacing`-th pixel along both axes. No arrow is longer than the spacing, so that they do not
-/// overlap.
+/// Arrows that show the gradient, projected onto the plane of the slice. They are centred on every `spacing`-th
+/// pixel along both axes, where the pixel shows the field. No arrow is longer than the spacing, so that arrows
+/// do not overlap.
 std::vector<Arrow> gradientArrows(const Field& field, const SliceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 
-/// Arrows that show the gradient on a surface, from the visible point of every `spacing`-th pixel along both axes.
-/// They are faint where something in the buffers hides them. View and buffers must outlive the result.
+/// Arrows that show the gradient on a surface. They start at the visible point of every `spacing`-th pixel
+/// along both axes. An arrow is faint where something in the buffers hides it. View and buffers must outlive
+/// the result.
 std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 

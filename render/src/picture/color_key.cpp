@@ -16,23 +16,11 @@ namespace {
 
 constexpr int kBarColors = 256;
 
-/// The colours of a legend's bar; `colorAt` maps 0 to 1 to colours.
+/// The colours of the bar in a legend, from end to end. `colorAt` maps positions from 0 to 1 to colours.
 std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
   std::vector<Color> bar;
   for (int i = 0; i < kBarColors; ++i) bar.push_back(encodeSrgb(colorAt(double(i) / (kBarColors - 1))));
   return bar;
-}
-
-/// The names of a quantity, the longest first: the first that fits heads the colour bar, the last is for captions.
-std::span<const std::string> titlesOf(ColorBy quantity) {
-  static const std::map<ColorBy, std::vector<std::string>> titles = {
-      {ColorBy::valueJump, {"worst jump of the value", "jump of value", "value jump"}},
-      {ColorBy::gradientJump, {"worst jump of the gradient", "jump of gradient", "gradient jump"}},
-      {ColorBy::slope, {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"}},
-      {ColorBy::error, {"error |f − exact|", "error"}},
-      {ColorBy::difference, {"difference |f − other|", "difference"}},
-      {ColorBy::cellError, {"estimated cell error", "cell error"}}};
-  return titles.at(quantity);
 }
 
 ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field, const ViewBuffers& buffers,

@@ -1,5 +1,6 @@
 #pragma once
-// The meaning of a view's colours: the colour of each sample, the panel that explains them, and the scale.
+// The key to a view's colours: the colour of each sample, the legend that explains the colours, and the colour
+// scale.
 
 #include <functional>
 #include <string>
@@ -18,13 +19,14 @@ struct ColorKey {
   std::string range;   ///< range of a quantity's values in a caption; empty for degrees and depths
 };
 
-/// The key to colours by degree, depth or a quantity; adds its panel to the overlay. `pointAt(x, y)` returns the point
-/// of a sample. Throws `Error` for limits that make no scale.
+/// Makes the key to colours by degree, depth or a quantity, and adds its legend to the overlay. `pointAt(x, y)`
+/// returns the point of a sample. Throws `Error` if the limits in the options make no valid scale.
 ColorKey makeColorKey(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures,
                       const ViewBuffers& buffers, const std::function<Vector3(int, int)>& pointAt, ColorBy color,
                       const ScaleOptions& scale, const ReferenceData& reference);
 
-/// The scale of the distances in a slice. Throws `Error` for limits that make no scale.
+/// Chooses the scale of the distances in a slice. Throws `Error` if the limits in the options make no valid
+/// scale.
 DistanceScale distanceScaleFor(const ViewBuffers& buffers, const ScaleOptions& options);
 
 Legend distanceLegend(const DistanceScale& scale);

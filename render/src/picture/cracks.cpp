@@ -8,7 +8,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// The samples that are at most `radius` away from a crack along either axis.
+/// Marks the samples that are at most `radius` samples away from a crack along both axes.
 std::vector<std::uint8_t> dilated(const ViewBuffers& buffers, int radius) {
   const int width = buffers.width, height = buffers.height;
   std::vector<std::uint8_t> result(buffers.crack.size());
@@ -22,7 +22,8 @@ std::vector<std::uint8_t> dilated(const ViewBuffers& buffers, int radius) {
   return result;
 }
 
-/// Calls f(x, y, count) for every pixel with `count` marked samples, unless it has none.
+/// Calls f(x, y, count) for every pixel with at least one marked sample. `count` is the number of its marked
+/// samples.
 template <typename F>
 void forEachMarked(const std::vector<std::uint8_t>& marks, int width, int height, int samples, F&& f) {
   for (int y = 0; y < height / samples; ++y)

@@ -18,7 +18,7 @@ constexpr Color kMarkCasing = {24, 22, 34};
 constexpr float kMarkCasingStrength = 0.7F;
 constexpr float kHiddenMark =
     0.7F;  // opacity of hidden marks; they are dashed rather than faint, so that hues stay distinct
-// Lengths are in multiples of a thin line's width.
+// Lengths of the marks' parts are in multiples of the width of a thin line.
 constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;
 constexpr double kDotRadius = 2.6;
@@ -29,7 +29,7 @@ constexpr double kHiddenBeyond = 4;    // a mark is hidden by what is nearer by 
 constexpr double kNearestMark = 1e-3;  // least depth of a mark, as a share of the depth of an edge's farther end
 constexpr int kGroupCell = 8;          // pixels; marks in neighbouring cells of this size belong to one group
 
-/// The panel's row for a kind of defects, without its count.
+/// The names and the colour of a kind of defects, as a row of the legend without the number of defects.
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
       {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
@@ -47,7 +47,7 @@ std::string countOf(const MeshDefects& defects, DefectKind kind) {
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
 
-/// A line, a dot or a ring: all points at some distance from a segment in the picture.
+/// A line, a dot or a ring in the picture: all points at a certain distance from a line segment.
 struct Stroke {
   PicturePoint from, to;
   double radius = 0;     ///< radius of a ring, pixels; 0 for lines and dots
@@ -61,7 +61,8 @@ class Painter {
   Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
       : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
 
-  /// Blends the strokes, grown by `border`, over the picture, in their own colours or in `color`.
+  /// Blends the strokes, widened by `border` on every side, over the picture. `color` replaces the strokes' own
+  /// colours unless it is null.
   void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
     for (const Stroke& stroke : strokes) paint(stroke, border, decodeSrgb(color ? *color : stroke.color), opacity);
   }
@@ -81,7 +82,8 @@ class Painter {
     });
   }
 
-  /// A ring is hidden as a whole, if its centre is.
+  /// Returns true if the buffers show something in front of a stroke at pixel (x, y). A ring is hidden as a whole
+  /// if its centre is hidden.
   bool isHidden(const Stroke& stroke, double t, int x, int y) const {
     if (stroke.radius > 0) x = int(stroke.from.x), y = int(stroke.from.y);
     if (x < 0 || y < 0 || x >= buffers_.width / samples_ || y >= buffers_.height / samples_) return false;
@@ -90,8 +92,8 @@ class Painter {
     return hides(buffers_, samples_, x, y, distance, stroke.tolerance);
   }
 
-  /// The gaps depend on the position in the picture rather than on that along the line, so that edges shorter than a
-  /// dash have gaps too. A dot has none.
+  /// Returns true in the gaps of a dashed stroke. Gaps depend on the position in the picture rather than on the
+  /// position along the line, so that edges shorter than a dash have gaps too. A dot has no gaps.
   bool isGap(const Stroke& stroke, const Eigen::Vector2d& position) const {
     const double across = std::abs(stroke.to.x - stroke.from.x), down = std::abs(stroke.to.y - stroke.from.y);
     double path = across > down ? position.x() : position.y();
@@ -109,7 +111,8 @@ class Painter {
   double dash_;  ///< pixels
 };
 
-/// Groups of defects of one kind: connected components of the picture's cells (kGroupCell) that contain any.
+/// Groups of defects of one kind. The picture is divided into square cells (kGroupCell). A group is a connected
+/// component of the cells that contain defects.
 class Groups {
  public:
   Groups(int width, int height)
@@ -120,7 +123,7 @@ class Groups {
     PicturePoint nearest = {};
   };
 
-  /// Returns all groups and clears the cells.
+  /// Returns all groups and empties the cells.
   std::vector<Group> extract() {
     std::vector<Group> groups;
     for (int row = 0; row < rows_; ++row)
@@ -129,7 +132,7 @@ class Groups {
     return groups;
   }
 
-  /// Adds a line by points on it that are at most a cell apart from each other.
+  /// Adds points on a line to the groups. Neighbouring points are at most the size of a cell apart.
   void add(const PicturePoint& from, const PicturePoint& to) {
     const double length = std::hypot(to.x - from.x, to.y - from.y);
     const int steps = int(std::min(std::ceil(length / kGroupCell), 1e4));
@@ -173,8 +176,8 @@ class Groups {
   std::vector<Group> cells_;  ///< the points of each cell; their extent is empty where there are none
 };
 
-/// The ends of the part of a segment that lies in front of the eye; both are behind the eye if there is no such
-/// part.
+/// The ends, in the picture, of the part of a segment that lies in front of the eye. If there is no such part,
+/// both returned points are behind the eye.
 std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
   const auto seen = [&](const Vector3& point) { return project(camera, point, width, height); };
   PicturePoint from = seen(ends[0]), to = seen(ends[1]);
@@ -216,7 +219,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
   const auto toleranceAt = [&](double depth) { return kHiddenBeyond * pixelSize(camera, depth, height); };
   std::vector<Stroke> strokes;
   for (std::size_t kind = 0; kind < kDefectKinds; ++kind) {
-    // Collect lines and dots.
+    // Collect the lines and dots for the defects of one kind, and group the defects.
     Groups groups(width, height);
     const Color color = defectColor(DefectKind(kind));
     for (const Defect& defect : defects.ofKind(DefectKind(kind))) {
@@ -230,7 +233,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
         strokes.push_back({from, to, 0, kDotRadius * lineWidth, color, tolerance});
     }
 
-    // Put rings around small groups.
+    // Put a ring around each small group of defects.
     for (const Groups::Group& group : groups.extract()) {
       const double size = group.extent.sizes().maxCoeff();
       if (size > kSmallGroup * lineWidth) continue;
@@ -242,7 +245,7 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
     }
   }
 
-  // Paint all casings before the cores, so that no casing covers a neighbour.
+  // Paint the casings of all marks before their cores, so that no casing covers the core of a neighbour.
   Painter painter(picture, buffers, samples, lineWidth);
   painter.paint(strokes, kMarkCasingBorder * lineWidth, &kMarkCasing, kMarkCasingStrength);
   painter.paint(strokes, 0, nullptr, 1);

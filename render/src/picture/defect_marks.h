@@ -13,19 +13,20 @@
 
 namespace hpsdf::render {
 
-/// Titles of the panel, the longest first.
+/// Titles of the legend of a mesh's defects, from the longest to the shortest.
 inline const std::array<std::string, 2> kDefectTitles = {"Defects of the mesh", "Defects"};
 
-/// The colours of the kinds are distinguishable on clay.
+/// The colour of a kind of defects. The colours of all kinds are distinguishable from each other on clay.
 Color defectColor(DefectKind kind);
 
-/// The kinds of defects that the mesh has, with their numbers.
+/// The kinds of defects that the mesh has, with the number of defects of each kind.
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);
-/// The rows of the panel about the kinds of defects that the mesh has.
+/// The rows of the legend for the kinds of defects that the mesh has.
 std::vector<Swatch> defectSwatches(const MeshDefects& defects);
 
-/// Paints edges as lines and pinched vertices as dots, with rings around small groups, which would be overlooked. Marks
-/// are dashed where something in the buffers hides them. The view lies in the picture's upper left corner.
+/// Paints defective edges as lines and pinched vertices as dots. Small groups of defects, which would be
+/// overlooked, get rings. A mark is dashed where something in the buffers hides it. The view lies in the upper
+/// left corner of the picture.
 void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffers, int samples,
                   const MeshDefects& defects, double lineWidth);
 

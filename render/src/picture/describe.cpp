@@ -3,7 +3,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Ascending levels as text, as in "2, 4–6".
+/// Formats ascending levels (degrees or depths) as text, as in "2, 4–6".
 std::string describeRuns(const std::vector<int>& levels) {
   std::string text;
   for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {

@@ -11,16 +11,16 @@ namespace {
 
 constexpr Color kShareBar = {206, 209, 218};
 
-// Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures, but shrinks less than smaller
-// pictures do.
+// The text size for a picture. Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures.
+// In smaller pictures it shrinks less than the picture.
 double textSizeFor(int width, int height) {
   const double size = std::min<double>(height, width * 9.0 / 16);
   return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
 }
 
-// The part of the panel that is still free below its title.
+// The part of the legend's panel below the title that is still free.
 struct Column {
-  /// Adds the first title that fits.
+  /// Adds the first of the titles that fits into the panel to the overlay.
   Column(Overlay& overlay, const Frame& frame, std::span<const std::string> titles)
       : left(frame.panel.x0 + frame.textSize),
         right(frame.panel.x1 - frame.textSize),
@@ -36,7 +36,7 @@ struct Column {
   double left, right, top, bottom;
 };
 
-// A vertical colour bar in the panel.
+// The position of a vertical colour bar in the panel, and of the numbers beside it.
 struct Bar {
   double left, right, top, bottom;
   double labelsLeft, labelsRight;  // extent of the numbers beside the bar
@@ -44,7 +44,8 @@ struct Bar {
   double height() const { return bottom - top; }
 };
 
-// Adds a titled bar whose colour is colorAt(t), with t = 0 at the top and 1 at the bottom.
+// Adds a title and a colour bar. The colour of the bar is colorAt(t), with t = 0 at the top and 1 at the
+// bottom.
 template <typename ColorAt>
 Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, double above, double below,
            const ColorAt& colorAt) {
@@ -63,7 +64,8 @@ Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> ti
   return bar;
 }
 
-// Adds a number beside the bar if it fits; a part of a number would mislead.
+// Adds a number beside the colour bar if the whole number fits, because a part of a number would mislead.
+// Returns true if it fits.
 bool addBarLabel(Overlay& overlay, const Bar& bar, const std::string& label, double y) {
   const bool fits = bar.labelsLeft + advanceOf(label, bar.labelSize) <= bar.labelsRight;
   if (fits) addText(overlay, label, bar.labelSize, bar.labelsLeft, y + capHeight(bar.labelSize) / 2, kInk);
@@ -81,7 +83,8 @@ void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width,
   overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
 }
 
-// Adds a swatch that contains the level's number, the share as text and, in a roomy picture, as a bar.
+// Adds a row for a level: a swatch with the level's number, then the level's share as text. In a roomy picture
+// a grey bar shows the share too.
 void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double largestShare,
                 bool roomy, const LinearColor& color) {
   const double left = std::round(column.left);
@@ -105,7 +108,8 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
                            middle + half, kShareBar});
 }
 
-// Adds rows that are too low for text in each of them. The swatches touch, and only some have their number beside them.
+// Adds rows for levels that are too low for text in each row. The swatches touch, and only some of them have
+// the level's number beside them.
 void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
   const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
   const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
@@ -133,13 +137,15 @@ std::string formatScientific(double value, int digits) {
   return withoutTrailingZeros(shown.substr(0, e)) + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
 }
 
-// Rounds a positive number to this many digits, or to a whole number if that has more, without trailing zeros.
+// Formats a positive number without an exponent or trailing zeros. It is rounded to `digits` digits, or to a
+// whole number if the whole number has more digits.
 std::string formatPlain(double value, int digits) {
   const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
   return withoutTrailingZeros(printed("%.*f", std::max(0, digits - beforePoint), value));
 }
 
-// Formats a multiple of a step: all multiples have the same number of decimals, or an exponent where that is shorter.
+// Formats a multiple of a step with its sign. All multiples have the same number of decimals. Very small and
+// very large steps give an exponent instead.
 std::string formatTick(double value, double step) {
   if (value == 0) return "0";
   const std::string sign = value < 0 ? "−" : "+";
@@ -241,7 +247,8 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
   const Bar bar =
       addBar(overlay, frame, titles, 0.3 * em, 0.6 * em, [](double t) { return divergingColor(1 - 2 * t); });
 
-  // Choose the lines with numbers: zero and every 1st, 2nd, 5th, 10th … line from it, so that the numbers have room.
+  // Choose the iso-lines that get numbers: zero and every 1st, 2nd, 5th, 10th … line from zero, so that the
+  // numbers have room.
   const double perLine = bar.height() * scale.step / (2 * scale.range);
   const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // on each side, about 1e7 at most
   int every = 1;
@@ -249,7 +256,7 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
     for (const int digit : {2, 5, 10})
       if (every * perLine < 1.7 * bar.labelSize) every = digit * decade;
 
-  // Leave out the lines without numbers where they are so dense that they would cover the colours.
+  // Leave out the iso-lines without numbers if the lines are so dense that they would cover the colours.
   const int next = perLine < 2 * thin ? every : 1;
   for (int line = -(lines / next) * next; line <= lines; line += next) {
     const double y = bar.top + bar.height() * (0.5 - 0.5 * (line * scale.step) / scale.range);
@@ -286,7 +293,7 @@ void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, cha
   const double extent = length + std::round(1.1 * size);  // length of an arrow with its letter
   if (section.width() < 3 * extent || section.height() < 3 * extent) return;
 
-  // Choose the origin of the arrows: to the left of the section, below it, or within it on a plate.
+  // Choose the origin of the arrows: to the left of the section, below the section, or within it on a plate.
   double x = section.x0, y = section.y1;
   if (section.x0 - frame.view.x0 >= extent + 2 * gap) {
     x = section.x0 - gap - extent;
@@ -303,7 +310,7 @@ void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, cha
   addArrow(overlay, x, y - thin, length, thin, false);
   addArrow(overlay, x, y, length, thin, true);
   const std::string across(1, right), upward(1, up);
-  // Lower-case letters are about half an em high; each is centred on its arrow's axis.
+  // Lower-case letters are about half an em high. Each letter is centred on the axis of its arrow.
   addText(overlay, across, size, x + length + 0.3 * size, y - 0.5 * thin + 0.27 * size, kSoftInk);
   addText(overlay, upward, size, x + 0.5 * (thin - advanceOf(upward, size)), y - length - 0.45 * size, kSoftInk);
 }

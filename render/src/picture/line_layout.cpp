@@ -19,14 +19,14 @@ namespace {
 /// Points of a curve: distance along the line, value.
 using Points = std::vector<Eigen::Vector2d>;
 
-// The colours of curves differ in lightness too, for colour-blind readers and for print.
+// The colours of curves differ in lightness as well as in hue, for colour-blind readers and for print.
 constexpr Color kBlue = {0, 68, 136};
 constexpr Color kAmber = {236, 160, 30};
 constexpr Color kRed = {187, 58, 82};
 constexpr Color kOutside = {238, 238, 240};
 constexpr Color kBorder = {176, 179, 190};
 
-// One row of a chart's legend with its curve, or with many short curves.
+// A row of a chart's legend, with the curve that it names, or with many short curves.
 struct Series {
   std::vector<std::string> names;  // the longest first; the legend shows the first that fits
   Color color;
@@ -109,7 +109,8 @@ Scale scaleOf(const Chart& chart, double lines) {
   if (!(low <= high)) low = high = 0;
   const double size = std::max(std::abs(low), std::abs(high));
   double margin = kMargin * (high - low);
-  // A curve that is constant up to rounding gets a wide margin, so that rounding errors do not look like a curve.
+  // A curve that is constant up to rounding gets a wide margin, so that the rounding errors do not look like
+  // variation.
   if (!(high - low > kFlat * size)) margin = size > 0 ? 0.05 * size : 1;
   low -= margin;
   high += margin;
@@ -124,7 +125,7 @@ std::vector<double> ticksOf(const Scale& scale) {
   return ticks;
 }
 
-// Formats a tick's value with as many digits as neighbouring ticks need to differ.
+// Formats the value of a tick with just enough digits to tell it from the values of neighbouring ticks.
 std::string tickText(double value, double step) {
   if (std::abs(value) < 1e-9 * step) return "0";
   const int digits = int(std::floor(std::log10(std::abs(value)) + 1e-9) - std::floor(std::log10(step) + 1e-9)) + 1;
@@ -175,14 +176,14 @@ class Plotter {
       scales_.push_back(scaleOf(charts_[n], layout_.charts[n].height() / (2.4 * em_)));
     left_ = view.x0 + margin;
     if (labelled_) left_ = view.x0 + int(std::ceil(widestLabel() + 1.2 * em_));
-    // Leave room for the last number where the picture's edge follows instead of a legend.
+    // Leave room for the last number of the axis if no legend lies between the charts and the picture's edge.
     right_ = std::max(left_ + 1, view.x1 - int(std::lround(frame_.panel.empty() ? 1.5 * margin : 0.5 * margin)));
     for (auto* rows : {&layout_.charts, &bands_})
       for (PixelRect& row : *rows) row.x0 = left_, row.x1 = right_;
   }
 
-  // Stacks charts and bands. If the charts would not be high enough to read, the bands are left out, then the last
-  // charts.
+  // Stacks charts and bands from top to bottom. If the charts would be too low to read, first the bands are left
+  // out, then charts, beginning with the last.
   void layOutRows(int top, int bottom) {
     const int gap = std::max(1, int(std::lround(0.9 * em_))), bandGap = std::max(1, int(std::lround(0.35 * em_)));
     const int band = int(std::lround(1.5 * em_)), least = int(std::lround(2.6 * em_));
@@ -221,7 +222,7 @@ class Plotter {
     return chart.y1 - (value - scale.low) / (scale.high - scale.low) * chart.height();
   }
 
-  // Draws grid lines with their values, a darker one at zero, and the two axes.
+  // Draws a chart's two axes and its horizontal grid lines with their values. The grid line at zero is darker.
   void drawGround(const PixelRect& chart, const Scale& scale) {
     double lastLabel = std::numeric_limits<double>::infinity();  // baseline of the last number; the ticks ascend
     for (const double tick : ticksOf(scale)) {
@@ -237,7 +238,8 @@ class Plotter {
     box(left_ - thin_, chart.y1, right_, chart.y1 + thin_, kTick);
   }
 
-  // Draws the borders of cells, thinner where they are dense, so that they do not hide the curves.
+  // Draws a vertical line at each border between two cells. The lines are thinner where they are dense, so that
+  // they do not hide the curves.
   void drawBorders() {
     for (std::size_t n = 1; n < line_.pieces.size(); ++n) {
       const double x = xOf(line_.pieces[n].tEnter);
@@ -255,8 +257,8 @@ class Plotter {
     nameOutside(bands_[0]);
   }
 
-  // Draws a band of degrees or depths. The colours depend on all levels of the field, as in slices; the legend contains
-  // only the levels on the line.
+  // Draws the band of degrees or depths below the charts. Its colours depend on all levels of the field, as in
+  // slices. Its legend contains only the levels of cells on the line.
   void drawBand(const PixelRect& band, const std::string& name, const std::map<int, double>& ofField,
                 const auto& levelOf) {
     std::vector<int> levels;
@@ -340,7 +342,7 @@ class Plotter {
     text(title, small_, (left_ + right_ - advanceOf(title, small_)) / 2, baseline + 1.35 * small_, kSoftInk);
   }
 
-  // Draws the chart's title and, for each series, a stroke with its name.
+  // Draws the legend of a chart: the chart's title and, for each series, a stroke with the name of the series.
   void drawLegend(const PixelRect& chart, const Chart& content) {
     if (frame_.panel.empty()) return;
     const double left = frame_.panel.x0 + em_, right = frame_.panel.x1 - 0.5 * em_;
@@ -363,7 +365,7 @@ class Plotter {
     const std::vector<LineJump> jumps = jumpsAlong(line_);
     double greatest = 0;
     for (const LineJump& jump : jumps) greatest = std::max(greatest, std::abs(jump.value));
-    // Choose as many digits as the two ends need to differ.
+    // Choose as many digits for coordinates as are needed to tell the two ends of the line apart.
     const double size = std::max(line_.from.cwiseAbs().maxCoeff(), line_.to.cwiseAbs().maxCoeff());
     const int digits = int(std::clamp(std::ceil(std::log10(size / line_.length())) + 3, 4.0, 15.0));
     std::vector<std::string> details = {
@@ -394,7 +396,8 @@ LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, 
   return Plotter(frame, field, line, exact).draw();
 }
 
-// The coverage by all segments is collected before blending, so that a curve is not darker where segments overlap.
+// Paints a curve. The coverage by all its segments is collected before blending, so that the curve is not
+// darker where segments overlap.
 void paintCurve(Image& image, const CurveItem& curve) {
   const PixelRect& rect = curve.within;
   if (rect.empty()) return;

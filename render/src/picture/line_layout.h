@@ -1,5 +1,6 @@
 #pragma once
-// The parts of a line plot. They are laid out before they are painted, so that tests can check them.
+// The layout of a line plot: its charts, curves, boxes and texts. The plot is laid out before it is painted, so
+// that tests can check the layout.
 
 #include <Eigen/Core>
 #include <span>
@@ -18,14 +19,15 @@ struct CurveItem {
   PixelRect within;
 };
 
-/// The parts of a plot; the curves are painted over the overlay.
+/// The layout of a line plot. The curves are painted over the overlay.
 struct LineLayout {
   Overlay overlay;
   std::vector<PixelRect> charts;  ///< from top to bottom
   std::vector<CurveItem> curves;
 };
 
-/// `exact` holds the exact distance at each sample of the line, or nothing.
+/// Lays out the plot of a field along a line. `exact` holds the exact distance at each sample of the line, or
+/// is empty.
 LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact);
 
 /// Blends an anti-aliased curve over the image.

@@ -22,13 +22,15 @@ namespace {
 constexpr double kFarthest = 1e15;    // greatest coordinate of a camera's target, in a unit near the mesh's size
 constexpr double kMeshBorder = 0.04;  // free border around a whole mesh, as a share of the view's width and height
 
-/// The sides of faces, as indices of the picture's materials.
+/// The kinds of visible faces: front side, back side, or a face that crosses another. The values index the
+/// materials.
 enum Side : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
 constexpr Color kCrossing = {240, 146, 150};  // paler than the rings around crossings
 
-/// Maps a mesh to coordinates in which it surrounds the origin and has a size from 1 to 2: devices compute with floats,
-/// whose squares overflow near 1e19 and vanish near 1e-19.
+/// Maps a mesh to coordinates in which it is centred at the origin and its size is from 1 to 2. Without this
+/// map, devices that compute with floats would fail: squares overflow for lengths above 1e19 and vanish below
+/// 1e-19.
 class Normalization {
  public:
   explicit Normalization(const Box& box) : middle_(box.center()) {
@@ -54,7 +56,7 @@ class Normalization {
   double unit_ = 1;
 };
 
-/// Moves the camera to the least distance from which it shows all points.
+/// Sets the distance of the camera from its target to the least at which the view shows all points.
 OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbit, const Box& domain, int width,
                             int height) {
   OrbitCamera inSpace = orbit;
@@ -72,7 +74,7 @@ OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbi
   return orbit;
 }
 
-/// For each triangle 1 if it crosses another, else 0.
+/// Returns an entry for each triangle of the mesh: 1 if the triangle crosses another triangle, else 0.
 std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defects) {
   std::vector<char> result(mesh.triangles.size(), 0);
   for (const Defect& defect : defects.ofKind(DefectKind::crossing))
@@ -80,7 +82,7 @@ std::vector<char> areCrossing(const TriangleMesh& mesh, const MeshDefects& defec
   return result;
 }
 
-/// Sets the material of each pixel by the side of the triangle that it shows.
+/// Sets the material of each pixel by the visible side of the triangle that the pixel shows.
 void setSides(const TriangleMesh& mesh, const MeshDefects& defects, const Camera& camera, BodyBuffers& seen) {
   const std::vector<char> crossing = areCrossing(mesh, defects);
   for (int y = 0; y < seen.height; ++y)
@@ -111,7 +113,7 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   const Frame frame = render::frame(picture.width, picture.height);
   const int width = frame.view.width(), height = frame.view.height(), samples = picture.samples;
 
-  // Place the camera in the coordinates of the normalised mesh.
+  // Normalise the mesh, and place the camera in its normalised coordinates.
   const Body body{.mesh = 0, .worldFromBody = Eigen::Isometry3d::Identity(), .color = surfaceColor()};
   const Normalization normalized(boundingBox(mesh));
   const TriangleMesh normalizedMesh = normalized(mesh);
@@ -130,14 +132,14 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   ViewBuffers buffers = emptyBuffers(seen.width, seen.height, true);
   addBodies(seen, buffers);
 
-  // Colour the view and mark the defects.
+  // Colour the view of the mesh in a picture, and mark the mesh's defects.
   Image image = backdropPicture(picture.width, picture.height, height);
   const Sampling sampling{samples, frame.lineWidth(), 1};
   const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
   pasteView(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
   paintDefects(image, camera, buffers, samples, normalized(defects), sampling.lineWidth);
 
-  // Add panel and caption.
+  // Add the legend in the panel and the caption.
   Overlay overlay;
   addSwatches(overlay, frame, kDefectTitles, swatchesOf(defects));
   const std::array<std::string, 3> details = {formatCount(mesh.triangles.size()) + " faces",

@@ -46,7 +46,7 @@ Frame frameOfSurface(const SurfacePicture& picture) {
   return result;
 }
 
-/// The pixels of a slice that show the domain.
+/// The rectangle of pixels of a slice that contains all pixels which show the domain.
 PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
   PixelRect samplesHit = {buffers.width, buffers.height, 0, 0};
   for (int y = 0; y < buffers.height; ++y)
@@ -58,7 +58,8 @@ PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
   return {samplesHit.x0 / samples, samplesHit.y0 / samples, up(samplesHit.x1), up(samplesHit.y1)};
 }
 
-/// Moves the panel to the section's edge: a square domain leaves much of a wide view empty.
+/// Moves the panel next to the right edge of the section, because a square domain leaves much of a wide view
+/// empty.
 void movePanelTo(const PixelRect& section, Frame& frame) {
   const int space = frame.panel.x0 - section.x1 - static_cast<int>(std::ceil(0.5 * frame.textSize));
   if (frame.panel.empty() || section.empty() || space <= 0) return;
@@ -66,7 +67,8 @@ void movePanelTo(const PixelRect& section, Frame& frame) {
   frame.panel.x1 -= space;
 }
 
-/// Names the axes of a slice; an oblique plane has none.
+/// Names the axes in the picture of a slice. Does nothing for an oblique plane, which is not parallel to two
+/// axes.
 void addAxesOf(Overlay& overlay, const Frame& frame, const SliceView& view, const PixelRect& section) {
   const int right = axisAlong(view.right), up = axisAlong(view.up);
   if (right >= 0 && up >= 0 && !section.empty()) addAxes(overlay, frame, section, "xyz"[right], "xyz"[up]);
@@ -77,7 +79,7 @@ void checkArrows(int spacing) {
     throw Error("arrows = " + std::to_string(spacing) + " is out of range: give 4 to 1000 pixels between them, or 0");
 }
 
-/// Draws arrows over the finished view; legend and caption cover them.
+/// Draws arrows along the gradient over the finished view. Legend and caption may cover the arrows later.
 void addArrows(Image& image, const Frame& frame, const Field& field, const auto& view, const ViewBuffers& buffers,
                int samples, int spacing) {
   if (spacing > 0)
@@ -97,7 +99,7 @@ std::function<Vector3(int, int)> pointsOf(const View& view, const ViewBuffers& b
   };
 }
 
-/// The domain's section with a plane, framed for width × height pixels.
+/// A slice view of the domain's section with a plane, framed for a view of width × height pixels.
 SliceView sectionView(const Box& domain, const Plane& plane, int width, int height) {
   if (const auto* axis = std::get_if<AxisPlane>(&plane))
     return axisSlice(domain, axis->axis, axis->offset, width, height);
@@ -105,28 +107,29 @@ SliceView sectionView(const Box& domain, const Plane& plane, int width, int heig
   return planeSlice(domain, free.point, free.normal, width, height);
 }
 
-/// The buffers of a surface's picture with everything that it shows: surface, sections, cells, bodies.
+/// The view and the buffers of a picture of a surface, with all it shows: surface, sections, cells and bodies.
 struct Scene {
   SurfaceView view;
   ViewBuffers buffers;
   std::vector<float> lines = {};  ///< how strongly edges of cells cover each sample, 0 to 1; empty without such lines
 
-  /// True if any pixel shows the field.
+  /// Returns true if any pixel shows a cell of the field or a line along the edge of a cell.
   bool showsField() const {
     return std::ranges::any_of(buffers.cell, [](std::uint32_t cell) { return cell != kNoCell; }) ||
            std::ranges::any_of(lines, [](float strength) { return strength > 0; });
   }
 };
 
-/// Renders a view of width × height pixels with the picture's samples for each; lines along cells are `lineWidth`
-/// pixels wide. Throws `Error` for a camera, an offset or a clipping plane out of range.
+/// Renders a view of width × height pixels, with `picture.samples` samples along each side of a pixel. Lines
+/// along cells are `lineWidth` pixels wide. Throws `Error` if the camera, the offset or the clipping plane is
+/// out of range.
 Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& picture, int width, int height,
                   double lineWidth) {
   checkOffset(picture.offset);
   checkClip(picture.clip);
   const ShownBodies& bodies = picture.bodies;
   Camera camera = cameraOf(picture.camera, field.domain(), width, height);
-  // Parallel rays start in front of the domain; let them start in front of the bodies too.
+  // Parallel rays start in front of the domain. Move their start in front of the bodies too.
   if (bodies.renderer) camera = startingBefore(bodies.renderer->bounds(bodies.bodies), camera);
   const SurfaceView view{camera, picture.offset, picture.clip};
   width *= picture.samples;
@@ -144,7 +147,8 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   return scene;
 }
 
-/// Fills the panel of a picture whose colours stand for no quantity.
+/// Adds facts about the field to the panel. They replace the legend if the colours of the picture show no
+/// quantity.
 void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
   const std::pair<std::string, std::string> facts[] = {
@@ -164,7 +168,7 @@ std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
   return materials;
 }
 
-/// Adds the details about everything in a surface's picture except its colours and marks.
+/// Adds the details for the caption about all contents of a surface's picture except its colours and marks.
 void addSceneDetails(const SurfacePicture& picture, std::vector<std::string>& details) {
   if (picture.bodies.renderer) {
     if (!picture.bodies.note.empty()) details.push_back(picture.bodies.note);
@@ -195,7 +199,7 @@ SliceView sliceView(const Field& field, const SlicePicture& picture, int width, 
   if (picture.target && !picture.target->allFinite())
     throw Error("the slice's target is not finite: give three coordinates");
   SliceView view = sectionView(field.domain(), picture.plane, width, height);
-  // Move the view within its plane only, so that the plane's offset stays exact.
+  // Centre the view at the target, but move it only within its plane, so that the plane's offset stays exact.
   if (picture.target)
     for (const Vector3& side : {view.right, view.up})
       view.origin += side * (side.dot(*picture.target - view.origin) / side.squaredNorm());
@@ -220,7 +224,7 @@ Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture
 }
 
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference) {
-  // Render the buffers.
+  // Lay out the picture, check its options, and render the buffers of its view.
   Frame frame = frameOf(picture);
   checkColor(picture.color, ColorBy::normal, reference);
   checkArrows(picture.arrows);
@@ -236,7 +240,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   drawn.seen = !section.empty();
   movePanelTo(section, frame);
 
-  // Colour the view.
+  // Colour the view, and collect the caption's details about the colours.
   const Sampling sampling{samples, frame.lineWidth(), view.right.norm() / buffers.width};
   const FieldStatistics figures = statistics(field);
   const std::string plane = describePlane("slice", picture.plane);
@@ -260,7 +264,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     if (!key.range.empty()) drawn.details.push_back(key.range);
   }
 
-  // Add arrows, axes and caption.
+  // Add the arrows, the axes and the caption to the picture.
   addArrows(drawn.image, frame, field, view, buffers, samples, picture.arrows);
   addAxesOf(overlay, frame, view, section);
   addFieldDetails(field, figures, drawn.details);
@@ -271,7 +275,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
 
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
                   const ReferenceData& reference) {
-  // Render the buffers.
+  // Lay out the picture, check its options, and render the buffers of its view.
   const Frame frame = frameOfSurface(picture);
   checkColor(picture.color, ColorBy::distance, reference);
   checkArrows(picture.arrows);
@@ -287,7 +291,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
               .seen = scene.showsField(),
               .scale = picture.scale};
 
-  // Colour the view.
+  // Colour the view, and collect the caption's details about the colours.
   const FieldStatistics figures = statistics(field);
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
   Overlay overlay;
@@ -310,7 +314,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   pasteView(drawn.image, colorSurface(buffers, camera, key.color, sampling, picture.offset, scene.lines,
                                       materialsOf(picture.bodies)));
 
-  // Add marks and caption.
+  // Add the marks of cracks and defects, the arrows and the caption to the picture.
   if (picture.cracks) {
     markCracks(drawn.image, buffers, sampling);
     drawn.details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
@@ -340,8 +344,8 @@ std::vector<float> quantityAt(const Field& field, const View& view, const ViewBu
 
 namespace {
 
-/// Moves the point into the cell if it lies outside by a rounding error: distances along rays have single precision,
-/// and a crack lies on a face itself.
+/// Moves a point into its cell if it lies outside by a rounding error. Distances along rays have only single
+/// precision, and the point of a crack lies on a face of the cell.
 Vector3 withinCell(const Field& field, const Vector3& point, std::uint32_t cell) {
   if (field.cellAt(point).id == cell) return point;
   for (const double step : {1e-7, 1e-6, 1e-5})

@@ -15,8 +15,8 @@
 namespace hpsdf::render {
 namespace {
 
-// Greatest angle between the normals of faces that are shaded smoothly. Faces of a sphere of 80 triangles differ
-// by less, faces at the edges of a gear's teeth by more.
+// Greatest angle between the normals of adjacent faces that are shaded as one smooth surface. In a sphere of 80
+// triangles the angles are smaller, at the edges of a gear's teeth they are larger.
 constexpr double kCreaseDegrees = 40;
 
 constexpr std::size_t kMostTriangles = std::size_t{1} << 26;
@@ -98,9 +98,9 @@ void BodyMesh::moveVertices(std::span<const Vector3> vertices) {
   findNormals();
 }
 
-// The normal at a corner of a face is the mean of the normals of the faces around the vertex that are within the crease
-// angle of the face's own normal. The faces' angles at the vertex are the weights (Thürmer and Wüthrich 1998), so that
-// the result does not depend on how flat parts are triangulated.
+// The normal at a corner of a face is a weighted mean of face normals at the vertex. Only normals within the
+// crease angle of the face's own normal count. The weight of a face is its angle at the vertex (Thürmer and
+// Wüthrich 1998), so that the result does not depend on how flat parts are triangulated.
 void BodyMesh::findNormals() {
   box_ = boundingBox(mesh_);
   const std::size_t count = mesh_.triangles.size();

@@ -1,5 +1,5 @@
 #pragma once
-// The meshes of a body renderer: checked, and with the normals by which they are shaded.
+// The meshes of a body renderer. They are checked, and have normals for shading.
 
 #include <array>
 #include <cstdint>
@@ -17,18 +17,18 @@ using CornerNormals = std::array<Eigen::Vector3f, 3>;
 
 class BodyMesh {
  public:
-  /// Throws as `makeCpuBodyRenderer` does.
+  /// Throws the same errors as `makeCpuBodyRenderer`.
   explicit BodyMesh(TriangleMesh mesh);
 
-  /// Throws as `BodyRenderer::moveVertices` does.
+  /// Moves vertices of a mesh. Throws the same errors as `BodyRenderer::moveVertices`.
   void moveVertices(std::span<const Vector3> vertices);
 
   const std::vector<Vector3>& vertices() const { return mesh_.vertices; }
   const std::vector<Triangle>& triangles() const { return mesh_.triangles; }
   const Box& box() const { return box_; }
 
-  /// The unit normal at the point of a triangle with these barycentric coordinates, on the side from which the corners
-  /// run counter-clockwise.
+  /// The unit normal for shading at a point of a triangle, given by barycentric coordinates. It points to the
+  /// side from which the corners run counter-clockwise.
   Vector3 normal(std::uint32_t triangle, const Vector3& barycentric) const;
 
  private:
@@ -36,24 +36,24 @@ class BodyMesh {
 
   TriangleMesh mesh_;
   Box box_;
-  // The corners at vertex v, each as 3 · triangle + 0, 1 or 2, are corners_[firstCorner_[v]] to
-  // corners_[firstCorner_[v + 1] - 1].
+  // The triangle corners at vertex v are corners_[firstCorner_[v]] to corners_[firstCorner_[v + 1] - 1]. Each
+  // entry of corners_ is 3 · triangle + 0, 1 or 2.
   std::vector<std::uint32_t> firstCorner_, corners_;
   std::vector<CornerNormals> normals_;
 };
 
 class BodyMeshes {
  public:
-  /// Throws as `makeCpuBodyRenderer` does.
+  /// Throws the same errors as `makeCpuBodyRenderer`.
   explicit BodyMeshes(std::vector<TriangleMesh> meshes);
 
   std::size_t size() const { return meshes_.size(); }
   const BodyMesh& operator[](std::size_t mesh) const { return meshes_[mesh]; }
 
-  /// Throws as `BodyRenderer::moveVertices` does.
+  /// Moves vertices of a mesh. Throws the same errors as `BodyRenderer::moveVertices`.
   void moveVertices(std::size_t mesh, std::span<const Vector3> vertices);
 
-  /// A box that holds the bodies. Throws as `BodyRenderer::bounds` does.
+  /// A box that contains the bodies. Throws the same errors as `BodyRenderer::bounds`.
   Box bounds(std::span<const Body> bodies) const;
 
  private:

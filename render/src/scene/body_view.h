@@ -1,18 +1,19 @@
 #pragma once
-// Parts of a view of bodies that both body renderers share.
+// Functions for views of bodies that the CPU and the OpenGL body renderer share.
 
 #include "scene/body_meshes.h"
 
 namespace hpsdf::render {
 
-/// Throws `Error` for a camera or a size that `BodyRenderer::view` refuses.
+/// Throws `Error` if the camera or the size is invalid, as `BodyRenderer::view` states.
 void checkBodyView(const Camera& camera, int width, int height);
 
-/// Depth of the farthest corner of a box, along `forward` from the eye; 1 where no corner lies in front of the
-/// eye.
+/// Depth of the farthest corner of a box: its distance from the eye along `forward`. Returns 1 if no corner
+/// lies in front of the eye.
 double farthestDepth(const Camera& camera, const Box& box);
 
-/// The least visible depth, which `BodyRenderer::view` states, for bodies whose farthest depth is `farthest`.
+/// The least visible depth, as `BodyRenderer::view` defines it, if the farthest depth of the bodies is
+/// `farthest`.
 double leastDepth(const Camera& camera, double farthest);
 
 /// Buffers in which no pixel shows a body.
@@ -28,11 +29,12 @@ struct BodyPoint {
 void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const BodyPoint& point, std::size_t pixel,
               BodyBuffers& buffers);
 
-/// Shows in `buffers` each body that is nearer than what the pixel shows.
+/// Copies each pixel of `bodies` to `buffers` if its body is nearer to the eye than what `buffers` show at the
+/// pixel.
 void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers);
 
-/// The camera, with the start of its parallel rays moved back in front of the box; a perspective camera stays as
-/// it is.
+/// Returns the camera with the start of its parallel rays moved back in front of the box. A perspective camera
+/// is returned unchanged.
 Camera startingBefore(const Box& box, const Camera& camera);
 
 }  // namespace hpsdf::render

@@ -28,7 +28,8 @@ struct BoxRay {
 
 BoxRay rayOf(const Camera& camera, int x, int y, int width, int height) {
   BoxRay ray{pixelEye(camera, x, y, width, height), pixelRay(camera, x, y, width, height), {}};
-  // A zero component has a very large inverse rather than an infinite one, because infinity times 0 is not a number.
+  // For a direction component of zero the inverse is very large instead of infinite, because infinity times 0 is
+  // NaN.
   for (int axis = 0; axis < 3; ++axis)
     ray.inverse[axis] = 1 / (ray.direction[axis] != 0 ? ray.direction[axis] : 1e-200);
   return ray;
@@ -40,7 +41,8 @@ struct Entry {
   int axis;  ///< axis across the face that the ray enters
 };
 
-/// The entry of a ray that starts outside of the box.
+/// The point at which a ray that starts outside of a box enters the box. Returns std::nullopt if the ray misses
+/// the box.
 std::optional<Entry> enter(const BoxRay& ray, const Box& box) {
   const Vector3 a = (box.min() - ray.start).cwiseProduct(ray.inverse);
   const Vector3 b = (box.max() - ray.start).cwiseProduct(ray.inverse);
@@ -59,7 +61,8 @@ struct CellBox {
   double squaredDistance;  ///< squared distance of the box from the eye
 };
 
-/// The boxes of the cells, the nearest first, because near boxes hide most of the others.
+/// The boxes to draw for the cells, sorted by their distance from the eye. Near boxes come first because they
+/// hide most of the others.
 std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& cells) {
   const Camera& camera = view.camera;
   std::vector<CellBox> boxes;
@@ -73,7 +76,7 @@ std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& c
   return boxes;
 }
 
-/// Sets f in the pixels that show boxes, in the rows from y0 on to which the rays belong.
+/// Sets the field's value in the pixels that show boxes. `rays` are the rays of the pixels from row y0 on.
 void addValues(const Field& field, int y0, const std::vector<BoxRay>& rays, ViewBuffers& buffers) {
   const std::size_t first = std::size_t(y0) * buffers.width;
   std::vector<std::size_t> pixels;

@@ -1,5 +1,5 @@
 #pragma once
-// Cells of the octree in the picture of a surface: which of them are shown, and how they are drawn as boxes.
+// Cells of the octree in a picture of a surface: the choice of the shown cells, and their drawing as boxes.
 
 #include <array>
 #include <vector>
@@ -19,12 +19,13 @@ Box clipped(Box box, const SurfaceView& view);
 /// The corners of a box; bit k of a corner's index is set where its coordinate along axis k is the greater one.
 std::array<Vector3, 8> cornersOf(const Box& box);
 
-/// The edge length of a drawn box as a share of its cell's. It is below 1, so that the camera sees between boxes.
+/// The edge length of a drawn box as a share of the edge length of its cell. It is below 1, so that there are
+/// gaps between boxes.
 constexpr double kBoxShare = 0.8;
 
-/// Shows each cell as a solid box about its centre where it is the nearest thing to the eye: the face that a pixel's
-/// ray enters, with f there and the outward normal. A clipping plane cuts boxes; a box that contains the eye is left
-/// out.
+/// Shows each cell as a solid box about the cell's centre, in pixels where the box is nearer to the eye than
+/// what the buffers show. Such a pixel shows the face that its ray enters, with the field's value there and the
+/// outward normal. A clipping plane cuts boxes. A box that contains the eye is left out.
 void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells, ViewBuffers& buffers);
 
 }  // namespace hpsdf::render

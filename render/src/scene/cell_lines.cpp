@@ -15,27 +15,28 @@
 namespace hpsdf::render {
 namespace {
 
-// Edges fade between two lengths in the picture, given in multiples of the line width.
+// An edge fades if its length in the picture lies between two limits, given here in multiples of the line
+// width.
 constexpr double kFullLength = 24;  // edges of this length or more have full strength
 constexpr double kGoneLength = 6;   // edges of this length or less are not drawn
 
 constexpr double kFarthestStrength = 0.3;  // strength at the far end of the domain; it is 1 at the near end
 constexpr double kNearDepth = 1e-3;        // least depth at which lines are drawn, in domain diagonals
 
-/// A cell's edge, or the part of it that a clipping plane leaves.
+/// An edge of a cell, or the part of the edge that a clipping plane leaves.
 struct Segment {
   Vector3 a, b;
   double edgeLength;  ///< length of the whole edge, world units
 };
 
-/// A segment in the picture.
+/// A segment, its projection to the picture, and the strength of its line.
 struct Edge {
   Segment segment;
   PicturePoint from, to;
   float strength = 0;  ///< 0 for an edge that is not drawn
 };
 
-/// Identifies an edge: equal for all cells of one size that share the edge.
+/// Identifies an edge of a cell. All cells of one size that share an edge give the same key.
 struct EdgeKey {
   std::array<std::uint64_t, 3> from;  ///< lower end, in cells of the greatest depth
   std::uint64_t kind;                 ///< axis and depth
@@ -53,13 +54,14 @@ class EdgeCollector {
     keys_.reserve(12 * mostCells);
   }
 
-  /// Adds the edges of `box`, the part of a cell that a clipping plane leaves.
+  /// Adds the edges of a cell. `box` is the part of the cell that a clipping plane leaves.
   void add(const Cell& cell, const Box& box) {
     const Vector3 first = (cell.box.min() - lower_).cwiseProduct(cellsPerUnit_);
     const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
     const std::array<Vector3, 8> corners = cornersOf(box);
     for (int edge = 0; edge < 12; ++edge) {
-      // Edges 0 to 3 run along x, 4 to 7 along y, 8 to 11 along z; the two low bits choose the sides of the other axes.
+      // Edges 0 to 3 run along x, 4 to 7 along y, 8 to 11 along z. The two low bits of `edge` choose the sides along
+      // the other two axes.
       const int axis = edge / 4, from = (edge & 1) << (axis + 1) % 3 | (edge >> 1 & 1) << (axis + 2) % 3;
       EdgeKey key{{}, std::uint64_t(cell.depth) * 3 + axis};
       for (int k = 0; k < 3; ++k) key.from[k] = std::uint64_t(std::llround(first[k])) + (from >> k & 1 ? size : 0);
@@ -70,8 +72,8 @@ class EdgeCollector {
   std::vector<Segment> segments;
 
  private:
-  /// Returns whether the edge is new. The hash set with open addressing is faster than `std::unordered_set` by a
-  /// multiple.
+  /// Adds a key to the hash set. Returns true if the key is new. This hash set with open addressing is several
+  /// times faster than `std::unordered_set`.
   bool insert(const EdgeKey& key) {
     std::uint64_t hash = key.kind;
     for (const std::uint64_t x : key.from) hash = (hash ^ x) * 0x9e3779b97f4a7c15;
@@ -91,7 +93,7 @@ class EdgeCollector {
   std::vector<EdgeKey> keys_;
 };
 
-/// Draws edges into the coverage.
+/// Draws edges as lines into a buffer that holds the coverage of each pixel.
 class EdgePainter {
  public:
   EdgePainter(const Camera& camera, const Box& domain, const ViewBuffers& buffers, double lineWidth,
@@ -117,7 +119,7 @@ class EdgePainter {
     return middle + half > nearDepth_ && pixelsAt(box.sizes().maxCoeff(), middle - half) > kGoneLength * width_;
   }
 
-  /// The part of a segment in front of the eye, in the picture.
+  /// Projects the part of a segment in front of the eye to the picture, and finds the strength of its line.
   Edge projected(Segment segment) const {
     const auto toPicture = [&](const Vector3& p) { return project(camera_, p, buffers_.width, buffers_.height); };
     Edge edge{segment, toPicture(segment.a), toPicture(segment.b)};
@@ -147,7 +149,7 @@ class EdgePainter {
   }
 
  private:
-  /// The pixels that a length covers at a depth.
+  /// The size in pixels of a world length that lies at a given depth from the eye.
   double pixelsAt(double length, double depth) const {
     return length / pixelSize(camera_, std::max(depth, nearDepth_), buffers_.height);
   }
@@ -155,7 +157,8 @@ class EdgePainter {
   void paintPixel(const Edge& edge, const NearPixel& near) const {
     const double t = near.t, covered = std::min(radius_ - near.distance, 1.0);
     const std::size_t i = std::size_t(near.y) * buffers_.width + near.x;
-    // Find the parameter s of the point in space: equal steps in a perspective picture are not equal steps in space.
+    // Find the parameter s of the point along the edge in space. Equal steps in a perspective picture are not equal
+    // steps in space.
     const double toFar = parallel_ ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel_ ? t : t * edge.from.depth;
     const double s = toNear / (toFar + toNear);
     const double depth = edge.from.depth + s * (edge.to.depth - edge.from.depth);
@@ -164,7 +167,8 @@ class EdgePainter {
     if (strength <= coverage_[i]) return;
     if (buffers_.covered(i)) {
       const Vector3 p = edge.segment.a + s * (edge.segment.b - edge.segment.a);
-      // The surface on which a line lies may have been sampled a pixel or two away from the line.
+      // Allow for the sampling: the buffers may show the surface at a point one or two pixels away from the line on
+      // it.
       const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth);
       if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance) return;
     }

@@ -7,8 +7,8 @@
 
 namespace hpsdf::render {
 
-/// The coverage, 0 to 1, of each pixel of the buffers by the cells' edges, drawn as lines of `lineWidth` pixels.
-/// Lines are hidden behind what the buffers show. They fade with their distance, and vanish where their cells are
+/// The share of each pixel, 0 to 1, that the edges of cells cover when drawn as lines of `lineWidth` pixels.
+/// What the buffers show hides lines behind it. Lines fade with their distance, and vanish if their cells are
 /// small in the picture. A clipping plane cuts cells.
 std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth);

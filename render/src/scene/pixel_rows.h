@@ -13,8 +13,8 @@
 
 namespace hpsdf::render {
 
-/// The pixels of a view whose middles may lie in the hull of these points: none where all depths are below
-/// `leastDepth`, and the whole view where only some are, because the hull then extends behind the eye.
+/// The pixels of a view whose centres may lie in the convex hull of the points. Returns no pixels if all depths
+/// are below `leastDepth`, and the whole view if only some are, because the hull then extends behind the eye.
 inline PixelRect pixelsAround(std::span<const PicturePoint> points, double leastDepth, int width, int height) {
   constexpr double kMargin = 1e-6;  // for rounding, pixels
   Eigen::AlignedBox2d hull;
@@ -34,9 +34,9 @@ inline PixelRect pixelsAround(std::span<const PicturePoint> points, double least
           clamped(std::floor(hull.max().y() + 0.5 + kMargin), height)};
 }
 
-/// Draws things with known rectangles in parallel: calls fill(y0, y1, indices) for strips of 16 rows, where
-/// `indices` are those of the rectangles that meet the strip, ascending. The result does not depend on the number
-/// of threads as long as `fill` changes only the rows of its strip.
+/// Draws objects in parallel, given the rectangle of each object. Calls fill(y0, y1, indices) for strips of 16
+/// rows, where `indices` are the ascending indices of the rectangles that meet the strip. The result does not
+/// depend on the number of threads if `fill` changes only the rows of its strip.
 template <typename Fill>
 void forEachStrip(int height, const std::vector<PixelRect>& rects, const Fill& fill) {
   constexpr int kRows = 16;

@@ -9,7 +9,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// A plane in the scene.
+/// A plane that is shown in the picture of a surface.
 struct ScenePlane {
   Vector3 point;
   Vector3 normal;                          ///< unit vector
@@ -24,7 +24,8 @@ struct PlaneHit {
   Vector3 ray;  ///< unit direction of the ray
 };
 
-/// Shows the part of a plane within the domain where `visible(hit)` and `keeps(value)` hold.
+/// Shows the part of a plane within the domain, in the pixels for which both `visible(hit)` and `keeps(value)`
+/// are true.
 template <typename Visible, typename Keeps>
 void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& plane, Shown shown,
                    const Visible& visible, const Keeps& keeps, ViewBuffers& buffers) {
@@ -39,7 +40,7 @@ void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& p
       const double distance = plane.normal.dot(plane.point - eye) / plane.normal.dot(ray);
       if (!(distance > 0)) continue;
       Vector3 point = eye + distance * ray;
-      // The coordinate across an axis-aligned plane must be exact, because cells are half-open.
+      // The coordinate along the normal of an axis-aligned plane must be exact, because cells are half-open.
       if (axis >= 0) point[axis] = plane.point[axis];
       const PlaneHit hit{std::size_t(y) * buffers.width + x, distance, point, ray};
       if (!field.domain().contains(point) || !visible(hit)) continue;
@@ -82,7 +83,8 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
   ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
   const double nudge = kClipNudge * field.domain().sizes()[axis];
   plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
-  // Rays start behind the clipping plane, so that the section lies in front of everything that they hit.
+  // Show the section in all pixels that see it. It lies in front of all other hits, because rays start behind the
+  // clipping plane.
   addScenePlane(
       field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
       [&](double value) { return value < view.offset; }, buffers);

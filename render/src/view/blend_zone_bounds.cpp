@@ -19,7 +19,7 @@ struct NodeBox {
   std::int64_t width() const { return std::int64_t{1} << (kMaxDepth - depth); }
 };
 
-/// Calls visit(leaf) for each leaf below a node, descending only into nodes that `enter` accepts.
+/// Calls visit(leaf) for each leaf below a node. The descent enters only nodes for which enter(node) is true.
 template <typename Enter, typename Visit>
 void visitLeaves(const FieldData& field, const NodeBox& at, const Enter& enter, const Visit& visit) {
   if (!enter(at)) return;
@@ -45,7 +45,7 @@ void visitBaseCells(const FieldData& field, const std::array<std::int64_t, 3>& f
                       {x << kMaxDepth, y << kMaxDepth, z << kMaxDepth}});
 }
 
-/// Calls visit(other) for each other leaf that touches this one.
+/// Calls visit(other) for each other leaf that touches `leaf`.
 template <typename Visit>
 void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& visit) {
   const auto touches = [&](const NodeBox& other) {
@@ -65,7 +65,8 @@ void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& vis
   });
 }
 
-/// A polynomial on a box; the coefficient of L_i L_j L_k is at index (i · n + j) · n + k, n being the degree + 1.
+/// A polynomial on a box. With n = degree + 1, the coefficient of L_i L_j L_k has the index (i · n + j) · n +
+/// k.
 class Polynomial {
  public:
   template <typename T>
@@ -79,7 +80,8 @@ class Polynomial {
 
   double& at(int i, int j, int k) { return c_[(std::size_t(i) * size_ + j) * size_ + k]; }
 
-  /// Restricts the box along an axis: the old coordinate is scale · s + shift, where s is the new one.
+  /// Restricts the polynomial to a part of its box along an axis. The coordinate x in the old box and the
+  /// coordinate s in the new box are related by x = scale · s + shift.
   void restrict(int axis, double scale, double shift) {
     if (scale == 1 && shift == 0) return;
     findRows(scale, shift);
@@ -88,7 +90,8 @@ class Polynomial {
     for (int a = 0; a < n; ++a)
       for (int b = 0; a + b < n; ++b) {
         double* line = c_.data() + a * first + b * second;
-        // Entry j of the result depends on entries j and above only, so that the line is overwritten from below.
+        // Overwrite the line of coefficients in ascending order. This is possible because entry j of the result depends
+        // only on entries j and above.
         for (int j = 0; j < n - a - b; ++j) {
           double sum = 0;
           for (int i = j; i < n - a - b; ++i) sum += rows_[i][j] * line[i * along];
@@ -101,15 +104,15 @@ class Polynomial {
     for (std::size_t n = 0; n < c_.size(); ++n) c_[n] -= other.c_[n];
   }
 
-  /// The sum of the coefficients' magnitudes, which bounds the polynomial on its box.
+  /// The sum of the coefficients' magnitudes. It is an upper bound of the polynomial's magnitude on its box.
   double magnitude() const {
     double sum = 0;
     for (const double c : c_) sum += std::abs(c);
     return sum;
   }
 
-  /// A bound of the gradient's length on the box, with respect to coordinates that change by 1 where those of this box
-  /// change by `perUnit`.
+  /// An upper bound of the length of the polynomial's gradient on the box. The gradient is with respect to
+  /// coordinates of which one unit is `perUnit` units of this box's coordinates.
   double gradientBound(const Vector3& perUnit) {
     Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)
@@ -120,8 +123,8 @@ class Polynomial {
   }
 
  private:
-  /// Fills rows_ such that L_i(scale · s + shift) = Σ rows_[i][j] L_j(s), by the recurrence of L_i and by
-  /// s L_j = ((j+1) L_{j+1} + j L_{j−1})/(2j+1).
+  /// Fills rows_ such that L_i(scale · s + shift) = Σ rows_[i][j] L_j(s). Uses the recurrence of L_i and the
+  /// identity s L_j = ((j+1) L_{j+1} + j L_{j−1})/(2j+1).
   void findRows(double scale, double shift) {
     for (int i = 0; i < size_; ++i) std::fill_n(rows_[i].begin(), size_ + 1, 0.0);
     rows_[0][0] = 1;
@@ -138,7 +141,7 @@ class Polynomial {
   std::array<std::array<double, kMaxDegree + 3>, kMaxDegree + 1> rows_;
 };
 
-/// Computes the bounds of leaves; one for each thread.
+/// Computes the blend zone bounds of leaves. Each thread has its own object of this class.
 class LeafBounder {
  public:
   explicit LeafBounder(const Field& field) : field_(field.data()), extents_(field.lookupGrid().blendExtents) {}
@@ -158,7 +161,7 @@ class LeafBounder {
   }
 
  private:
-  /// The depth of the smallest leaf that touches a face of this one, itself included.
+  /// The depth of the smallest leaf among `leaf` and the leaves that touch one of its faces.
   int smallestNeighbour(const NodeBox& leaf) const {
     int deepest = leaf.depth;
     for (int axis = 0; axis < 3; ++axis)
@@ -169,7 +172,7 @@ class LeafBounder {
   }
 
   /// Restricts the polynomials of both leaves to the part of `leaf` into which the weight of `other` may extend.
-  /// Returns the sum of the magnitudes of both polynomials' coefficients.
+  /// Returns the sum of the magnitudes of all coefficients of the two restricted polynomials.
   double restrictBoth(const NodeBox& leaf, const NodeBox& other) {
     const int size = std::max(degree(leaf), degree(other)) + 1;
     assign(ofLeaf_, leaf, size);

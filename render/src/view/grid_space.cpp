@@ -26,7 +26,7 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
   checkFinite(view.origin, "origin");
   checkFinite(view.right, "right vector");
   checkFinite(view.up, "up vector");
-  // A plane in the domain's boundary may have been rounded to just outside of the domain.
+  // Rounding may have moved a plane in the boundary of the domain to just outside of the domain. Move it back.
   for (int axis = 0; axis < 3; ++axis) {
     if (right[axis] != 0 || up[axis] != 0) continue;
     const double clamped = std::clamp(origin[axis], 0.0, space.grid[axis]);
@@ -58,8 +58,8 @@ RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, in
   checkCamera(camera, w, h);
   checkClip(clip);
   if (!clip) return;
-  // The visible part ends slightly behind the plane, so that a ray that starts at a cut along faces starts in a cell
-  // behind the plane in single precision too.
+  // The visible part of the domain ends slightly behind the clipping plane. If the plane lies along faces of
+  // cells, rays then start in a cell behind the plane in single precision too.
   const bool above = eyeAbove(camera, *clip);
   const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];
   const double behind = cut + (above ? -kClipNudge : kClipNudge) * space.grid[clip->axis];

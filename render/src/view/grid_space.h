@@ -1,6 +1,7 @@
 #pragma once
-// Grid coordinates, in which both renderers work: the domain is [0, grid], a base cell a unit cube. Views are
-// transformed to grid coordinates once, in double precision, so that CPU and GPU start from the same numbers.
+// Grid coordinates, which both renderers use: the domain is [0, grid], and a base cell is a unit cube. Views
+// are transformed to grid coordinates once, in double precision, so that CPU and GPU start from the same
+// numbers.
 
 #include <optional>
 
@@ -9,8 +10,8 @@
 
 namespace hpsdf::render {
 
-/// The transform from world to grid coordinates. Its operations have the order of those in core's queries, so that both
-/// put a plane through the middle of the domain on the same side of a face.
+/// The transform from world to grid coordinates. Its operations have the same order as in the queries of core,
+/// so that renderers and queries put a plane through the middle of the domain on the same side of a face.
 struct GridSpace {
   explicit GridSpace(const FieldData& field);
 
@@ -23,8 +24,9 @@ struct GridSpace {
   double diagonal;  ///< diagonal of the domain, world units
 };
 
-/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) + up · (h−2y−1) · stepY: these
-/// are products and sums only, which every IEEE device rounds alike.
+/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) +
+/// up · (h−2y−1) · stepY. This formula has only products and sums, which every IEEE device rounds in the same
+/// way.
 struct SliceGeometry {
   SliceGeometry(const GridSpace& space, const SliceView& view, int width, int height);
 
@@ -38,16 +40,17 @@ struct SliceGeometry {
   double stepX, stepY;  ///< 1/(2w), 1/(2h)
 };
 
-/// Distance behind a clipping plane at which rays start, in parts of the domain's extent across the plane. Cells of a
-/// section are looked up at the same distance.
+/// Distance behind a clipping plane at which rays start, as a share of the domain's extent across the plane.
+/// The cells that a section shows are looked up at the same distance behind the plane.
 constexpr double kClipNudge = 1e-6;
 
-/// Returns true if a clipping plane removes its side of greater coordinates, on which the eye is.
+/// Returns true if a clipping plane removes its side of greater coordinates. A clipping plane removes the side
+/// from which the camera looks at it.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
-/// The rays of a camera. With across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY, the ray of pixel (x, y) starts
-/// at the eye and runs along forward + across or, where rays are parallel, starts at eye + across · scale and runs
-/// along forward.
+/// The rays of a camera. Let across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY. In perspective the ray
+/// of pixel (x, y) starts at the eye and runs along forward + across. A parallel ray starts at eye +
+/// across · scale and runs along forward.
 struct RayGeometry {
   RayGeometry(const GridSpace& space, const Camera& camera, int width, int height,
               const std::optional<ClipPlane>& clip = {});
@@ -73,7 +76,7 @@ struct RayGeometry {
   double stepX, stepY;  ///< 1/w, 1/h
 
  private:
-  /// `middle` plus the vector from the picture's middle to the pixel, world units.
+  /// `middle` plus the vector from the middle of the picture to pixel (x, y), in world units.
   Vector3 onPicture(const Vector3& middle, int x, int y) const {
     return middle + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
   }

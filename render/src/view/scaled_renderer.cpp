@@ -20,8 +20,8 @@ Field scaled(const Field& field, double factor) {
   return Field(std::move(data));
 }
 
-/// Passes views on to `inner`, whose unit of length is `unit` world units, and converts its buffers to world
-/// units.
+/// A renderer that passes views on to the renderer `inner`. The unit of length of `inner` is `unit` world
+/// units. The buffers of `inner` are converted to world units.
 class ScaledRenderer final : public Renderer {
  public:
   ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}
@@ -57,7 +57,7 @@ class ScaledRenderer final : public Renderer {
 
 }  // namespace
 
-// The destructor is defined here so that the virtual table exists once, in this library.
+// The destructor is defined here so that only this library contains the virtual table of the class.
 Renderer::~Renderer() = default;
 
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make) {

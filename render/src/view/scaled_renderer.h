@@ -1,6 +1,6 @@
 #pragma once
-// Rendering of very large and very small fields: devices compute in float, in which the square of a length overflows
-// above 1e19 and vanishes below 1e-19.
+// Rendering of fields with very large or very small domains. Devices compute in float, in which the square of a
+// length overflows for lengths above 1e19 and vanishes below 1e-19.
 
 #include <functional>
 #include <memory>
@@ -11,10 +11,10 @@ namespace hpsdf::render {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Field&)>;
 
-/// A renderer for the field that lets `make` work with lengths near 1. Calls `make` with the field itself where
-/// its domain's size lies within 2^±30, else with a copy in units of a power of two, which rounds nothing. Views
-/// and buffers of the result are in the field's own units. The renderer that `make` returns must keep no reference
-/// to the field.
+/// A renderer for the field. `make` creates it for a field with lengths near 1: the field itself if the size of
+/// its domain lies within 2^±30, else a copy in units of a power of two, which rounds nothing. Views and
+/// buffers of the returned renderer are in the units of the field. The renderer that `make` creates must keep
+/// no reference to its argument.
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make);
 
 }  // namespace hpsdf::render

@@ -13,7 +13,7 @@ struct BlockRect {
   int x0, y0, x1, y1;
 };
 
-/// The bounds of a box's projection to the view, in which the view is [−1, 1]².
+/// The bounds of a box's projection to the view, in coordinates in which the view is [−1, 1]².
 struct Projected {
   double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
   int behind = 0;                    ///< number of corners behind the eye, which perspective leaves out of the bounds
@@ -57,7 +57,8 @@ class BlockFinder {
  private:
   static constexpr float kNone = std::numeric_limits<float>::infinity();
 
-  /// Guesses the side on which rays start. A wrong guess costs time but does not change the picture.
+  /// Guesses the sign of f − offset, 1 or −1, where rays start. A wrong guess costs time but does not change the
+  /// picture.
   float sideAt(const Vector3& p) const {
     std::uint32_t node = 0;
     for (int axis = 2; axis >= 0; --axis)
@@ -65,7 +66,7 @@ class BlockFinder {
     return 0.5 * (double(bounds_[node].lo) + bounds_[node].hi) >= offset_ ? 1 : -1;
   }
 
-  /// Marks the blocks that may see parts of a node which are not on `side_`.
+  /// Marks the blocks whose rays may reach a part of a node where the sign of f − offset is not `side_`.
   void markBlocks(std::uint32_t node, const Vector3& lo, double size) {
     const bool above = bounds_[node].lo > offset_;
     const bool below = bounds_[node].hi < offset_;
@@ -115,7 +116,7 @@ class BlockFinder {
     if (box.behind == 8 || std::ranges::count(box.outside, 8) > 0) return {0, 0, 0, 0};
     if (box.behind > 0 && !rays_.parallel) return whole;
     if (!std::isfinite(box.x0 + box.x1 + box.y0 + box.y1)) return whole;
-    // The centre of pixel i is at 2i + 1 = (1 + x) · width. The rectangle has a margin of one pixel.
+    // The centre of pixel i is at the x with 2i + 1 = (1 + x) · width. The rectangle gets a margin of one pixel.
     const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };
     const auto last = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) + 1) / kBlock) + 1; };
     const auto clamped = [](double block, int blocks) { return int(std::clamp(block, 0.0, double(blocks))); };
@@ -123,7 +124,7 @@ class BlockFinder {
             clamped(last(box.x1, rays_.width), columns_), clamped(last(box.y1, rays_.height), rows_)};
   }
 
-  /// A lower bound of the distance along rays from their start to a box, which allows for rounding.
+  /// A lower bound, which allows for rounding, of the distance along rays from the start of a ray to a box.
   float distance(const Vector3& lo, double size) const {
     constexpr double kRoundingFactor = 1 - 1e-6;
     if (rays_.parallel) {
@@ -137,7 +138,7 @@ class BlockFinder {
     return static_cast<float>(kRoundingFactor * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
   }
 
-  /// Lowers the start of the blocks in a rectangle.
+  /// Lowers the start distance of all blocks in a rectangle to `start`, unless it is lower already.
   void mark(const BlockRect& rect, float start) {
     for (int y = rect.y0; y < rect.y1; ++y)
       for (int x = rect.x0; x < rect.x1; ++x) {

@@ -1,6 +1,6 @@
 #pragma once
-// Blocks of pixels whose rays may meet the surface, and a lower bound of the distance to it. Pixels that do not
-// see the surface are not drawn at all, and the rays of the other pixels start near it.
+// Blocks of pixels whose rays may hit the surface, with a lower bound of the distance to the surface. Pixels
+// outside of these blocks are not drawn at all. Rays of pixels in the blocks start near the surface.
 
 #include <vector>
 
@@ -17,13 +17,15 @@ struct Block {
 };
 
 struct SurfaceBlocks {
-  /// The sign, 1 or −1, of f − offset along every ray from its entry into the domain: up to `Block::start`, or up to
-  /// its exit from the domain if its pixel lies in no block.
+  /// The sign, 1 or −1, of f − offset at the start of every ray. For a pixel in a block, the sign holds along the
+  /// ray from its entry into the domain up to `Block::start`. For any other pixel, it holds up to the ray's exit
+  /// from the domain.
   float side;
   std::vector<Block> blocks;
 };
 
-/// Projects the nodes whose bounds are not wholly on `side` to the view, down to nodes that cover about one block.
+/// Finds the blocks. Projects the nodes in which f − offset may lack the sign `SurfaceBlocks::side` to the
+/// view, down to nodes that cover about one block.
 SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset);
 

@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Greatest |L_i'| and |L_i''| on [−1, 1], which occur at the ends of the interval.
+/// Greatest magnitude of L_i' and of L_i'' on [−1, 1]. Both occur at the ends of the interval.
 double firstDerivative(int i) { return 0.5 * i * (i + 1); }
 double secondDerivative(int i) { return 0.125 * (i - 1) * i * (i + 1) * (i + 2); }
 
@@ -24,7 +24,7 @@ std::array<float, 4> linearPart(const T* c, int degree) {
 
 template <typename T>
 SurfaceBounds leafBounds(const T* c, int degree) {
-  // Sum the coefficients' magnitudes, times the greatest derivatives of their basis functions.
+  // Sum the magnitudes of the coefficients, multiplied by the greatest derivatives of their basis functions.
   double sum = 0;
   double nonlinear = 0;
   Vector3 gradient = Vector3::Zero();  // bound of the nonlinear part's gradient
@@ -47,7 +47,7 @@ SurfaceBounds leafBounds(const T* c, int degree) {
   const auto widened = [&](double bound) { return static_cast<float>(bound * (1 + kFloatRounding) + rounding); };
   const double mean = c[0];
   const double range = sum - std::abs(mean) + rounding;
-  // The Frobenius norm of the bounds of a Hessian is no less than the Hessian's spectral norm.
+  // Bound the spectral norm of the Hessian by the Frobenius norm of the matrix of bounds of its entries.
   const double hessian = std::sqrt(pure.squaredNorm() + 2 * mixed.squaredNorm());
   return {.lo = static_cast<float>(mean - range),
           .hi = static_cast<float>(mean + range),
@@ -61,7 +61,7 @@ SurfaceBounds leafBounds(const T* c, int degree) {
 
 std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vector<BlendZoneBounds>& zones) {
   std::vector<SurfaceBounds> bounds(field.nodes.size());
-  // Bound the leaves.
+  // Compute the bounds of all leaves.
   std::visit(
       [&](const auto& coefficients) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
@@ -75,7 +75,8 @@ std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vect
         });
       },
       field.coefficients);
-  // Unite the ranges of children in their parents, from the end, because children follow their parents.
+  // Set the range of each parent to the union of its children's ranges. The loop runs backwards because children
+  // follow their parents.
   for (std::size_t n = bounds.size(); n-- > 0;) {
     if (node::isLeaf(field.nodes[n])) continue;
     const SurfaceBounds* children = &bounds[node::firstChild(field.nodes[n])];
@@ -91,7 +92,8 @@ std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vect
 }
 
 std::uint32_t packOutwards(float lo, float hi) {
-  // Dropping the lower half of a float rounds it towards zero; adding one to the upper half rounds it away from zero.
+  // Keep the upper half of a float's bits. Dropping the lower half rounds towards zero, and adding one to the
+  // upper half rounds away from zero.
   const auto half = [](float x, bool awayFromZero) {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
     return (bits >> 16) + (awayFromZero && (bits & 0xffff) != 0 ? 1 : 0);

@@ -22,8 +22,8 @@ void checkDomain(const Box& domain) {
     throw Error("a view's domain is empty or not finite: give a field's domain");
 }
 
-/// The view with square pixels that shows the rectangle [lo, hi], given by coordinates from `base` along the unit
-/// vectors `right` and `up`.
+/// A slice view with square pixels that shows the rectangle [lo, hi] of a plane. The coordinates of `lo` and
+/// `hi` are along the unit vectors `right` and `up`, from the point `base`.
 SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vector3& base, const Vector3& right,
                  const Vector3& up, int width, int height) {
   const Eigen::Vector2d center = 0.5 * (lo + hi);
@@ -32,8 +32,9 @@ SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vec
   return {base + center.x() * right + center.y() * up, right * (pixel * width), up * (pixel * height)};
 }
 
-/// The unit vectors that point right and up on screen for a plane. Up is the projection of z, or of y where the plane
-/// is nearly level. Right points towards growing coordinates, so that the picture does not depend on the normal's sign.
+/// The unit vectors that point right and up on the screen, for a plane with this normal. Up is the projection
+/// of the z axis, or of the y axis if the plane is nearly horizontal. Right points towards growing coordinates,
+/// so that the picture does not depend on the normal's sign.
 std::pair<Vector3, Vector3> screenAxes(const Vector3& normal) {
   const Vector3 upwards = std::abs(normal.z()) > 0.9 ? Vector3::UnitY() : Vector3::UnitZ();
   const Vector3 up = (upwards - upwards.dot(normal) * normal).normalized();
@@ -44,7 +45,8 @@ std::pair<Vector3, Vector3> screenAxes(const Vector3& normal) {
   return {right, up};
 }
 
-/// The intersections of a plane with the edges of a box, in no particular order: the corners of its section.
+/// The intersections of a plane with the edges of a box, in no particular order. They are the corners of the
+/// section of the box.
 std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3& normal) {
   std::vector<Vector3> corners;
   for (int axis = 0; axis < 3; ++axis)
@@ -63,7 +65,7 @@ std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3
   return corners;
 }
 
-/// `middle` plus the vector from the picture's middle to the pixel.
+/// `middle` plus the vector from the middle of the picture to pixel (x, y).
 Vector3 onPicture(const Camera& camera, const Vector3& middle, int x, int y, int width, int height) {
   return middle + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
 }
@@ -111,7 +113,8 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
     return Error("the slice plane through (" + text(point.x()) + ", " + text(point.y()) + ", " + text(point.z()) +
                  ") misses the domain: give a point within it");
   };
-  // Treat a plane across an axis without rounding, so that it stays on a face between cells.
+  // Treat a plane that is perpendicular to an axis without rounding, so that a plane on a face between cells
+  // stays there.
   for (int axis = 0; axis < 3; ++axis) {
     if (normal[(axis + 1) % 3] != 0 || normal[(axis + 2) % 3] != 0) continue;
     if (!(point[axis] >= domain.min()[axis] && point[axis] <= domain.max()[axis])) throw misses();
@@ -121,7 +124,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
   const std::vector<Vector3> corners = section(domain, point, unit);
   if (corners.empty()) throw misses();
   const auto [right, up] = screenAxes(unit);
-  // Start from the plane's point nearest to the domain's centre, so that coordinates stay small.
+  // Count coordinates in the plane from its point nearest to the centre of the domain, so that they stay small.
   const Vector3 base = domain.center() - unit.dot(domain.center() - point) * unit;
   Eigen::AlignedBox2d extent;
   for (const Vector3& corner : corners) extent.extend(Eigen::Vector2d(right.dot(corner - base), up.dot(corner - base)));

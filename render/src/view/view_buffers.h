@@ -4,7 +4,8 @@
 
 namespace hpsdf::render {
 
-/// Buffers of a view in which no pixel shows anything. `surface` adds the buffers that slices lack.
+/// Buffers of a view in which no pixel shows anything. With `surface`, they include the buffers that only
+/// surfaces have.
 inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   const std::size_t pixels = std::size_t(width) * height;
   ViewBuffers buffers;

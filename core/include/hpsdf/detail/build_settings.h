@@ -1,6 +1,6 @@
 #pragma once
-// The table of all settings of a construction: the program's options, the settings stored with a field, the identity of
-// a checkpoint and the checks of ranges all come from it.
+// The table of all settings of a construction. The program's options, the settings stored with a field, the
+// identity of a checkpoint and the checks of ranges are derived from this table.
 
 #include <cstdint>
 #include <limits>
@@ -14,16 +14,17 @@
 
 namespace hpsdf {
 
-/// Headings above settings in help texts.
+/// Headings of the groups of settings in help texts.
 namespace setting_group {
 constexpr std::string_view kAsked = "What you ask for", kResult = "What you get", kMethod = "How it is built";
 }
 
-/// One setting of `BuildOptions`. Its value is a list of numbers: one for a number; 0 or 1 for a flag; the index of a
-/// word for a choice; one for each axis of the grid. The list is empty if the setting is off or unset.
+/// A setting of `BuildOptions`. The value of a setting is a list of numbers: one number for a numeric setting;
+/// 0 or 1 for a flag; the index of a word for a choice; three numbers, one for each axis, for the grid. The
+/// list is empty if the setting is off or unset.
 struct BuildSetting {
   enum class Type : std::uint8_t { number, wholeNumber, wholeNumbers, choice, flag };
-  /// How a setting ends the construction.
+  /// The way in which a setting ends the construction.
   enum class Ending : std::uint8_t {
     none,           ///< not at all
     target,         ///< when the target error is reached
@@ -56,22 +57,26 @@ struct BuildSetting {
   void (*set)(BuildOptions&, std::span<const double>) = nullptr;
 };
 
-/// Returns all settings in the order in which they are shown to users. A setting follows its owner.
+/// Returns all settings in the order in which users see them. A setting that has an effect only with another
+/// setting comes after that setting.
 std::span<const BuildSetting> buildSettings();
 
-/// Returns the setting of this name. Throws std::logic_error if the table does not have it.
+/// Returns the setting of this name. Throws std::logic_error if there is no such setting.
 const BuildSetting& buildSetting(std::string_view name);
 
-/// Returns a setting's value as users write it: "4", "6,6,6", "hp", "true"; empty if the setting is off or unset.
+/// Returns the value that a setting has in `options`, as users write it: "4", "6,6,6", "hp", "true". Returns an
+/// empty string if the setting is off or unset.
 std::string settingText(const BuildSetting& setting, const BuildOptions& options);
 
-/// Returns the value that a setting has if users give none.
+/// Returns the value, as users write it, that a setting has if users do not give it.
 std::string defaultText(const BuildSetting& setting);
 
-/// Returns `options` in which all settings that a field does not store are those of a field that was not built.
+/// Returns `options` with the settings that files do not store reset. These settings get the values that they
+/// have in the metadata of a field that `build` did not make.
 BuildOptions storedSettings(const BuildOptions& options);
 
-/// Returns settings that build a field like this one: those that it stores, and those that follow from its arrays.
+/// Returns options with which `build` makes a field like `field`. They combine the settings that the field
+/// stores with settings that follow from its arrays.
 BuildOptions settingsOf(const FieldData& field);
 
 }  // namespace hpsdf

@@ -1,5 +1,5 @@
 #pragma once
-// Jumps as queries see them, measured at random points of faces.
+// Jumps of a field's value and gradient as queries see them, measured at random points on the faces of leaves.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace hpsdf {
 
-/// The greatest differences between queries on both sides of faces.
+/// The greatest differences between queries of a field on opposite sides of the faces of its leaves.
 struct FaceSteps {
   std::size_t points = 0;  ///< number of points at which both sides were queried
   double value = 0;        ///< greatest difference of f, in the field's units
@@ -20,10 +20,11 @@ struct FaceSteps {
   void add(const FaceSteps& other);
 };
 
-/// Queries a field on both sides of `count` random points of faces. The two queries of a point are at neighbouring
-/// floating-point numbers that lie in different leaves. Each point lies on a random one of `faces`, which are
-/// interfaces of the field (`Jumps::interfaces`); small faces are as likely as large ones. The result depends on the
-/// seed, not on `threads` (0: all that the machine offers). Throws `Cancelled` when `progress` says so.
+/// Queries a field on both sides of faces at `count` random points. At each point the two queries are at
+/// neighbouring floating-point numbers that lie in different leaves. Each point lies on a random face out of
+/// `faces`, which are interfaces of the field (`Jumps::interfaces`). Small faces are chosen as often as large
+/// faces. The result depends on the seed, not on `threads` (0: all that the machine offers). Throws `Cancelled`
+/// when `progress` says so.
 FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces, std::size_t count,
                            std::uint64_t seed = 1, int threads = 0, const Progress& progress = {});
 

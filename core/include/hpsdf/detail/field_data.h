@@ -1,5 +1,5 @@
 #pragma once
-// A field's arrays, and how it came to be.
+// The arrays of a field, and the record of how it was built.
 
 #include <array>
 #include <cstdint>
@@ -13,27 +13,30 @@
 
 namespace hpsdf {
 
-/// The record of how a field was built: stored with it, shown by `info`. Lengths are in the field's own units.
+/// The record of how a field was built. It is stored with the field, and the command `info` shows it. Lengths
+/// are in the field's own units.
 struct FieldMetadata {
   Source source;
-  /// The settings that took effect. If errors by distance were asked for, τ is the error reached and θ the exponent
-  /// that followed from them. Files store the settings that have a `BuildSetting::storedAt`.
+  /// The settings that took effect. If errors by distance were asked for, τ is the error that the construction
+  /// reached, and θ the exponent that it derived from these errors. Files store the settings that have a
+  /// `BuildSetting::storedAt`.
   BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
   double totalError = 0;               ///< ε, weighted by nearness, at the paper's scale: comparable with τ
   double referenceLength = 2;          ///< L; an error at the paper's scale times (L/2)^5 is in the field's own units^5
   std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction
-  /// Leaves that the construction raised or split; nothing where that is unknown, as in files of version 1.
+  /// Number of steps of the construction, each of which raised the degree of a leaf or split a leaf. It is
+  /// std::nullopt if the number is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
   /// Greatest |f − Φ| at the probed points, without blending, if a maximum error was asked for. The effect of
-  /// rounding is added if it exceeds a hundredth of that maximum.
+  /// rounding is included if it exceeds a hundredth of the maximum error.
   double measuredError = 0;
 
-  /// √(ε/|Ω|): the estimated RMS error that the construction ended with.
+  /// Returns √(ε/|Ω|), the estimated RMS error over the domain Ω at the end of the construction.
   double rmsEstimate(const Box& domain) const;
 };
 
-/// Bounds that are proven to hold throughout a leaf (see `safe_distance.h`).
+/// Proven bounds that hold throughout one leaf (see `safe_distance.h`).
 struct CellBound {
   float error = 0;  ///< bound of |f − Φ| in the field's units
   float slope = 0;  ///< bound of ‖∇f‖
@@ -50,14 +53,14 @@ struct FieldData {
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
   std::variant<std::vector<double>, std::vector<float>> coefficients;
-  /// Width of the zones along a leaf's faces in which it is blended with its neighbours, in edges of the leaf: 0, for
-  /// no blending, to `kMaxBlend`.
+  /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours. It is
+  /// measured in edges of the leaf, from 0 (no blending) to `kMaxBlend`.
   double blend = 0;
   std::vector<CellBound> bounds = {};  ///< by node, 0 for internal nodes; empty if the field has no bounds
   FieldMetadata metadata = {};
 };
 
-/// Packs and unpacks the bits of a node.
+/// Functions that pack and unpack the bits of an octree node.
 namespace node {
 constexpr std::uint64_t kLeafBit = std::uint64_t{1} << 63;
 constexpr bool isLeaf(std::uint64_t n) { return (n & kLeafBit) != 0; }
@@ -73,9 +76,10 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// Blend extents of a leaf. The extent at a face is the distance to either side of it within which the leaf's weight
-/// grows from 0 outside to 1 inside. It is `FieldData::blend` edges of the deepest leaf that touches the face, the
-/// leaf itself included; 5 bits hold the depth of that leaf, or `kDomainFace` where the domain ends.
+/// Blend extents of a leaf. The blend extent at a face is the distance to either side of the face within which
+/// the leaf's weight grows from 0 outside the leaf to 1 inside. It is `FieldData::blend` times the edge of the
+/// deepest leaf that touches the face, the leaf itself included. 5 bits hold the depth of the deepest leaf, or
+/// `kDomainFace` if the face lies on the boundary of the domain.
 namespace blend_extent {
 constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {

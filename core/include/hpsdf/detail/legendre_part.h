@@ -1,5 +1,5 @@
 #pragma once
-// Polynomials restricted to a part of their cell.
+// Restricts the polynomial of a cell to a part of the cell.
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Rows of L_i(shift + scale·t) = Σ_a row[i][a] L_a(t), a ≤ i. Elements beyond the degree are not set.
+/// Coefficients row[i][a], a ≤ i, with which L_i(shift + scale·t) = Σ_a row[i][a] L_a(t). Elements beyond the
+/// degree of the polynomial are not set.
 using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
 
 inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
@@ -30,8 +31,8 @@ inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
   return row;
 }
 
-/// Restricts a polynomial to a part of one axis, which the rows describe. Its coefficients are a cube of (degree + 1)³
-/// numbers, z fastest, which are 0 above the total degree.
+/// Restricts a polynomial to a part of its cell along one axis; `rows` describes the part. The coefficients c
+/// are a cube of (degree + 1)³ numbers, z fastest. Coefficients above the total degree are 0.
 inline void restrictToPart(std::vector<double>& c, int degree, int axis, const LegendreRows& rows) {
   const int n = degree + 1;
   const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};

@@ -1,5 +1,5 @@
 #pragma once
-// A field along a segment: the leaves that the segment crosses, and samples within each.
+// A field along a segment: the leaves that the segment crosses, and samples within each of these leaves.
 
 #include <cstddef>
 #include <optional>
@@ -9,16 +9,17 @@
 
 namespace hpsdf {
 
-/// The part of a segment within one leaf, or a part outside the domain.
+/// The part of a segment that lies within one leaf, or a part that lies outside the domain.
 struct Piece {
   std::optional<Cell> cell;  ///< empty outside the domain
   double tEnter, tLeave;     ///< ends of the piece, 0 at the segment's start and 1 at its end; tEnter < tLeave
 };
 
-/// Cuts a segment at the faces that it crosses. The pieces are in order from 0 to 1, and each begins where the one
-/// before it ends. Leaves are half-open, so that a segment along a face or an edge runs through the leaves of greater
-/// coordinates, and one through an edge or a corner continues in the opposite leaf. Leaves that hold less than 1e-12 of
-/// the segment are left out, because rounding decides about them. Throws `Error` if the points are equal or not finite.
+/// Cuts a segment into pieces at the faces of leaves. The pieces are in order of the parameter t from 0 to 1,
+/// and each piece begins where the previous piece ends. Leaves are half-open. Therefore a segment along a face
+/// or an edge runs through the leaves of greater coordinates, and a segment through an edge or a corner
+/// continues in the opposite leaf. Leaves that hold less than 1e-12 of the segment are left out, because
+/// rounding decides whether the segment crosses them. Throws `Error` if the points are equal or not finite.
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to);
 
 struct LineSample {
@@ -29,31 +30,32 @@ struct LineSample {
   Vector3 gradient;
 };
 
-/// Samples of a field along a segment. Where two pieces meet, two samples with equal t hold the limits from both
-/// pieces, so that a plot shows jumps as steps.
+/// Samples of a field along a segment. Where two pieces of the segment meet, there are two samples with equal
+/// t, which hold the limits from the two pieces. A plot therefore shows jumps as steps.
 struct Line {
   Vector3 from, to;
   std::vector<Piece> pieces;
   std::vector<LineSample> samples;  ///< in the order of t
 
-  /// Returns the segment's length, even if its square would vanish or overflow.
+  /// Returns the segment's length. The length is correct even if its square would underflow or overflow.
   double length() const { return (to - from).stableNorm(); }
-  /// Returns the gradient's component along the segment.
+  /// Returns the component of the sample's gradient in the direction of the segment.
   double slopeAlong(const LineSample& sample) const { return sample.gradient.dot(to - from) / length(); }
 };
 
-/// Samples a field at `count` ≥ 2 evenly spaced points, which include the segment's ends, and at both ends of every
-/// piece. Samples within the domain are limits from the piece's leaf, those outside use the field's continuation.
-/// Throws `Error` as `piecesAlong` does.
+/// Samples a field at `count` ≥ 2 evenly spaced points of a segment, including its ends, and at both ends of
+/// every piece of the segment. A sample within the domain is the limit from the leaf of its piece. A sample
+/// outside the domain uses the field's continuation. Throws `Error` as `piecesAlong` does.
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count);
 
-/// The jump of f where a segment crosses from one leaf to the next.
+/// The jump of a field f at the point where a segment crosses from one leaf to the next leaf.
 struct LineJump {
   double t;      ///< position along the segment, 0 at its start and 1 at its end
   double value;  ///< f after the crossing less f before it
 };
 
-/// Returns the jumps at all crossings within the domain, in order.
+/// Returns the jumps at all points within the domain where the line crosses from leaf to leaf, in order along
+/// the line.
 std::vector<LineJump> jumpsAlong(const Line& line);
 
 }  // namespace hpsdf

@@ -12,14 +12,15 @@
 
 namespace hpsdf {
 
-/// The least number of letters to insert, drop, replace or swap with the next one that turns `a` into `b`, where no
-/// letter is edited twice (the optimal string alignment distance). Upper and lower case are alike.
+/// Returns the smallest number of edits that turn `a` into `b`. An edit inserts, drops or replaces a letter, or
+/// swaps it with the next letter. No letter is edited twice (the optimal string alignment distance). Upper and
+/// lower case count as equal.
 inline std::size_t editDistance(std::string_view a, std::string_view b) {
   const auto same = [](char x, char y) {
     return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
   };
-  // row[j] is the distance between the first i letters of a and the first j of b; `before` and `twoBefore` are the rows
-  // of i - 1 and i - 2.
+  // row[j] is the distance between the first i letters of a and the first j letters of b; `before` is the row of
+  // i - 1, and `twoBefore` the row of i - 2.
   std::vector<std::size_t> twoBefore, before, row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 1; i <= a.size(); ++i) {
@@ -34,10 +35,10 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// Returns the known name that was probably meant, the first one if several are equally near; empty if none is near.
-/// A name is near when at most a third of the letters (at least one) differ, or when `wanted` is its beginning of
-/// three letters or more. Names of more than 64 letters are not compared, because names in untrusted files can be
-/// very long.
+/// Returns the known name that was probably meant by `wanted`: the nearest known name, the first of several
+/// equally near names, or an empty string if no name is near. A name is near if at most a third of its letters
+/// (or one letter) differ, or if it begins with `wanted` and `wanted` has three letters or more. Names of more
+/// than 64 letters are not compared, because names in untrusted files can be very long.
 inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
   constexpr std::size_t kLongest = 64;
   std::string best;
@@ -56,8 +57,8 @@ inline std::string nearestName(std::string_view wanted, std::span<const std::str
   return best;
 }
 
-/// The end of a message about an unknown name: "did you mean 'NAME'?" where a known name is near, with `prefix` before
-/// it, else `otherwise`.
+/// Returns the end of a message about the unknown name `wanted`: "did you mean 'NAME'?" with `prefix` before
+/// the name if a known name is near, else `otherwise`.
 inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
                               std::string_view prefix = "") {
   const std::string name = nearestName(wanted, known);

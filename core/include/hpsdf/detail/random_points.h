@@ -1,5 +1,6 @@
 #pragma once
-// Random numbers that depend only on a seed and an index: the same for any number of threads and any standard library.
+// Random numbers that depend only on a seed and an index. They are the same for any number of threads and any
+// standard library.
 
 #include <cmath>
 #include <cstdint>
@@ -9,14 +10,15 @@
 
 namespace hpsdf::detail {
 
-/// SplitMix64 (Steele, Lea, Flood 2014). Each index of a sequence has a generator of its own.
+/// The SplitMix64 random number generator (Steele, Lea, Flood 2014). Each index of a sequence has its own
+/// generator.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t index) : state_(mixed(mixed(seed) + index)) {}
 
   std::uint64_t next() { return mixed(state_ += 0x9e3779b97f4a7c15); }
 
-  /// A uniform number in [0, 1) with 53 random bits.
+  /// Returns a random number that is uniform in [0, 1), with 53 random bits.
   double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
 
   Vector3 inBox(const Box& box) {
@@ -24,7 +26,7 @@ class Random {
     return box.min() + box.sizes().cwiseProduct(Vector3(x, y, z));
   }
 
-  /// A uniform point in the ball of this radius around the origin.
+  /// Returns a random point that is uniform in the ball of this radius around the origin.
   Vector3 inBall(double radius) {
     const double z = 2 * unit() - 1, angle = 2 * std::numbers::pi * unit(), fromCenter = radius * std::cbrt(unit());
     const double fromAxis = std::sqrt(1 - z * z);

@@ -1,5 +1,5 @@
 #pragma once
-// Small helpers for text that core and the program share.
+// Small helpers for text, which the core library and the program share.
 
 #include <algorithm>
 #include <filesystem>
@@ -8,20 +8,22 @@
 
 namespace hpsdf {
 
-/// The text without blanks and line ends at its beginning and end.
+/// Returns the text without blanks and line ends at its beginning and its end.
 inline std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r\n\v\f";
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
   return text.substr(0, text.find_last_not_of(kBlanks) + 1);
 }
 
-/// The text with the letters A to Z in lower case; other bytes, those of UTF-8 among them, stay.
+/// Returns the text with the letters A to Z in lower case. Other bytes, such as those of UTF-8 characters, stay
+/// unchanged.
 inline std::string lowerCase(std::string text) {
   std::ranges::transform(text, text.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
   return text;
 }
 
-/// The file's extension in lower case with its dot, such as ".ply"; empty where the file has none.
+/// Returns the file's extension in lower case with its dot, such as ".ply", or an empty string if the file has
+/// no extension.
 inline std::string lowerExtension(const std::filesystem::path& file) { return lowerCase(file.extension().string()); }
 
 }  // namespace hpsdf

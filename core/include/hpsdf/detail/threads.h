@@ -7,8 +7,8 @@
 
 namespace hpsdf {
 
-/// Calls `work` in a TBB arena of its own, which limits its parallel work to `threads` threads; 0 stands for all that
-/// the machine offers. An exception of `work` reaches the caller.
+/// Calls `work` in a TBB arena that limits its parallel loops to `threads` threads; 0 stands for all threads
+/// that the machine offers. Rethrows an exception that `work` throws.
 void runWithThreads(int threads, const std::function<void()>& work);
 
 /// Calls `work` as `runWithThreads` does and returns its result.

@@ -20,7 +20,7 @@ namespace {
 /// Number of points for which Φ is called at once.
 constexpr std::size_t kBatch = 512;
 
-/// Drawing gives up if a sample takes more candidates than this on average.
+/// Drawing fails if an accepted sample takes more candidate points than this on average.
 constexpr std::size_t kMaxCandidates = 1000;
 
 /// Spreads the low 21 bits of a number to every third bit.
@@ -57,7 +57,7 @@ std::vector<T> permuted(const std::vector<T>& items, const std::vector<std::uint
   return result;
 }
 
-/// Computes Φ at points in any order. Throws `Error` if it is not finite.
+/// Computes Φ at points, which may come in any order. Throws `Error` if a value of Φ is not finite.
 std::vector<double> distancesAt(const DistanceFunction& distance, const std::vector<Vector3>& points, const Box& domain,
                                 const Progress& progress) {
   const std::vector<std::uint32_t> order = mortonOrder(points, domain);
@@ -74,8 +74,9 @@ std::vector<double> distancesAt(const DistanceFunction& distance, const std::vec
   return distances;
 }
 
-/// Draws candidates draw(0), draw(1), … until `options.count` of them lie in the domain and, if `band` is above 0, in
-/// the band. Throws `Error` with `noneMessage` if hardly any does.
+/// Draws candidate points draw(0), draw(1), … until `options.count` of them are accepted. A candidate must lie
+/// in the domain and, if `band` is above 0, in the narrow band. Throws `Error` with `noneMessage` if too few
+/// candidates are accepted.
 template <typename Draw>
 ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, double band, const SampleOptions& options,
                          const Progress& progress, const std::string& noneMessage, const Draw& draw) {
@@ -99,8 +100,8 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
   return {permuted(samples.points, order), permuted(samples.distances, order)};
 }
 
-/// Divides the domain into blocks and returns those that may intersect the band. The others cannot, because Φ is
-/// 1-Lipschitz.
+/// Divides the domain into blocks and returns the blocks that may intersect the narrow band. All other blocks
+/// lie outside the band, because Φ is 1-Lipschitz.
 std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domain, double band) {
   constexpr int kBlocks = 32;  // along each axis
   const Vector3 size = domain.sizes() / kBlocks;

@@ -21,7 +21,7 @@ ValueAndGradient queryAt(const Field& field, const std::array<double, 3>& gridCo
                                                  query::findLeaf(field.data(), lookupGrid, point));
 }
 
-/// Measures the step at a random point of a face.
+/// Measures the jump of the field's value and gradient at a random point of a face.
 FaceSteps stepAcross(const Field& field, const Interface& face, detail::Random& random) {
   const GridFrame& frame = field.lookupGrid().frame;
   const int depth = std::max(face.depths[0], face.depths[1]);  // The interface is a whole face of the smaller leaf.

@@ -21,8 +21,8 @@ using namespace query;
 
 namespace {
 
-/// Sample coordinates along one side of a face, in [−1, 1]: the points of a Gauss rule, and the ends with weight 0. The
-/// product of two such lists samples the inside, the edges and the corners of a face.
+/// Sample coordinates in [−1, 1] along one axis of a face: the points of a Gauss rule, and both ends with
+/// weight 0. The product of two such lists samples the interior, the edges and the corners of the face.
 struct Samples {
   std::vector<double> points, weights;
 
@@ -36,11 +36,11 @@ struct Samples {
   }
 };
 
-/// The axes along a face across `axis`: those that follow `axis` cyclically.
+/// Returns the two axes in the plane of a face that is perpendicular to `axis`, in cyclic order after `axis`.
 constexpr std::array<int, 2> axesAlong(int axis) { return {(axis + 1) % 3, (axis + 2) % 3}; }
 
-/// The trace of a leaf's field on a face: values and world gradients at the product of two lists of sample coordinates,
-/// of which the second is fastest.
+/// The trace of a leaf's field on a face: values and gradients in world units at the samples. The samples are
+/// the product of two coordinate lists, and the second coordinate varies fastest.
 class FaceTrace {
  public:
   const double* value() const { return out_[0].data(); }
@@ -54,8 +54,9 @@ class FaceTrace {
     for (int axis = 0; axis < 3; ++axis) out_[1 + axis][at] = result.gradient[axis];
   }
 
-  /// Evaluates a polynomial on the plane across `axis` at the local coordinate t. `along` holds the samples' local
-  /// coordinates along `axesAlong(axis)`. `toWorld` converts derivatives from local coordinates to the world.
+  /// Evaluates a leaf's polynomial on the plane perpendicular to `axis` at the leaf's local coordinate t. `along`
+  /// holds the local coordinates of the samples along `axesAlong(axis)`. `toWorld` converts local derivatives to
+  /// world units.
   template <typename T>
   void evaluate(const T* coefficients, int degree, int axis, double t, const std::array<std::vector<double>, 2>& along,
                 const Vector3& toWorld) {
@@ -70,7 +71,7 @@ class FaceTrace {
   }
 
  private:
-  /// Evaluates the Legendre polynomials at all samples.
+  /// Evaluates the Legendre polynomials at all sample coordinates.
   void tabulateBasis(int degree, const std::array<std::vector<double>, 2>& along) {
     const int n = degree + 1;
     for (int side = 0; side < 2; ++side) {
@@ -81,7 +82,8 @@ class FaceTrace {
     }
   }
 
-  /// Computes the coefficients of the polynomial and of its derivative across the plane, in the plane's coordinates.
+  /// Computes the coefficients on the plane of a face, for the leaf's polynomial and for its derivative
+  /// perpendicular to the plane.
   template <typename T>
   void restrictToPlane(const T* coefficients, int degree, int axis, double t) {
     const int n = degree + 1;
@@ -99,7 +101,7 @@ class FaceTrace {
         }
   }
 
-  /// Computes the coefficients on the line through sample s1 of the second axis.
+  /// Computes the coefficients on the line through sample s1 of the second in-plane axis.
   void restrictToLine(int degree, std::size_t s1) {
     const int n = degree + 1;
     for (int i = 0; i < n; ++i) {
@@ -113,7 +115,7 @@ class FaceTrace {
     }
   }
 
-  /// Evaluates sample s0 of the first axis on the line.
+  /// Evaluates the polynomial and its gradient on the line, at sample s0 of the first in-plane axis.
   void evaluatePoint(int degree, int axis, std::size_t s0, std::size_t at, const Vector3& toWorld) {
     const int n = degree + 1;
     double value = 0, d0 = 0, d1 = 0, dAcross = 0;
@@ -131,7 +133,8 @@ class FaceTrace {
     derivative(axis + 2, d1);
   }
 
-  /// Coefficients on a line: of the polynomial and of its derivatives across the plane and along the second axis.
+  /// Coefficients on a line in the plane of a face: of the polynomial, of its derivative perpendicular to the
+  /// plane, and of its derivative along the second in-plane axis.
   struct LineCoefficients {
     double value = 0, across = 0, along = 0;
   };
@@ -142,13 +145,13 @@ class FaceTrace {
   std::array<std::vector<double>, 4> out_;             ///< value, then derivatives
 };
 
-/// Measures the jumps on faces; each thread needs its own.
+/// Measures the jumps of a field on faces. Each thread needs an object of its own.
 class FaceMeter {
  public:
   FaceMeter(const Field& field, std::span<const Samples> samples)
       : field_(field), data_(field.data()), samplesOfDegree_(samples) {}
 
-  /// Appends the interfaces of a leaf by `forEachInterface`.
+  /// Measures the interfaces that `forEachInterface` assigns to a leaf, and appends them to `faces`.
   void measureLeaf(const OctreeNode& leaf, std::vector<Interface>& faces) {
     forEachInterface(data_, leaf, [&](int axis, int step, const OctreeNode& neighbour) {
       faces.push_back(measure(leaf, neighbour, axis, step));
@@ -156,7 +159,8 @@ class FaceMeter {
   }
 
  private:
-  /// Measures the face of `small` at its lower (step −1) or upper (step 1) end along `axis`, beyond which `large` lies.
+  /// Measures the jump on one face of the leaf `small`. The face is at the leaf's lower (step −1) or upper (step
+  /// 1) end along `axis`. The leaf `large` lies on the other side.
   Interface measure(const OctreeNode& small, const OctreeNode& large, int axis, int step) {
     const std::array<const OctreeNode*, 2> sides = {step > 0 ? &small : &large, step > 0 ? &large : &small};
     Interface face;
@@ -167,7 +171,7 @@ class FaceMeter {
       face.depths[side] = static_cast<std::uint8_t>(sides[side]->depth);
     }
 
-    // Compute the traces from both leaves.
+    // Compute the traces of both leaves at the samples for the higher one of their degrees.
     const Samples& samples = samplesOfDegree_[std::max(face.degrees[0], face.degrees[1])];
     for (int side = 0; side < 2; ++side) {
       if (data_.blend > 0)
@@ -177,7 +181,7 @@ class FaceMeter {
     }
     const std::size_t worst = compareTraces(samples, face);
 
-    // Locate the face and its worst sample.
+    // Compute the positions of the face's center and of the sample with the greatest jump.
     const Vector3 size = cellSize(data_, small.depth);
     const auto [axis0, axis1] = axesAlong(axis);
     face.area = size[axis0] * size[axis1];
@@ -192,7 +196,8 @@ class FaceMeter {
     return face;
   }
 
-  /// Sets the jumps of a face from both traces. Returns the sample at which the value jumps most.
+  /// Computes the jumps of a face from the traces of both leaves. Returns the index of the sample with the
+  /// greatest jump of the value.
   std::size_t compareTraces(const Samples& samples, Interface& face) const {
     const std::size_t n = samples.points.size();
     std::size_t worst = 0;
@@ -218,7 +223,8 @@ class FaceMeter {
     return worst;
   }
 
-  /// Evaluates a leaf's polynomial at the samples of a face of `small`, which has the local coordinate t in the leaf.
+  /// Evaluates a leaf's polynomial at the samples of a face of the leaf `small`. The face lies at the local
+  /// coordinate t of `leaf`.
   void tracePolynomial(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, double t,
                        const Samples& samples) {
     const int levels = small.depth - leaf.depth;
@@ -239,7 +245,8 @@ class FaceMeter {
         data_.coefficients);
   }
 
-  /// Evaluates the blended field's limits from within `leaf` at the samples of a face of `small`.
+  /// Evaluates the blended field at the samples of a face of the leaf `small`. The results are the limits from
+  /// within `leaf`.
   void traceBlended(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, int step,
                     const Samples& samples) {
     const std::size_t n = samples.points.size();
@@ -273,7 +280,7 @@ class FaceMeter {
   std::array<std::vector<double>, 2> along_;  ///< local coordinates of the samples along the face
 };
 
-/// Computes the totals over all interfaces.
+/// Computes the totals of the jumps over all interfaces.
 void computeTotals(Jumps& jumps) {
   double valueSquares = 0, gradientSquares = 0;
   for (const Interface& face : jumps.interfaces) {

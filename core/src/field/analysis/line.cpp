@@ -13,11 +13,12 @@
 namespace hpsdf {
 namespace {
 
-/// The shortest piece, in parts of the segment. Shorter pieces are rounding errors.
+/// The shortest piece of a segment, as a fraction of the segment's length. Shorter pieces are rounding errors.
 constexpr double kShortest = 1e-12;
 
-/// One coordinate along a segment, in cells of the greatest depth, whose faces lie at integers. All leaves at a face
-/// compute the same t for it, and faces farther along the segment never get a smaller t.
+/// One coordinate along a segment, in units of cells of the greatest depth, so that faces lie at integers. All
+/// leaves at a face compute the same parameter t for the face. Faces farther along the segment never get a
+/// smaller t.
 struct Axis {
   double start = 0, speed = 0;  ///< coordinate at t = 0 and its change over the whole segment
   std::int64_t cells = 0;
@@ -45,12 +46,12 @@ Axes segmentAxes(const GridFrame& frame, const Vector3& from, const Vector3& to)
   return axes;
 }
 
-/// A range of t.
+/// A range of the segment's parameter t.
 struct Span {
   double first, last;
 };
 
-/// Returns the part of the segment within the domain, if there is any.
+/// Returns the part of the segment within the domain, or std::nullopt if the segment misses the domain.
 std::optional<Span> clipToDomain(const Axes& axes) {
   Span span{0, 1};
   for (const Axis& axis : axes) {
@@ -79,20 +80,22 @@ Vector3 centerOf(const GridFrame& frame, const query::CellIndex& corner, std::in
   return query::worldPoint(frame, center);
 }
 
-/// Returns the t of the face through which a segment leaves a leaf along one axis.
+/// Returns the parameter t at which the segment leaves a leaf along one axis, or infinity if it runs parallel
+/// to the faces.
 double tAtExit(const Axis& axis, std::int64_t corner, std::int64_t width) {
   if (axis.speed > 0) return axis.tAtFace(corner + width);
   return axis.speed < 0 ? axis.tAtFace(corner) : std::numeric_limits<double>::infinity();
 }
 
-/// Walks from leaf to leaf. Despite rounding, each step advances along at least one axis and goes back along none, so
-/// that the walk ends and visits no leaf twice. Cells are those of the greatest depth.
+/// Divides a segment into one piece for each leaf, in the order along the segment. Despite rounding, each step
+/// advances along at least one axis and goes back along none, so that the loop ends and visits no leaf twice.
+/// Cells have the greatest depth.
 std::vector<Piece> walk(const Field& field, const GridFrame& frame, const Axes& axes, const Span& span) {
   std::vector<Piece> pieces;
   query::CellIndex cell, corner;
   for (int a = 0; a < 3; ++a) cell[a] = clampedCell(axes[a].coordinate(span.first), 0, frame.last[a]);
   for (double t = span.first;;) {
-    // Find where the segment leaves the leaf.
+    // Find the parameter t at which the segment leaves the leaf, and append the piece up to it.
     const std::int64_t width = leafWidth(field, cell);
     std::array<double, 3> exit;
     for (int a = 0; a < 3; ++a) {
@@ -106,7 +109,7 @@ std::vector<Piece> walk(const Field& field, const GridFrame& frame, const Axes& 
     }
     if (next >= span.last) return pieces;
 
-    // Cross all faces that the segment meets there.
+    // Move to the next leaf, across every face that the segment meets at its exit from the leaf.
     for (int a = 0; a < 3; ++a) {
       if (exit[a] == next)
         cell[a] = axes[a].speed > 0 ? corner[a] + width : corner[a] - 1;
@@ -121,8 +124,8 @@ Vector3 pointAt(const Vector3& from, const Vector3& to, double t) {
   return {std::lerp(from.x(), to.x(), t), std::lerp(from.y(), to.y(), t), std::lerp(from.z(), to.z(), t)};
 }
 
-/// Evaluates the field at a point of a leaf; on the leaf's faces, the result is the limit from within the leaf. In a
-/// field without blending it is the leaf's polynomial at any x.
+/// Evaluates the field at a point x of a leaf. On the leaf's faces, the result is the limit from within the
+/// leaf. Without blending, the result is the leaf's polynomial, for any x.
 ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const Vector3& x) {
   const GridFrame& frame = field.lookupGrid().frame;
   std::array<double, 3> coordinates;
@@ -136,8 +139,8 @@ ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const 
   return query::evaluateInLeaf<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
 }
 
-/// Evaluates the continuation outside the domain. On the domain's boundary the boundary leaf's gradient differs from
-/// that of the continuation, so that the gradient is taken slightly inside the piece.
+/// Evaluates the continuation of the field outside the domain. The gradient is taken slightly inside the piece,
+/// because on the domain's boundary the gradient of the boundary leaf differs from that of the continuation.
 ValueAndGradient evaluateOutside(const Field& field, const Line& line, const Piece& piece, double t) {
   constexpr double kMargin = 1e-9;
   const double margin = kMargin * (piece.tLeave - piece.tEnter);

@@ -32,8 +32,8 @@ double safeDistance(const Field& field, const Vector3& x) {
   const GridFrame& frame = field.lookupGrid().frame;
   const Vector3 closest = query::closestInDomain(frame, x);
   const query::GridPoint point = query::gridPoint(frame, closest);
-  // The descent starts at the base cells, because bounds are stored by node and the lookup grid does not give the
-  // node's index.
+  // Find the leaf from its base cell down, not by the lookup grid. The error bounds are stored by node index,
+  // which the lookup grid does not give.
   const auto [node, depth, cellIndex] = query::findLeafNode(data, point);
   const query::LeafPoint leaf = query::leafPoint(data.nodes[node], depth, node, cellIndex, point.coordinates);
   const double value = query::evaluateInLeaf<double>(data, field.lookupGrid(), point.coordinates, leaf);
@@ -47,7 +47,7 @@ SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& di
     throw Error("a ray needs a finite origin and a direction that is not zero");
   if (!(slack > 0)) throw Error("the slack of a ray must be above 0");
 
-  // Clip the ray to the domain.
+  // Find the part of the ray that lies in the domain.
   const Vector3 unit = direction / norm;
   const Box& domain = field.domain();
   double first = 0, last = std::numeric_limits<double>::infinity();
@@ -62,7 +62,8 @@ SafeTrace safeTrace(const Field& field, const Vector3& origin, const Vector3& di
     last = std::min(last, leave);
   }
 
-  // March by safe distances, less the rounding of the points, which is large if the origin is far from the domain.
+  // March along the ray by safe distances. Each step is reduced by the rounding error of the points, which is
+  // large if the ray's origin is far from the domain.
   SafeTrace trace{.length = first};
   const double rounding = 8 * std::numeric_limits<double>::epsilon() * (query::length(origin) + std::abs(last));
   while (trace.length < last) {

@@ -28,7 +28,7 @@ detail::Sums sumsOf(std::span<const double> values) {
   return detail::sumOfChunks<detail::Sums>(values.size(), kPointsPerTask, {}, "", add);
 }
 
-/// Returns the least of some ascending values that is not exceeded by `percent` percent of them.
+/// Returns the least of the ascending values that at least `percent` percent of the values do not exceed.
 double percentile(std::span<const double> ascending, double percent) {
   const double rank = std::ceil(percent / 100 * static_cast<double>(ascending.size()));
   return ascending[std::clamp<std::size_t>(static_cast<std::size_t>(rank), 1, ascending.size()) - 1];
@@ -78,7 +78,7 @@ double angleDegrees(const Vector3& a, const Vector3& b) {
   return 180 / std::numbers::pi * std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// Returns the angles between ∇f and ∇Φ at about `wanted` samples with equal strides.
+/// Returns the angles between the gradients ∇f and ∇Φ at about `wanted` samples, chosen with a constant stride.
 std::vector<double> anglesAt(const VerifiedSurface& surface, const ExactSamples& samples,
                              std::span<const ValueAndGradient> found, std::size_t wanted, const Progress& progress) {
   if (wanted == 0) return {};
@@ -126,13 +126,14 @@ GradientFigures gradientFigures(const ExactSamples& samples, std::span<const Val
   return figures;
 }
 
-/// Random points of one kind, uniform or near the surface, with the field there.
+/// Random points, either all uniform or all near the surface, with the field's values and gradients at the
+/// points.
 struct Sampled {
   ExactSamples samples;
   std::vector<ValueAndGradient> found;
 };
 
-/// Returns the points with the greatest errors, greatest first, one for each cell.
+/// Returns the `count` points with the greatest errors, greatest first, and at most one point of each cell.
 std::vector<WorstPoint> worstPoints(const Field& field, std::span<const Sampled* const> kinds, std::size_t count) {
   struct Candidate {
     double error;
@@ -161,7 +162,7 @@ std::vector<WorstPoint> worstPoints(const Field& field, std::span<const Sampled*
   return worst;
 }
 
-/// Compares samples with the bounds of their cells.
+/// Compares the errors and slopes at the samples with the proven bounds of the cells that hold the samples.
 BoundFigures boundFigures(const FieldData& field, std::span<const Sampled* const> kinds) {
   constexpr double kNoSample = -1;
   BoundFigures figures;
@@ -196,7 +197,8 @@ void checkOptions(const VerifyOptions& options) {
       throw Error("verify: a length is below 0 or not finite; give near, band and sign bound as 0 or more");
 }
 
-/// Maps the progress of one task to a range of the whole progress.
+/// Returns a callback that maps the progress of one task to the range from `from` to `to` of the whole
+/// progress.
 Progress part(const Progress& progress, double from, double to) {
   if (!progress.report) return progress;
   return {.report = [&progress, from, to](std::string_view task,
@@ -224,7 +226,8 @@ Verification verify(const Field& field, const VerifiedSurface& surface, const Ve
   result.near = options.near > 0 ? options.near : 0.01 * boundingBox(surface.mesh).sizes().maxCoeff();
   if (options.band > 0) result.near = std::min(result.near, options.band);
 
-  // Draw the samples. Near points get a seed of their own so that they do not repeat the pattern of the uniform ones.
+  // Draw the uniform samples and the samples near the surface. The latter get a seed of their own so that they do
+  // not repeat the pattern of the uniform ones.
   const std::size_t half = options.points / 2;
   Sampled uniform, near;
   uniform.samples = sampleUniform(surface.distance, field.domain(), options.band,

@@ -23,7 +23,8 @@ namespace {
 
 using namespace detail;
 
-/// Returns the goal of the growth. If pruning follows, the growth has to reach a smaller error than the construction.
+/// Returns the error goal of the octree's growth. If pruning follows, this goal is smaller than the goal of the
+/// whole construction.
 ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
   return options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal;
 }
@@ -33,7 +34,7 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
   return asked > 0 ? asked : 0.01 * referenceLength;
 }
 
-/// One construction: the stages of Algorithm 1, one after the other, on one state.
+/// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other on one state.
 class Construction {
  public:
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
@@ -54,7 +55,8 @@ class Construction {
     refiner_.requireMemory();  // checks the memory of Φ before anything is built
   }
 
-  /// Keeps the state in a file from now on. If the file already holds a state, continues from it and returns true.
+  /// From now on, saves the state of the construction to a file. If the file already holds a state, continues
+  /// from that state and returns true.
   bool resume(CheckpointFile& file) {
     observer_.atWholeState = [this, &file] {
       if (!file.isDue()) return;
@@ -73,31 +75,32 @@ class Construction {
     if (setup_.options.maxError > 0) refineByProbes(refiner_);
   }
 
-  /// The field of the present state, from a copy of its tree.
+  /// Returns the field of the present state. It is made from a copy of the state's tree.
   Field snapshot() { return Field(finish(BuildTree(state_.tree))); }
   /// The field of the final state.
   FieldData finish() { return finish(std::move(state_.tree)); }
 
  private:
-  /// Makes a field of a tree, which is the state's own or a copy of it: prunes, enriches, lays out, applies continuity,
-  /// rounds, bounds.
+  /// Makes a field from a tree, which is the state's own or a copy. Prunes and enriches the tree, lays it out in
+  /// arrays, applies continuity, rounds the coefficients and computes bounds.
   FieldData finish(BuildTree&& tree) {
     const BuildOptions& options = setup_.options;
     const std::uint64_t before = fitter_.evaluations();
 
-    // Make the cells final.
+    // Prune and enrich the tree, after which its cells are final.
     if (options.criterion == Criterion::optimal) prune(tree);
     if (options.enrich) enrich(tree);
     FieldMetadata built = metadata(sumOfErrors(tree));
     FieldData field = layOut(std::move(tree), std::move(built));
 
-    // Make the coefficients final. Jumps are reduced in double precision, before rounding.
+    // Reduce the jumps, if that is asked for, and then round. The coefficients are final after that. Jumps are
+    // reduced in double precision.
     if (options.continuityWeight)
       continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
     roundCoefficients(budget_.coefficientType(), field);
     field.blend = options.blend;
 
-    // Compute bounds for the final coefficients with blending.
+    // Compute the bounds. They hold for the rounded coefficients and include blending.
     if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
     ownEvaluations_ += fitter_.evaluations() - before;
     return field;
@@ -107,8 +110,8 @@ class Construction {
     const BuildOptions& options = setup_.options;
     PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
     for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
-    // If the growth ended before its goal, but not because of the limit of bytes, relax the goal so that pruning can
-    // still take back refinements.
+    // Relax the goal if the growth ended before its goal, but not because of the limit of bytes. Pruning can then
+    // still undo refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
       limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
     if (options.maxBytes) limits.mostBytes = budget_.limit();
@@ -117,7 +120,8 @@ class Construction {
     detail::prune(tree, state_.nearness, limits);
   }
 
-  /// Fits every leaf anew, one degree higher, so that all of its coefficients come from samples of its own.
+  /// Fits every leaf of the tree anew, one degree higher. All coefficients of a leaf then come from samples of
+  /// its own.
   void enrich(BuildTree& tree) const {
     constexpr std::size_t kChunk = 4096;
     std::size_t coefficients = 0;

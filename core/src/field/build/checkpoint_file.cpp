@@ -17,7 +17,8 @@ namespace hpsdf::detail {
 namespace {
 
 constexpr Magic kMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
-// Must be raised whenever a construction would continue differently from the same state, or the layout changes.
+// Version of the checkpoint file. It must be increased whenever the file's layout changes or a construction
+// would continue differently from the same state.
 constexpr std::uint32_t kVersion = 3;
 constexpr FileKind kKind{"checkpoint", "another output", "delete it to build from the start"};
 
@@ -103,11 +104,11 @@ void checkTimes(const Checkpoint& checkpoint) {
     throw Error("checkpoint: expected a share of the time above 0 up to 1");
 }
 
-/// Bits that tell which parts of a fit follow in the file.
+/// Bits that tell which parts of a cell's fit follow in the checkpoint file.
 enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
 
-// The functions for items work in both directions: a `CheckedWriter` writes the state and leaves it unchanged, a
-// `CheckedReader` reads and checks it.
+// The functions named …Item and …Items work in both directions. With a `CheckedWriter` they write the state and
+// do not change it; with a `CheckedReader` they read and check it.
 
 template <typename Stream>
 void finiteItem(Stream& stream, double& value) {
@@ -155,7 +156,8 @@ void nodeItems(Stream& stream, BuildTree& tree, int mostDegree) {
   }
 }
 
-/// Gives the cells below the base their cell indices. Each group of eight must have one parent, which precedes it.
+/// Sets the cell indices of all cells below the base cells. Throws `Error` unless each group of eight children
+/// has exactly one parent, which precedes the group.
 void setCellIndices(const CheckedReader& reader, BuildTree& tree, int maxDepth) {
   std::vector<bool> hasParent(tree.nodes.size());
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
@@ -170,7 +172,8 @@ void setCellIndices(const CheckedReader& reader, BuildTree& tree, int maxDepth) 
   }
 }
 
-/// Throws `Error` where a cell lacks a polynomial that the construction needs, or has one that it cannot have.
+/// Throws `Error` if a cell lacks a polynomial that the construction needs, or has a polynomial that it cannot
+/// have.
 void checkFits(const CheckedReader& reader, const BuildTree& tree, std::uint64_t fittedBaseCells, bool keepsAll) {
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
     const BuildNode& node = tree.nodes[n];
@@ -200,7 +203,7 @@ void readTree(CheckedReader& reader, BuildTree& tree, std::uint64_t fittedBaseCe
   checkFits(reader, tree, fittedBaseCells, options.criterion == Criterion::optimal);
 }
 
-/// Every scalar of the state, in order.
+/// Writes or reads every scalar of the construction state, in the order of the file.
 template <typename Stream>
 void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evaluations) {
   stream.item(state.stage);
@@ -216,7 +219,7 @@ void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evalua
   stream.item(state.processed);
 }
 
-/// Throws `Error` unless all `nodes` are leaves and none occurs twice.
+/// Throws `Error` unless all `nodes` are indices of leaves and no index occurs twice.
 void requireLeaves(const CheckedReader& reader, const BuildTree& tree, std::span<const std::uint32_t> nodes) {
   std::vector<bool> isNamed(tree.nodes.size());
   for (const std::uint32_t n : nodes) {

@@ -17,24 +17,26 @@ namespace hpsdf::detail {
 
 class CheckpointFile {
  public:
-  /// Throws `Error` where the file cannot be written.
+  /// Prepares the file of a construction. Throws `Error` if the file cannot be written.
   CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
                  const BuildOptions& options);
 
-  /// Returns a reader at the beginning of the stored state, if there is one. Throws `Error` if the state belongs to
-  /// another construction.
+  /// Returns a reader at the beginning of the saved state, or std::nullopt if no state is saved. Throws `Error`
+  /// if the state belongs to another construction.
   std::optional<CheckedReader> open() const;
 
-  /// Tells whether enough time has passed since the construction began or the last state was kept.
+  /// Returns true if it is time to save again: if enough time has passed since the construction began or last
+  /// saved its state.
   bool isDue() const;
 
-  /// Writes the state. Errors go to `Checkpoint::failed` if there is one.
+  /// Saves the state to the file. Reports errors to `Checkpoint::failed` if that callback is set.
   void keep(const std::function<void(CheckedWriter&)>& writeState);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Digests in which a state must agree with the construction that continues it.
+  /// Digests of a construction's inputs. A saved state may only be continued by a construction with equal
+  /// digests.
   struct Identity {
     std::string program;  ///< version of the program
     std::uint64_t surface = 0;
@@ -49,11 +51,12 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
-/// Writes the state, which stays as it is, and the number of evaluations of Φ.
+/// Writes the construction state, which does not change, and the number of evaluations of Φ.
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
-/// Reads what `save` wrote into `state`, whose domain and grid are set already. Throws `Error` unless a construction
-/// with these options could have left this state. Returns the number of evaluations of Φ.
+/// Reads into `state` what `save` wrote. The domain and the grid of `state` must already be set. Throws `Error`
+/// unless a construction with these options could have saved such a state. Returns the number of evaluations of
+/// Φ.
 std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
                       const ByteBudget& budget);
 

@@ -17,11 +17,13 @@ namespace {
 
 using Stage = ConstructionState::Stage;
 
-/// Extrapolates the decay of the error over the work (evaluations of Φ). They are assumed to follow a power law,
-/// whose exponent is measured over the last decade of the error.
+/// Estimates the progress of the growth from the decay of the error with the work, which is the number of
+/// evaluations of Φ. The error is assumed to follow a power law of the work, with the exponent measured over
+/// the last decade of the error.
 class GrowthProgress {
  public:
-  /// Records a state and returns the fraction done, which never falls; 1 once the error is at the target.
+  /// Records the present work and error. Returns the fraction of the work that is done, which never decreases and
+  /// is 1 once the error reaches the target.
   double update(double work, double error, double target) {
     if (error <= target) return 1;
     if (history_.empty() || error < 0.8 * history_.back().error) history_.push_back({work, error});
@@ -33,9 +35,9 @@ class GrowthProgress {
     return fraction_;
   }
 
-  /// Returns a lower bound of the final work divided by the present work. It assumes that from now on the error falls
-  /// exponentially with the work, at its present rate, which is faster than a power law. It is 1 until the error has
-  /// fallen by a decade, because less does not suffice for an estimate.
+  /// Returns a lower bound of the final work divided by the present work. The bound assumes that the error falls
+  /// exponentially with further work, at its present rate, which is faster than a power law. Returns 1 until the
+  /// error has fallen by a decade, because less data does not suffice for an estimate.
   double leastFactor(double work, double error, double target) const {
     if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
     const Sample& past = latestAbove(3, error);
@@ -59,14 +61,15 @@ class GrowthProgress {
   double fraction_ = 0;
 };
 
-/// The queue is served in rounds: refinements of a round are tried in parallel and applied in the order of the queue,
-/// so that the result does not depend on the number of threads.
+/// Grows the octree by refining the leaves of a priority queue in rounds. The refinements of a round are tried
+/// in parallel but applied in the order of the queue, so that the result does not depend on the number of
+/// threads.
 class Growth {
  public:
   explicit Growth(Refiner& refiner)
       : setup_(refiner.setup), fitter_(refiner.fitter), state_(refiner.state), refiner_(refiner) {
     if (state_.stage != Stage::refine) return;
-    // A restored state has no queue; it is rebuilt from the leaves.
+    // Rebuild the queue from the leaves, because a restored state does not contain the queue.
     std::vector<bool> isDeferred(state_.tree.nodes.size());
     for (const std::uint32_t leaf : state_.deferred) isDeferred[leaf] = true;
     for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
@@ -86,7 +89,8 @@ class Growth {
     bool operator<(const Entry& other) const { return std::pair(error, other.node) < std::pair(other.error, node); }
   };
 
-  /// Returns false if the growth ended early, for instance by the limit of steps or bytes.
+  /// Returns true if the errors have reached the goal of the growth. If this is false at the end, the growth
+  /// ended early, for instance by the limit of steps or bytes.
   bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals); }
 
   void fitBaseCells() {
@@ -121,8 +125,8 @@ class Growth {
     setup_.budget.requireRoomForBaseGrid(refiner_.bytes(), least);
   }
 
-  /// Chooses θ such that the weight of a cell at the mean distance of the far cells is the ratio of the squared errors
-  /// asked for, near to far.
+  /// Chooses the exponent θ of the nearness weight. With it, a cell at the mean distance of the far cells has a
+  /// weight equal to the ratio of the squared error goals, near to far.
   void chooseNearness() {
     double distance = 0, volume = 0;
     for (const BuildNode& node : state_.tree.nodes) {
@@ -139,14 +143,15 @@ class Growth {
       node.fit.error.weighted = nearness.weight(node.fit.coefficients[0]) * node.fit.error.squared;
   }
 
-  /// Returns false if the maximum error alone decides what is refined. Refinement by the errors of cells would then
-  /// leave no bytes for it.
+  /// Returns false if the goal of the construction is a maximum error alone. Refinement by the integrated errors
+  /// of cells would then leave no bytes for the refinement by the maximum error.
   bool growsByErrors() const { return !setup_.options.targetError.isNone() || !(setup_.options.maxError > 0); }
 
   void refineWorstCells() {
     while (!reachedGoal() && refiner_.mayStep() && (!queue_.empty() || enqueueDeferred())) {
       refineRound();
-      // Rounding errors of the running total must neither end the construction early nor keep it from ending.
+      // Sum the errors exactly where rounding errors of the running total could end the construction too early or
+      // keep it from ending.
       if (reachedGoal() || state_.totals.weighted < 1e-6 * state_.lastSum) refiner_.sumTotals();
       refiner_.observer.atWholeState();
     }
@@ -165,7 +170,8 @@ class Growth {
     }
   }
 
-  /// Takes the leaves of a round from the queue, and defers those whose kind, near or far, has reached its goal.
+  /// Takes the leaves of one round from the queue. Defers near leaves if the near error has reached its goal, and
+  /// far leaves if the far error has.
   std::vector<std::uint32_t> worstLeaves() {
     constexpr std::size_t kRound = 32;  // few enough to stay close to the paper's order, which refines cells one by one
     std::vector<std::uint32_t> worst;
@@ -177,7 +183,8 @@ class Growth {
     return worst;
   }
 
-  /// Tries leaves in parallel, the most expensive first, so that no thread begins a long trial while others are done.
+  /// Computes the trial refinements of leaves in parallel. The most expensive leaves come first, so that no
+  /// thread begins a long trial when the other threads are already done.
   std::vector<Trial> tryAll(const std::vector<std::uint32_t>& leaves) const {
     const auto node = [&](std::size_t n) -> const BuildNode& { return state_.tree.nodes[leaves[n]]; };
     std::vector<std::size_t> order(leaves.size());
@@ -205,13 +212,15 @@ class Growth {
     for (std::uint32_t child = first; child < first + 8; ++child) enqueue(child);
   }
 
-  /// Tells whether the cell's kind, near or far, has reached its goal.
+  /// Returns true if the error of all near cells, for a near cell, or of all far cells, for a far cell, has
+  /// reached its goal.
   bool isExactEnough(const CellError& cell) const {
     const ErrorGoal& goal = setup_.growthGoal;
     return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
   }
 
-  /// Enqueues the deferred leaves whose kind does not meet its goal any longer. Returns false if the queue stays empty.
+  /// Moves deferred leaves back to the queue: near leaves if the near error no longer meets its goal, far leaves
+  /// if the far error does not. Returns false if the queue stays empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))

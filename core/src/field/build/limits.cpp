@@ -13,13 +13,13 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Bytes that the construction may take.
+/// Returns the number of bytes of memory that a construction may take.
 double allowedMemory(const BuildOptions& options) {
   const double most = hpsdf::allowedMemory();
   return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
-/// A rounded number of cells, for messages.
+/// Returns a rounded number of cells as text for messages.
 std::string cellsText(double cells) {
   constexpr double kFew = 1e4;
   std::ostringstream text;
@@ -28,11 +28,12 @@ std::string cellsText(double cells) {
   return text.str();
 }
 
-// Memory of a leaf's node, its queue entry, the vector of its fit and the final arrays.
+// Bytes of memory for a node of the octree: the node itself, its queue entry, the vector of its fit, and its
+// part of the final arrays.
 constexpr double kBytesPerNode = 250;
 constexpr double kBytesPerCoefficient = 8;
 
-/// τ in units^5.
+/// Returns the target error τ converted to units^5.
 double scaledTarget(double weighted, double referenceLength) {
   if (weighted == 0) return 0;
   const double target = weighted * std::pow(referenceLength / 2, 5);
@@ -65,7 +66,7 @@ bool hasEnd(const BuildOptions& options) {
   });
 }
 
-/// Throws `Error` if the settings of when the construction ends contradict each other.
+/// Throws `Error` if the settings that determine when the construction ends contradict each other.
 void checkEnds(const BuildOptions& options) {
   const NearFarError byDistance = options.targetError.byDistance();
   if ((byDistance.near > 0) != (byDistance.far > 0)) refuse("near error and far error belong together: give both");
@@ -88,8 +89,9 @@ void checkEnds(const BuildOptions& options) {
     refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
 }
 
-/// Returns the part of the limit that remains without the lookup grid. The grid has one entry for each base cell, or
-/// takes a sixteenth of the bytes of nodes and coefficients if that is more; blending adds half an entry to each.
+/// Returns the part of the byte limit that remains without the lookup grid. The grid has one entry for each
+/// base cell, or takes a sixteenth of the bytes of nodes and coefficients if that is more. Blending makes each
+/// entry half as large again.
 double limitWithoutLookup(const BuildOptions& options) {
   if (!options.maxBytes) return HUGE_VAL;
   const auto limit = double(*options.maxBytes);
@@ -165,8 +167,8 @@ double ByteBudget::nodeBytes() const {
 }
 
 double ByteBudget::growthLimit() const {
-  // Pruning needs refinements to choose from, so that the growth may exceed the limit. The factor was measured like
-  // `kGrowth` in limits.h.
+  // During the growth the field may exceed the byte limit by this factor, because pruning needs refinements to
+  // choose from. The factor was measured in the same way as `kGrowth` in limits.h.
   constexpr double kByteGrowth = 1.6;
   return options_.criterion == Criterion::optimal ? limit_ * kByteGrowth : limit_;
 }

@@ -17,13 +17,14 @@ namespace {
 
 constexpr int kAcross = 8;
 
-/// The probes of a cell: a lattice of 8 × 8 × 8 points from corner to corner.
+/// The probes of a cell: a lattice of 8 × 8 × 8 points from the lower to the upper corner of the cell.
 struct Probes {
   std::vector<std::array<int, 3>> index;  ///< position in the lattice
   std::vector<Vector3> local;             ///< the points in local coordinates
 };
 
-/// Returns the lattice block by block, because exact distances are fastest for eight neighbouring points.
+/// Returns the lattice of probes. Its points are ordered in compact blocks, because exact distances are fastest
+/// for eight neighbouring points.
 const Probes& probes() {
   static const Probes all = [] {
     constexpr int kBlocks = kAcross / 2;  // number of blocks of eight neighbours along an axis
@@ -41,9 +42,9 @@ const Probes& probes() {
   return all;
 }
 
-/// The greatest |f − Φ| at the probes, plus half of its greatest step between two neighbouring probes: the error is
-/// assumed to rise no faster between probes than from probe to probe. `exact` holds Φ at the probes; probes with |Φ|
-/// above `farthest` do not count.
+/// Returns the greatest error |f − Φ| at the probes, plus half of the greatest difference of this error between
+/// two neighbouring probes. The error is assumed to rise no faster between probes than from probe to probe.
+/// `exact` holds Φ at the probes. Probes with |Φ| above `farthest` do not count.
 double worstError(const Fit& fit, std::span<const double> exact, double farthest) {
   constexpr std::array<int, 3> kStride = {1, kAcross, kAcross * kAcross};
   std::array<double, kAcross * kAcross * kAcross> errors;
@@ -66,7 +67,8 @@ double worstError(const Fit& fit, std::span<const double> exact, double farthest
   return worst + step / 2;
 }
 
-/// The greatest distance of a point of a cell from the closest probe. `cellDiagonal` is the length of its diagonal.
+/// Returns the greatest distance from a point of a cell to its closest probe. `cellDiagonal` is the length of
+/// the cell's diagonal.
 double probeSpacing(double cellDiagonal) { return cellDiagonal / (2 * (kAcross - 1)); }
 
 class MaxErrorPass {
@@ -96,7 +98,8 @@ class MaxErrorPass {
   }
 
  private:
-  /// The result of probing one leaf: its greatest error or, where that is too great, a trial of its refinements.
+  /// The result of probing one leaf: its greatest error and, if that error is too great, a trial of its
+  /// refinements.
   struct Candidate {
     double worst = 0;  ///< |f − Φ|, see `worstError`
     std::optional<Trial> trial;
@@ -111,7 +114,8 @@ class MaxErrorPass {
     return candidates;
   }
 
-  /// Applies the candidate's refinement and appends the new leaves to those that wait to be probed.
+  /// Applies the refinement that was chosen for a leaf. Appends the refined leaf or its children to the leaves
+  /// that are still to be probed.
   void apply(std::uint32_t leaf, Candidate&& candidate) {
     if (!candidate.trial) {
       state_.measuredError = std::max(state_.measuredError, candidate.worst);
@@ -135,7 +139,7 @@ class MaxErrorPass {
     const bool mayRefine = refiner_.mayStep() && found;
     const Refinement allowed = found.value_or(Refinement::either);
 
-    // An RMS error above half the maximum makes probing superfluous.
+    // Skip the probes if the RMS error exceeds half of the maximum error; the leaf is then certainly refined.
     const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
     if (mayRefine && isSurelyBad) {
       candidate.trial = refiner_.attempt(leaf, allowed);
@@ -143,7 +147,8 @@ class MaxErrorPass {
       return candidate;
     }
 
-    // Probe the leaf. A probe that lies slightly outside the band represents the points around it within the band.
+    // Probe the leaf, that is, compare it with Φ at the lattice points. A probe slightly outside the narrow band
+    // represents the points around it that lie within the band.
     const Box box = state_.tree.boxOf(leaf);
     const std::vector<double> exact = fitter_.distances(box, probes().local);
     const double band = setup_.options.band;
@@ -152,7 +157,8 @@ class MaxErrorPass {
     candidate.worst = worstError(leaf.fit, exact, farthest);
     if (candidate.worst <= most || !mayRefine) return candidate;
 
-    // Raise the degree where that is enough, else decide by the paper's criterion.
+    // Try both refinements. Raise the degree if that makes the error small enough, else decide by the paper's
+    // criterion.
     candidate.trial = refiner_.attempt(leaf, allowed);
     const std::optional<Fit>& raised = candidate.trial->raised;
     candidate.raises =

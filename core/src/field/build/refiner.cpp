@@ -54,7 +54,7 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     return;
   }
 
-  // Replace the leaf's error by the errors of its refinement.
+  // Update the totals of the state: replace the leaf's coefficients and error by those of its refinement.
   state.coefficients += added;
   state.totals.add(tree.nodes[leaf].fit.error, -1);
   if (raises) {
@@ -76,8 +76,8 @@ void Refiner::sumTotals() {
 }
 
 void Refiner::requireMemory(double factor) const {
-  // If pruning follows, cached projections and internal nodes take about three times the memory of the leaves' own
-  // coefficients in addition.
+  // Estimate the memory. If pruning follows, cached projections and internal nodes need additional memory, about
+  // three times that of the coefficients of the leaves.
   const bool keepsAll = setup.options.criterion == Criterion::optimal;
   detail::requireMemory({.nodes = state.tree.nodes.size(),
                          .coefficients = keepsAll ? 4 * state.coefficients : state.coefficients,

@@ -1,5 +1,5 @@
 #pragma once
-// The state of a construction, the refinement of single leaves, and the two stages in which the octree grows.
+// The state of a construction, the refinement of single leaves, and the two stages that grow the octree.
 
 #include <cstdint>
 #include <functional>
@@ -13,7 +13,7 @@ namespace hpsdf::detail {
 
 /// The state of a construction: all that must be kept so that another process can continue it.
 struct ConstructionState {
-  /// The stage that comes next; all earlier stages are done.
+  /// The stage of a construction that runs next. All earlier stages are done.
   enum class Stage : std::uint8_t { fitBaseCells, refine, probe };
 
   Stage stage = Stage::fitBaseCells;
@@ -31,7 +31,7 @@ struct ConstructionState {
   std::size_t coefficients = 0;         ///< number of coefficients of the finished field; derived, not stored
 };
 
-/// The goal of a construction, and what all its stages share.
+/// The goal of a construction, and the settings and objects that all stages share.
 struct ConstructionSetup {
   const DistanceFunction& distance;
   const BuildOptions& options;
@@ -42,56 +42,59 @@ struct ConstructionSetup {
   const ByteBudget& budget;
 };
 
-/// Callbacks while the octree grows.
+/// Callbacks that are called while the octree grows.
 struct GrowthObserver {
-  /// Called with the number of steps: 0 once the base cells are fitted, then after each step. May be empty.
+  /// Called with the number of refinement steps: with 0 once the base cells are fitted, then after each step. May
+  /// be empty.
   std::function<void(std::uint64_t steps)> afterStep;
-  /// Called whenever the state is complete, so that it can be saved.
+  /// Called whenever the state of the construction is complete, so that it can be saved.
   std::function<void()> atWholeState;
 };
 
-/// Applies refinements to the octree of a state and keeps its sums up to date.
+/// Applies refinements to the octree of a construction's state. Keeps the error totals of the state up to date.
 struct Refiner {
   const ConstructionSetup& setup;
   const CellFitter& fitter;
   ConstructionState& state;
   const GrowthObserver& observer;
 
-  /// Returns the refinements that the limits of degree and depth allow for a leaf; nothing if they allow none.
+  /// Returns the refinements of a leaf that the limits of degree and depth allow, or std::nullopt if they allow
+  /// none.
   std::optional<Refinement> allowed(const BuildNode& leaf) const;
-  /// False once the limit of steps or bytes is reached.
+  /// Returns false once the limit of refinement steps or of bytes is reached.
   bool mayStep() const;
 
-  /// Tries the allowed refinements of a leaf. Thread-safe.
+  /// Computes the fits of a leaf's allowed refinements. Thread-safe.
   Trial attempt(const BuildNode& leaf, Refinement allowed) const {
     return fitter.attempt(state.tree.boxOf(leaf), leaf.fit, allowed);
   }
 
-  /// Raises the degree of a leaf or splits it, as `trial` did. If the limit of bytes forbids this, sets `isFull` of
-  /// the state instead.
+  /// Raises the degree of a leaf if `raises` is true, else splits the leaf. The new fits come from `trial`. If
+  /// the limit of bytes forbids the refinement, sets `isFull` of the state instead.
   void apply(std::uint32_t leaf, Trial&& trial, bool raises);
 
-  /// Sums the totals exactly.
+  /// Computes the error totals anew from all leaves, which removes the rounding errors of the running totals.
   void sumTotals();
-  /// Returns the bytes of the present field, as `ByteBudget` counts them.
+  /// Returns the bytes of the field as it would be made from the present octree, computed by `ByteBudget`.
   double bytes() const { return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)); }
-  /// Throws `Error` if the octree exceeds the allowed memory, or will exceed it after growing by `factor`.
+  /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `factor`.
   void requireMemory(double factor = 1) const;
 };
 
-/// The hp decision (paper, eqs. 7 to 9), with errors weighted by nearness: whether a higher degree reduces the error
-/// more for each coefficient than a split. A trial of one of the two leaves no choice.
+/// The hp decision (paper, eqs. 7 to 9), with errors weighted by nearness. Returns true if a higher degree
+/// reduces the error more per coefficient than a split does. If only one refinement was tried, the decision is
+/// for that one.
 bool prefersDegree(const Fit& current, const Trial& trial);
 
 ErrorTotals sumOfErrors(const BuildTree& tree);
 
-/// Fits the base cells and refines the leaves of greatest error until the goal is reached (paper, Algorithm 1), or
-/// goes on with that where the state was restored. The growth ends early where the limits of steps or bytes are
-/// reached.
+/// Fits the base cells, then refines the leaves with the greatest errors until the goal is reached (paper,
+/// Algorithm 1). Continues with the next step if the state was restored. Ends early if the limit of steps or
+/// bytes is reached.
 void growByErrors(Refiner& refiner);
 
-/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The state stores the
-/// greatest error that remains because of the limits.
+/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The limits may
+/// stop this early; the state then stores the greatest error that remains.
 void refineByProbes(Refiner& refiner);
 
 }  // namespace hpsdf::detail

@@ -1,5 +1,5 @@
 #pragma once
-// The octree while it grows, and its layout as the arrays of a field.
+// The octree of a construction, and its conversion to the arrays of a field.
 
 #include <array>
 #include <cstdint>
@@ -14,12 +14,13 @@ struct BuildNode {
   std::uint32_t firstChild = 0;  ///< 0: a leaf
   std::uint32_t depth = 0;
   std::array<std::uint32_t, 3> cellIndex{};  ///< in cells of its depth, from the domain's lower corner
-  /// The fit of a leaf. For an internal node it is the fit that the node would have as a leaf if pruning follows, and
-  /// otherwise empty.
+  /// The polynomial of a leaf with its error. An internal node has a fit only if pruning follows: the one that it
+  /// would have as a leaf. Otherwise the fit of an internal node is empty.
   Fit fit;
 };
 
-/// The base cells, x fastest, followed by groups of eight children.
+/// The octree of a construction. Its array of nodes holds the base cells, x fastest, followed by groups of
+/// eight children.
 struct BuildTree {
   Box domain;
   std::array<std::uint32_t, 3> grid{};
@@ -31,18 +32,19 @@ struct BuildTree {
   /// Adds the base cells, without fits, to an empty tree.
   void addBaseCells();
 
-  /// Sets depth and cell indices of the eight children of a node.
+  /// Sets the depths and the cell indices of the eight children of `parent`.
   void setChildIndices(std::uint32_t parent);
 
-  /// Adds eight children with their fits to a leaf, whose own fit is replaced by `own`.
+  /// Splits a leaf: adds eight children with the fits `children`, and replaces the leaf's own fit by `own`.
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 
-/// Lays out nodes and coefficients depth first, so that neighbours in space are neighbours in memory. The coefficients
-/// stay in double. Destroys the tree.
+/// Copies the nodes and coefficients into the arrays of a field, depth first, so that neighbours in space are
+/// neighbours in memory. The coefficients remain double. Destroys the tree.
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata);
 
-/// Rounds coefficients from double to the given type, and sets `roundingRms` and `measuredError` of the metadata.
+/// Rounds the coefficients of a field from double to `type`. Sets `roundingRms` and `measuredError` in the
+/// field's metadata.
 void roundCoefficients(CoefficientType type, FieldData& field);
 
 }  // namespace hpsdf::detail

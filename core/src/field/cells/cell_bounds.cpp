@@ -21,10 +21,10 @@
 namespace hpsdf::detail {
 namespace {
 
-// A bound of accumulated rounding errors, relative to the size of the numbers involved.
+// Upper bound of the accumulated rounding errors, relative to the magnitude of the numbers involved.
 constexpr double kRounding = 1e-12;
 
-/// A leaf's polynomial over one of its eighths, in local coordinates of that part.
+/// A leaf's polynomial over one of the eight octants of the leaf, in local coordinates of the octant.
 struct Part {
   Vector3 center, half;              ///< in the field's units
   double value = 0;                  ///< constant coefficient: the linear polynomial's value at the centre
@@ -40,19 +40,21 @@ std::size_t cubeIndex(int i, int j, int k, int degree) {
   return (std::size_t(i) * (degree + 1) + j) * (degree + 1) + k;
 }
 
-/// Transforms a polynomial's coefficients to a part's coordinates, one axis after another.
+/// Transforms the coefficients c of a leaf's polynomial to the coordinates of one part of the leaf, one axis at
+/// a time.
 std::vector<double> partCoefficients(std::vector<double> c, int degree,
                                      const std::array<const LegendreRows*, 3>& rows) {
   for (int axis = 0; axis < 3; ++axis) restrictToPart(c, degree, axis, *rows[axis]);
   return c;
 }
 
-/// Transformations to the lower and the upper half of an axis.
+/// Transformations of Legendre coefficients from the whole range of an axis to its lower and its upper half.
 struct Halves {
   LegendreRows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
-/// Adds a product of Legendre polynomials, for which |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
+/// Adds the term coefficient · L_i L_j L_k to the polynomial of a part. The bounds use |L_i| ≤ 1 and |L_i'| ≤
+/// i(i+1)/2 within [-1, 1].
 void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
   const int total = order[0] + order[1] + order[2];
   if (total == 0) part.value = coefficient;
@@ -72,7 +74,7 @@ void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
     part.products[std::ranges::find(order, 0) - order.begin()] = coefficient;
 }
 
-/// The polynomial over one eighth of a leaf (number x + 2y + 4z).
+/// Returns a leaf's polynomial over one octant of the leaf. The octant's number is x + 2y + 4z.
 Part partOf(const std::vector<double>& cube, int degree, const Box& box, int number, const Halves& halves) {
   std::array<const LegendreRows*, 3> rows;
   Part part;
@@ -92,9 +94,9 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
   return part;
 }
 
-/// Number of points at which Φ is evaluated to bound it over a part: the centre, and one point on either side of it
-/// along the polynomial's gradient, at the distance of an edge of the leaf. The farther away such a point y is, the
-/// more nearly its bounds Φ(y) ± |x − y| are linear over the part.
+/// Number of points at which Φ is evaluated to bound Φ over one part of a leaf: the part's centre and one point
+/// on either side of it, one leaf edge away along the polynomial's gradient. A point y gives the bounds Φ(y) ±
+/// |x − y|. The farther away y is, the more nearly these bounds are linear in x over the part.
 constexpr std::size_t kPointsPerPart = 3;
 constexpr double kSideDistance = 1;  // in edges; 0.7, 1.4 and 2 multiply bunny's median bound by 1.03, 1.2 and 2.1
 
@@ -111,16 +113,16 @@ std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain
   return partPoints;
 }
 
-/// Upper bounds of f + |x − y| and of |x − y| − f over a part.
+/// Upper bounds of f(x) + |x − y| and of |x − y| − f(x) over the points x of one part of a leaf.
 struct ConeBounds {
   double over, under;
 };
 
-/// Functions that are linear in each coordinate, or convex along each axis, are greatest at corners. Where the
-/// quadratic terms are more concave than |x − y| is convex, the maximum may exceed that of the corners by the height of
-/// a parabola.
+/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over a part. A function that is linear in each
+/// coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more concave than
+/// |x − y| is convex, the maximum may exceed the corner values by the height of a parabola.
 ConeBounds coneBounds(const Part& part, const Vector3& y) {
-  // Find the greatest values at the corners.
+  // Find the greatest values of f + |x − y| and |x − y| − f at the corners of the part.
   double over = -std::numeric_limits<double>::infinity(), under = over, farthest = 0;
   for (int corner = 0; corner < 8; ++corner) {
     std::array<double, 3> t;
@@ -135,7 +137,7 @@ ConeBounds coneBounds(const Part& part, const Vector3& y) {
     under = std::max(under, distance - value);
   }
 
-  // Add the heights of parabolas along the axes.
+  // Add the heights by which parabolas along the axes may exceed the corner values.
   const Vector3 offset = part.center - y;
   const double nearest = (offset.cwiseAbs() - part.half).cwiseMax(0.0).norm();
   for (int axis = 0; axis < 3; ++axis) {
@@ -149,7 +151,8 @@ ConeBounds coneBounds(const Part& part, const Vector3& y) {
   return {over, under};
 }
 
-/// An upper bound of |f − Φ| over the part: for every point y, Φ(x) lies between Φ(y) − |x − y| and Φ(y) + |x − y|.
+/// Returns an upper bound of |f − Φ| over a part. For every point y, Φ(x) lies between Φ(y) − |x − y| and Φ(y)
+/// + |x − y|.
 double errorBound(const Part& part, std::span<const Vector3> partPoints, std::span<const double> distances) {
   double above = std::numeric_limits<double>::infinity(), below = above;  // bounds of f − Φ and of Φ − f
   for (std::size_t p = 0; p < partPoints.size(); ++p) {
@@ -165,7 +168,8 @@ float roundedUp(double number) {
   return double(nearest) >= number ? nearest : std::nextafter(nearest, std::numeric_limits<float>::infinity());
 }
 
-/// A leaf's coefficients as a cube of (degree + 1)³ numbers, for a degree that is at least its own.
+/// Returns the coefficients of a leaf as a cube of (degree + 1)³ numbers. `degree` is at least the leaf's
+/// degree.
 std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
   const std::uint64_t bits = field.nodes[leaf];
   std::vector<double> cube(cubeIndex(degree, degree, degree, degree) + 1, 0.0);
@@ -179,7 +183,7 @@ std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degre
   return cube;
 }
 
-/// Bounds single leaves by their own polynomials, without blending.
+/// Computes the bounds of each leaf from the leaf's own polynomial, without regard to blending.
 class BoundFinder {
  public:
   BoundFinder(const FieldData& field, const DistanceFunction& distance)
@@ -225,7 +229,7 @@ class BoundFinder {
   Halves halves_;
 };
 
-/// Upper bounds of the difference of two polynomials.
+/// Upper bounds of the differences between two polynomials and between their gradients.
 struct Disagreement {
   double value = 0, slope = 0;
 
@@ -235,8 +239,9 @@ struct Disagreement {
   }
 };
 
-/// Bounds the difference of the polynomials of two touching leaves where both have a weight: on either side of their
-/// interface, at most as far as the smaller leaf's edge times the blend width.
+/// Bounds the difference between the polynomials of two touching leaves in the zone where both leaves have a
+/// blending weight. The zone extends on either side of their interface by the edge of the smaller leaf times
+/// the blend width.
 Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small,
                                 const query::OctreeNode& large) {
   const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
@@ -246,7 +251,8 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
   for (int axis = 0; axis < 3; ++axis) {  // lengths are in edges of the small cell
     const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
     const std::int64_t width = std::int64_t{1} << levels, wall = std::int64_t{field.grid[axis]} << small.depth;
-    // Positions are relative to the small cell's lower side, so that they stay exact far from the domain's corner.
+    // Compute the extent of the zone relative to the small leaf's lower corner. Such positions stay exact far from
+    // the domain's corner.
     const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
     const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
     const double from = std::max(low - field.blend, static_cast<double>(-smallAt));
@@ -275,8 +281,9 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
   return disagreement;
 }
 
-/// Calls f(neighbour) for each leaf that touches `leaf` and is larger, or of its size and later in the octree. So each
-/// pair of touching leaves is visited once, although a larger leaf may lie in several directions.
+/// Calls f(neighbour) for each leaf that touches `leaf` and is larger, or is of equal size and comes later in
+/// the octree. Each pair of touching leaves is visited only once, even if a larger leaf touches `leaf` in
+/// several directions.
 template <typename F>
 void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F& f) {
   std::array<std::uint32_t, 26> seen;
@@ -289,7 +296,8 @@ void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F&
   });
 }
 
-/// Returns for each node the depth of the deepest leaf among a leaf's neighbours and their neighbours.
+/// Returns one depth for each node. For a leaf, it is the depth of the deepest leaf among its neighbours and
+/// the neighbours of these neighbours.
 std::vector<int> deepestAround(const FieldData& field, const std::vector<query::OctreeNode>& leaves) {
   std::vector<int> deepest(field.nodes.size(), 0);
   for (const query::OctreeNode& leaf : leaves) deepest[leaf.node] = leaf.depth;
@@ -308,9 +316,10 @@ constexpr std::size_t kLeavesPerStep = 4096;
 
 void report(const Progress& progress, double fraction) { progress.update("finding bounds", fraction); }
 
-/// Widens the bounds of blended leaves. In a blended leaf f = f₀ + Σ vₙ (fₙ − f₀), where f₀ is its own polynomial, fₙ
-/// are those of touching leaves, and the weights vₙ sum to at most 1. The error grows by the greatest |fₙ − f₀| in the
-/// blend zones; the slope by the greatest difference of gradients, and by |fₙ − f₀| times the slope of the weights.
+/// Widens the bounds of leaves to include blending. In a blended leaf f = f₀ + Σ vₙ (fₙ − f₀). Here f₀ is the
+/// leaf's own polynomial, the fₙ are the polynomials of touching leaves, and the weights vₙ sum to at most 1.
+/// The error bound grows by the greatest |fₙ − f₀| in the blend zones. The slope bound grows by the greatest
+/// difference of gradients and by |fₙ − f₀| times the slope of the weights.
 void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& leaves, const Progress& progress) {
   std::vector<Disagreement> disagreement(field.nodes.size());
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
@@ -332,10 +341,12 @@ void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& le
         disagreement[pair.node].widen(pair.disagreement);
       }
   }
-  // The blend extent of a neighbour follows from the smallest of its own neighbours.
+  // Find the deepest leaf around each leaf. The neighbours of a neighbour determine the blend extent of the
+  // neighbour.
   const std::vector<int> deepest = deepestAround(field, leaves);
-  // Bound the slope of the weights: Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over at most eight leaves, one of which has a weight
-  // of at least 1/8. A weight is a product of three ramps with slopes of at most 3/4 over the blend extent.
+  // Bound the slope of the normalized weights: Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over at most eight leaves, of which
+  // at least one has a weight of 1/8 or more. A weight is a product of three ramps, and the slope of a ramp is at
+  // most 3/4 over the blend extent.
   constexpr double kSlopes = 2 * 8 * 8 * 1.7320508075688773 * 0.75;
   const double rounding = kRounding * field.domain.diagonal().norm();
   for (const query::OctreeNode& leaf : leaves) {

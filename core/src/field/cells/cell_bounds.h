@@ -1,6 +1,6 @@
 #pragma once
 
-// Proven bounds of the error and the slope of each leaf.
+// Proven upper bounds of the error and of the slope of the field in each leaf.
 
 #include <cstdint>
 
@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Sets `field.bounds` to proven bounds of each leaf, see `withBounds`. Uses the threads of the calling TBB arena.
-/// Returns the number of evaluations of Φ.
+/// Computes proven bounds of each leaf and stores them in `field.bounds`; see `withBounds`. Uses the threads of
+/// the calling TBB arena. Returns the number of evaluations of Φ.
 std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, const Progress& progress);
 
 }  // namespace hpsdf::detail

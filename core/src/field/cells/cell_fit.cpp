@@ -13,7 +13,7 @@ namespace {
 /// Points of one call of Φ: enough to amortise the call, few enough to notice a cancellation soon.
 constexpr std::size_t kBatch = 512;
 
-/// The projection of cells of degree p. Its points suffice for degree p+1 as well.
+/// Returns the projection for cells of the given degree p. It has enough sample points for degree p+1 as well.
 std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options) {
   const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
   if (options.cubature == CubatureKind::compact)
@@ -21,10 +21,12 @@ std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildO
   return basis::productProjection(basis::gaussLegendre(order / 2 + 1), degree + 1);
 }
 
-/// Points that the exact distance searches as one packet: it is fastest when they lie close to each other.
+/// Number of points that the exact distance searches as one packet. The search is fastest if these points lie
+/// close to each other.
 constexpr std::size_t kGroup = 8;
 
-/// Orders point indices into compact groups by halving them recursively across their widest extent.
+/// Sorts the point indices in `order` into compact groups. It halves the set of points recursively across its
+/// widest extent.
 void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& points) {
   if (order.size() <= kGroup) return;
   Box box;
@@ -37,8 +39,8 @@ void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& poin
   intoGroups(order.subspan(middle), points);
 }
 
-/// Returns the order of points in compact groups. It is empty, for the given order, if there are so many points that
-/// eight consecutive ones lie close to each other anyway.
+/// Returns the indices of the points, sorted into compact groups. Returns an empty list if the given order is
+/// good enough: with very many points, eight consecutive ones lie close to each other anyway.
 std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
   constexpr std::size_t kMost = 8 * 1000;
   if (points.size() > kMost) return {};
@@ -133,14 +135,14 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
   const double residual = std::max(meanSquare - represented, 0.0);
   if (options_.estimator == Estimator::residual) return residual;
 
-  // If Φ is even or odd about the cell's centre, the coefficients of every other total degree vanish, and the
-  // embedded estimate may vanish too. The residual ∫Φ² − Σc² then replaces it, but only if it is far greater, so that
-  // everywhere else the paper's estimate decides.
+  // Compute the embedded error estimate. If Φ is even or odd about the cell's centre, the coefficients of every
+  // other total degree vanish, and the embedded estimate may vanish too. The residual ∫Φ² − Σc² then replaces it,
+  // but only if the residual is far greater, so that the paper's estimate decides everywhere else.
   const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
   return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
 }
 
-/// Sets the fit's error from the squared error per volume.
+/// Sets the error of a fit from `squared`, the squared error per volume.
 void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
   const double mean = fit.coefficients[0];  // the constant coefficient is the mean
   if (fit.outsideBand) return;

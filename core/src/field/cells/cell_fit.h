@@ -1,5 +1,5 @@
 #pragma once
-// The fit of a polynomial to the exact distance in one cell, and the trials of its refinements.
+// Fits of polynomials to the exact distance in single cells, and trials of the refinements of a cell.
 
 #include <array>
 #include <atomic>
@@ -17,10 +17,10 @@
 
 namespace hpsdf::detail {
 
-/// Throws `Error` with the first point at which the distance is not finite.
+/// Throws `Error` if a distance is not finite. The message names the first such point.
 void requireFinite(std::span<const Vector3> points, std::span<const double> distances);
 
-/// The projection of a cell's samples onto the highest degree for which they suffice.
+/// The projection of a cell's samples onto the highest polynomial degree for which the samples suffice.
 struct CachedProjection {
   std::vector<double> coefficients;
   int degree = 0;
@@ -36,7 +36,8 @@ struct Fit {
   CachedProjection cached;  ///< of at least the fit's degree; kept for pruning
 };
 
-/// The fits of a cell's two refinements.
+/// The fits that result from the two possible refinements of a cell: a higher degree, or a split into eight
+/// children.
 struct Trial {
   std::optional<Fit> raised;                   ///< the same cell one degree higher
   std::optional<std::array<Fit, 8>> children;  ///< its eight children at its own degree
@@ -47,8 +48,9 @@ enum class Refinement : std::uint8_t { degree, octree, either };
 /// Samples Φ and fits polynomials. Thread-safe: cells are fitted in parallel.
 class CellFitter {
  public:
-  /// Keeps references to its arguments. `nearness` may change between two fits. A cell counts as near the surface if
-  /// the mean of its field is at most `nearDistance` plus half of the cell's diagonal, in absolute value.
+  /// Keeps references to its arguments. `nearness` may be changed between two fits. A cell counts as near the
+  /// surface if the absolute value of its field's mean is at most `nearDistance` plus half of the cell's
+  /// diagonal.
   CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
              double nearDistance, const Progress& progress);
 
@@ -57,18 +59,18 @@ class CellFitter {
   /// Fits the allowed refinements of a cell whose fit is `current`.
   Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
 
-  /// Φ at points given by local coordinates.
+  /// Returns Φ at points that are given by local coordinates of a cell.
   std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const {
     return sample({&cell, 1}, local, {});
   }
 
   /// Number of evaluations of Φ so far.
   std::uint64_t evaluations() const { return evaluations_; }
-  /// Sets the number of evaluations to that of a restored construction.
+  /// Sets the number of evaluations of Φ, to continue that of a restored construction.
   void setEvaluations(std::uint64_t evaluations) { evaluations_ = evaluations; }
 
  private:
-  /// The quadrature of all cells of one degree p.
+  /// The projection and the sampling orders for all cells of one degree p.
   struct Rules {
     std::unique_ptr<const basis::Projection>
         projection;                           ///< onto degree p+1, which contains the projection onto degree p
@@ -77,12 +79,12 @@ class CellFitter {
   };
 
   const Rules& rules(int degree) const;
-  /// Returns Φ at the same points, given by local coordinates, of one cell after another. Φ is evaluated in the given
-  /// order; none: as the points come.
+  /// Returns Φ at the same local points of several cells, one cell after another. Φ is evaluated in the order
+  /// `order`; if `order` is empty, in the order of the points.
   std::vector<double> sample(std::span<const Box> cells, std::span<const Vector3> local,
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;
-  /// Makes a fit of lower degree from the projection of the samples.
+  /// Makes a fit of the given degree by cutting off the higher degrees of a projection of samples.
   Fit makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand) const;
   double squaredError(const Fit& fit, double meanSquare) const;
   void rate(Fit& fit, double squared, const Box& cell) const;

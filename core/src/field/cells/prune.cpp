@@ -16,7 +16,8 @@ namespace {
 constexpr std::uint8_t kSplit = 0xff;  ///< value in place of a degree for a node that stays split
 constexpr int kHalvings = 60;          // halvings of the range of log λ, down to the last bits of λ
 
-/// Squared errors of a node by degree, up to the degree of its cached projection.
+/// Returns the squared errors that a node has as a leaf of degree 0, 1, … up to the degree of its cached
+/// projection.
 std::vector<double> squaredErrors(const Fit& fit) {
   std::vector<double> left(fit.cached.degree + 1, 0.0);
   basis::forEachCoefficient(fit.cached.degree, [&](int i, int j, int k, int index) {
@@ -47,7 +48,8 @@ class Pruning {
   }
 
   void run() {
-    // The error grows with λ, the bytes fall: the greatest λ that keeps the goal, or the least that keeps the bytes.
+    // Choose λ. With a greater λ the error grows and the bytes fall. Take the greatest λ that keeps the error goal
+    // or, if greater, the least λ that keeps the limit of bytes.
     double lambda = bracket([&](const Totals& sum) { return limits_.goal.reached(sum.errors); }).first;
     if (limits_.mostBytes)
       lambda = std::max(lambda, bracket([&](const Totals& sum) { return sum.bytes > *limits_.mostBytes; }).second);
@@ -68,8 +70,8 @@ class Pruning {
     return error;
   }
 
-  /// Chooses for each node its best degree as a leaf, or to stay split, for this λ. It works from the leaves up: in
-  /// the array, children come after their parents.
+  /// Chooses for each node, for this λ, whether it stays split or which degree it gets as a leaf. Works from the
+  /// leaves up: in the array of nodes, children come after their parents.
   void choose(double lambda) {
     std::vector<double> cost(tree_.nodes.size());
     for (std::size_t n = tree_.nodes.size(); n-- > 0;) {
@@ -84,11 +86,12 @@ class Pruning {
     }
   }
 
-  /// Chooses the best degree of a node as a leaf, and returns its cost.
+  /// Chooses the best degree of node n as a leaf, and returns the cost of the node with this degree.
   double chooseDegree(std::size_t n, double lambda) {
     const Fit& fit = tree_.nodes[n].fit;
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
-    // Outside of the narrow band no error counts, so that pruning would lower every degree to the least.
+    // Keep the degree of a cell outside the narrow band. No error counts there, so that pruning would lower the
+    // degree to the lowest one.
     const int low = fit.outsideBand ? fit.degree : std::min(limits_.leastDegree, top);
     double least = HUGE_VAL;
     for (int degree = low; degree <= top; ++degree) {
@@ -120,8 +123,9 @@ class Pruning {
     return sum;
   }
 
-  /// Two neighbouring values of λ, in squared error per byte, between which `isBelow(totals)` of their trees becomes
-  /// false; the ends of the range of λ where it does not.
+  /// Returns two neighbouring values of λ, in squared error per byte: isBelow(totals of the pruned tree) is true
+  /// for the lower λ and false for the upper one. If it never changes, both values are at one end of the range of
+  /// λ.
   template <typename IsBelow>
   std::pair<double, double> bracket(const IsBelow& isBelow) {
     double high = 0;
@@ -135,7 +139,7 @@ class Pruning {
     return {low, high};
   }
 
-  /// Replaces the tree by the chosen one.
+  /// Replaces the tree by the pruned tree that was chosen.
   void cut() {
     BuildTree kept;
     kept.domain = tree_.domain;

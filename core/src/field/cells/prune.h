@@ -1,5 +1,6 @@
 #pragma once
-// Pruning takes back refinements, first those that save the most bytes for the error that this adds.
+// Pruning of the octree. It undoes refinements, first those that save the most bytes for the error that undoing
+// them adds.
 
 #include <array>
 #include <optional>
@@ -18,10 +19,10 @@ struct PruneLimits {
   int mostDegree = kMaxDegree;
 };
 
-/// Turns internal nodes into leaves and lowers degrees. Of all trees that this can yield, the one with the least
-/// error + λ·bytes is taken, as in the pruning of trees in classification and source coding (Breiman et al. 1984;
-/// Chou, Lookabaugh, Gray 1989), with the greatest λ that keeps the goal. The error of a node at a degree is the
-/// residual ∫Φ² − Σc² of its samples, so that every node needs its `Fit::cached`.
+/// Prunes a tree: turns internal nodes into leaves and lowers degrees. Of all possible results it takes the one
+/// with the least error + λ·bytes, as the pruning of trees in classification and source coding does (Breiman et
+/// al. 1984; Chou, Lookabaugh, Gray 1989). λ is the greatest that keeps the goal. The error of a node at a
+/// degree is the residual ∫Φ² − Σc² of its samples, so that every node needs its `Fit::cached`.
 void prune(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits);
 
 }  // namespace hpsdf::detail

@@ -50,7 +50,7 @@ class ConjugateGradients {
     for (double& r : residual_) r = -r;
   }
 
-  /// Returns d. Throws `Error` if the iterations do not reach the tolerance.
+  /// Returns the solution d. Throws `Error` if the iteration does not reach the tolerance.
   std::vector<double> solve(double squaredNormOfX0, const Progress& progress) {
     const double first = squaredNorm(residual_);
     if (first <= kRounding * kRounding * squaredNormOfX0) return std::move(change_);  // The field is continuous.
@@ -78,10 +78,10 @@ class ConjugateGradients {
   WeakContinuityFigures figures;
 
  private:
-  /// Residuals below this part of |x₀| are rounding errors.
+  /// Residuals smaller than this fraction of |x₀| are rounding errors.
   static constexpr double kRounding = 1e-13;
 
-  /// Sums over the squares of the residual.
+  /// Sums of the squared components of the residual, without and with the preconditioner as weights.
   struct ResidualSquares {
     double sum = 0;
     double weighted = 0;  ///< sum with the preconditioner as weights
@@ -92,7 +92,7 @@ class ConjugateGradients {
     }
   };
 
-  /// Moves the solution along the direction and updates the residual.
+  /// Moves the solution by `length` along the search direction. Updates the residual and returns its squares.
   ResidualSquares step(double length) {
     const auto move = [&](ResidualSquares& squares, std::size_t first, std::size_t count) {
       for (std::size_t i = first; i < first + count; ++i) {
@@ -119,7 +119,8 @@ class ConjugateGradients {
   std::vector<double> change_, residual_, direction_, product_;
 };
 
-/// Returns Σ κ_e ‖f − f₀‖² over the cells that count towards ε, in the field's units^5.
+/// Returns Σ κ_e ‖f − f₀‖² in the field's units^5. The sum runs over the cells e that count towards the error
+/// ε.
 double weightedChange(const FieldData& field, std::span<const double> x0, std::span<const double> change) {
   const BuildOptions& settings = field.metadata.settings;
   const double volume = field.domain.sizes().prod();

@@ -6,14 +6,15 @@
 
 namespace hpsdf::continuity {
 
-/// The figures of `WeaklyContinuous`.
+/// The figures that `WeaklyContinuous` reports besides the field.
 struct WeakContinuityFigures {
   int iterations = 0;
   double residual = 0;
   double change = 0;
 };
 
-/// Does what `weaklyContinuous` does to a field with coefficients in double, on the caller's TBB threads.
+/// Does the same as `weaklyContinuous`, but in place, for a field whose coefficients are double. Runs on the
+/// caller's TBB threads.
 WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuity& options, const Progress& progress);
 
 }  // namespace hpsdf::continuity

@@ -19,12 +19,12 @@ constexpr std::size_t kLeavesPerTask = 256;
 
 /// Returns the number of coefficients of a polynomial of total degree p on a face.
 constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
-/// Returns the index of the product of degrees a and b among the coefficients on a face.
+/// Returns the index, among the coefficients on a face, of the product of the polynomials of degrees a and b.
 constexpr std::size_t faceIndex(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
 constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 
-/// Restricts polynomials on a face to quarters of it. `share_[half][i][a]` is the coefficient of the orthonormal
-/// polynomial a of the half in the orthonormal polynomial i of the whole axis.
+/// Restricts a polynomial on a face to a quarter of the face. `share_[half][i][a]` is the coefficient of
+/// orthonormal polynomial a on the half axis in the expansion of orthonormal polynomial i of the whole axis.
 class QuarterRestriction {
  public:
   QuarterRestriction() {
@@ -35,8 +35,8 @@ class QuarterRestriction {
           share_[half][i][a] = 2 * std::sqrt((2 * a + 1.0) / (2 * i + 1)) * shares[half][i][a];
   }
 
-  /// Restricts a face's polynomial to a quarter in place. Bit 0 and 1 of `quarter`: upper half of the first and of the
-  /// second axis.
+  /// Replaces the polynomial on a face by its restriction to a quarter of the face. Bit 0 of `quarter` selects
+  /// the upper half of the first axis, bit 1 that of the second axis.
   template <typename Degree>
   void apply(double* face, Degree degree, int quarter) const {
     for (int along = 0; along < 2; ++along) {
@@ -73,7 +73,8 @@ class QuarterRestriction {
 
 const QuarterRestriction quarterRestriction;
 
-/// `FaceCoupling::Trace` for a degree and an axis that are known at compile time, which gives unrolled code.
+/// Does the same as `FaceCoupling::Trace`, for a degree and an axis that are known at compile time. The
+/// compiler unrolls its loops.
 template <int P, int Axis>
 struct KnownTrace {
   static constexpr int kCount = coefficientCount(P);
@@ -94,7 +95,8 @@ struct KnownTrace {
     return entries;
   }();
 
-  /// Restricts a leaf's coefficients x to its face. `ends` holds the orthonormal polynomials at the face.
+  /// Computes the coefficients on a face from the leaf's coefficients x. `ends` holds the values of the
+  /// orthonormal polynomials at the face.
   static void apply(const double* ends, const double* x, double* face) {
     std::array<double, faceCoefficientCount(P)> sums{};
     [&]<std::size_t... C>(std::index_sequence<C...>) {
@@ -104,7 +106,8 @@ struct KnownTrace {
     for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
   }
 
-  /// Adds the transposed restriction of `face`, times `scale`, to `out`.
+  /// Applies the transpose of the restriction to the coefficients `face`, multiplies the result by `scale` and
+  /// adds it to `out`.
   static void addTransposed(const double* ends, double scale, const double* face, double* out) {
     std::array<double, faceCoefficientCount(P)> scaled;
     for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
@@ -115,7 +118,7 @@ struct KnownTrace {
   }
 };
 
-/// The orthonormal polynomials at the lower and at the upper end of an axis.
+/// The values of the orthonormal polynomials at the lower and at the upper end of an axis.
 const auto endValues = [] {
   std::array<std::array<double, kMaxDegree + 1>, 2> values{};
   for (int i = 0; i <= kMaxDegree; ++i) {
@@ -133,7 +136,7 @@ bool withAxis(int axis, const F& f) {
   return true;
 }
 
-/// Calls f(KnownTrace) for the degrees that most leaves have. Returns whether it did.
+/// Calls f(KnownTrace) if the degree is one that most leaves have. Returns true if f was called.
 template <typename F>
 bool withKnownTrace(int degree, int axis, const F& f) {
   switch (degree) {
@@ -249,7 +252,8 @@ void FaceCoupling::fromUnknowns(std::span<const double> x, FieldData& field) con
   field.coefficients = std::move(coefficients);
 }
 
-/// Restricts a leaf's polynomial to its face across the link's axis, at the leaf's lower (0) or upper (1) end.
+/// Restricts a leaf's polynomial to one of the leaf's two faces perpendicular to the link's axis: the lower
+/// face (`side` 0) or the upper one (1).
 void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const {
   x += start_[leaf];
   if (withKnownTrace(degree_[leaf], link.axis, [&](auto trace) { trace.apply(endValues[side].data(), x, face); }))
@@ -259,7 +263,8 @@ void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side
   for (std::size_t c = 0; c < trace.faceIndex.size(); ++c) face[trace.faceIndex[c]] += trace.factor[side][c] * x[c];
 }
 
-/// Adds the transpose of `restrictToFace`, times `scale`, to the leaf's part of `out`.
+/// Applies the transpose of `restrictToFace` to `face`, multiplies the result by `scale` and adds it to the
+/// leaf's part of `out`.
 void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
                                double* out) const {
   out += start_[leaf];
@@ -271,8 +276,9 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
     out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// Computes the jump across a link, times √(w_F·area/|Ω|), in the polynomials of the small face. The unknowns of the
-/// large leaf contain the root of a greater volume; `scale` corrects them to that of the small leaf.
+/// Computes the jump across link n, times √(w_F·area/|Ω|), as coefficients on the face of the small leaf. The
+/// unknowns of the large leaf contain the square root of a greater volume. `scale` converts them to the volume
+/// of the small leaf.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   std::array<double, kMaxFaceCoefficients> large;
@@ -290,7 +296,8 @@ void FaceCoupling::computeJump(std::size_t n, const double* x) {
   for (std::size_t c = 0; c < largeCount; ++c) jump[c] -= scale * large[c];
 }
 
-/// Adds a link's part of Mx to one of its leaves: the transpose of `computeJump` times the jump.
+/// Adds the contribution of link n to Mx for one of the link's two leaves: the transpose of `computeJump` times
+/// the jump.
 void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const {
   const Link& link = links_[n];
   const double* face = &jumps_[jumpStart_[n]];

@@ -11,31 +11,36 @@
 
 namespace hpsdf::continuity {
 
-/// The matrix M with xᵀMx = Σ_F w_F ∫_F (f_left − f_right)² dA / |Ω|, where w_F is the smaller leaf's edge across the
-/// face F (Koschier et al. 2017). M is too large to be stored; this class computes products with vectors.
+/// Computes products of vectors with the matrix M, which is too large to be stored. M is defined by xᵀMx = Σ_F
+/// w_F ∫_F (f_left − f_right)² dA / |Ω|, where w_F is the edge of the smaller leaf perpendicular to the face F
+/// (Koschier et al. 2017).
 ///
-/// x holds the coefficients of all leaves in the order of the octree, each times √(V/|Ω|)·‖L_i L_j L_k‖, so that |x|²
-/// is the mean of f² over the domain and M has no unit. The trace of a large leaf is restricted to the face of a small
-/// one exactly, by repeated halving: on a part of a face the trace of degree p has degree p.
+/// The vector x holds the coefficients of all leaves in the order of the octree, each multiplied by
+/// √(V/|Ω|)·‖L_i L_j L_k‖. Hence |x|² is the mean of f² over the domain, and M has no unit. Repeated halving
+/// restricts the trace of a large leaf to the face of a small one. This is exact, because on a part of a face a
+/// trace of degree p still has degree p.
 ///
 /// The methods run on TBB. Their results do not depend on the number of threads.
 class FaceCoupling {
  public:
   explicit FaceCoupling(const FieldData& field);
 
-  /// Returns x for a field with the same nodes and with coefficients in double.
+  /// Returns the vector x of a field. The field has the same nodes as the one given to the constructor, and its
+  /// coefficients are double.
   std::vector<double> toUnknowns(const FieldData& field) const;
-  /// Sets the coefficients of a field from x, in the order of the octree.
+  /// Sets the coefficients of a field from the vector x, whose order is that of the leaves in the octree.
   void fromUnknowns(std::span<const double> x, FieldData& field) const;
 
   /// Computes out = Mx + weight·x and returns xᵀ·out.
   double apply(double weight, const std::vector<double>& x, std::vector<double>& out);
 
-  /// Returns the diagonal of M; where a large leaf has smaller neighbours, as if these covered its whole face.
+  /// Returns the diagonal of M. If a large leaf has smaller neighbours, each of them contributes, as an
+  /// approximation, a share of the integral over the leaf's whole face.
   std::vector<double> diagonal() const;
 
  private:
-  /// A face of a small leaf and the leaf across it, which is as large or larger.
+  /// A face of a small leaf, and the leaf on the other side of the face. The other leaf is equally large or
+  /// larger.
   struct Link {
     std::uint32_t small, large;          ///< indices into `leaves_`
     std::array<std::uint32_t, 2> along;  ///< position of the small face in the large one, in small faces
@@ -43,8 +48,9 @@ class FaceCoupling {
     std::uint8_t levels;                 ///< difference of the leaves' depths
     std::uint8_t side;                   ///< 0 if the face lies at the small leaf's lower end, 1 at its upper end
   };
-  /// The restriction of a leaf's coefficients to those of its face. The latter multiply products of orthonormal
-  /// polynomials and are ordered by total degree, so that a lower degree uses the first of them.
+  /// The map from a leaf's coefficients to the coefficients on one of its faces. The coefficients on the face
+  /// belong to products of orthonormal polynomials and are ordered by total degree, so that a lower degree uses
+  /// only the first ones.
   struct Trace {
     std::vector<std::uint16_t> faceIndex;       ///< index of the coefficient on the face, by coefficient
     std::array<std::vector<double>, 2> factor;  ///< factor at the lower and the upper end, by coefficient

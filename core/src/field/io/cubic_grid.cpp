@@ -1,4 +1,4 @@
-// docs/export.md describes the layout of the files.
+// Writes files whose layout docs/export.md describes.
 #include "hpsdf/detail/cubic_grid.h"
 
 #include <algorithm>
@@ -28,14 +28,14 @@ constexpr std::size_t kSizesInFile = 8;  // number of cells, number of fields, a
 
 using GridIndex = std::array<std::uint64_t, 3>;
 
-/// A node of the grid, at a cell's corner or on an edge.
+/// A node of the cubic grid, at a corner or on an edge of a cell.
 struct Node {
   GridIndex index;  ///< the corner, or the lower end of the edge, in cells from the domain's lower corner
   int axis = -1;    ///< axis of the edge; −1 for a corner
   int third = 0;    ///< 0 or 1: the lower or the upper node of the edge
 };
 
-/// Numbers all nodes of a grid in the order of `CubicGrid::nodes`.
+/// Gives each node of a grid its index in `CubicGrid::nodes`.
 class Numbering {
  public:
   explicit Numbering(const GridResolution& resolution) : cells_{resolution[0], resolution[1], resolution[2]} {
@@ -80,9 +80,9 @@ class Numbering {
   std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis; then the node count
 };
 
-/// Returns the n-th node of the cell with this lower corner. Nodes 0 to 7 are the corners, n = x + 2y + 4z; then come
-/// those on edges along x, along y and along z. Of the four edges along axis a, those that differ along a+2 (cyclic)
-/// follow each other.
+/// Returns the n-th node of the cell with the lower corner `corner`. Nodes 0 to 7 are the cell's corners, n = x
+/// + 2y + 4z. They are followed by the nodes on edges along x, then along y, then along z. Of the four edges
+/// along an axis a, those that differ only along axis a+2 (cyclic) come directly one after the other.
 Node nodeOfCell(GridIndex corner, int n) {
   if (n < 8) {
     for (int axis = 0; axis < 3; ++axis) corner[axis] += n >> axis & 1;
@@ -94,7 +94,8 @@ Node nodeOfCell(GridIndex corner, int n) {
   return {corner, axis, n % 2};
 }
 
-/// Returns the position of a node. The operations and their order are those of the programs that load the files.
+/// Returns the position of a node. The operations and their order are the same as in the programs that load the
+/// files, so that the positions are equal.
 Vector3 positionOf(const Node& node, const Vector3& lower, const Vector3& cellSize) {
   Vector3 x = lower;
   for (int axis = 0; axis < 3; ++axis) x[axis] += cellSize[axis] * static_cast<double>(node.index[axis]);
@@ -102,8 +103,8 @@ Vector3 positionOf(const Node& node, const Vector3& lower, const Vector3& cellSi
   return x;
 }
 
-/// Evaluates the cubic serendipity polynomial that is 1 at a cell's n-th node and 0 at all others, at local coordinates
-/// in [−1, 1]³.
+/// Evaluates the n-th shape function of a cell at local coordinates in [−1, 1]³. It is the cubic serendipity
+/// polynomial that is 1 at the cell's n-th node and 0 at the other nodes.
 double shapeFunction(int n, const Vector3& local) {
   const Node node = nodeOfCell({0, 0, 0}, n);
   double product = 1;
@@ -249,12 +250,12 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
   writeSize(out, cells);
   writeSize(out, 1);  // number of fields
 
-  // There is one list of nodes for each field.
+  // Write the lists of nodes. The file has one such list for each field, and it has one field.
   writeSize(out, 1);
   writeSize(out, grid.nodes.size());
   writeAll(out, std::span<const double>(grid.nodes));
 
-  // There is one list of cells for each field.
+  // Write the lists of cells. The file has one such list for each field, and it has one field.
   writeSize(out, 1);
   writeSize(out, cells);
   detail::Parts parts(progress, "writing", std::size_t{ny} * nz);
@@ -267,7 +268,7 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
       parts.end();
     }
 
-  // The list of each cell's position in the cell list is the identity because no cell is omitted.
+  // Write the list of each cell's position in the list of cells. It is the identity because no cell is omitted.
   writeSize(out, 1);
   writeSize(out, cells);
   std::vector<std::uint32_t> positions(cells);

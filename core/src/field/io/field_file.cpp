@@ -1,4 +1,4 @@
-// The layout is described in docs/file-format.md.
+// Reads and writes field files. docs/file-format.md describes their layout.
 #include "hpsdf/field_file.h"
 
 #include <algorithm>
@@ -16,9 +16,11 @@
 namespace hpsdf {
 namespace {
 
-// As in PNG files, the carriage return, line feed and end-of-file mark reveal a transfer that took the file for text.
+// First bytes of a field file. As in PNG files, the carriage return, line feed and end-of-file mark reveal that
+// the file was transferred as text.
 constexpr detail::Magic kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
-// Version 2 added the steps; 3 continuity, bounds, maximum error and criteria; 4 the inside test.
+// Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
+// and criteria; version 4 the inside test.
 constexpr std::uint32_t kVersion = 4;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
@@ -31,7 +33,7 @@ struct Sizes {
   std::uint64_t bounds = 0;
 };
 
-/// `Steps` is const when writing.
+/// Writes or reads the number of refinement steps. `Steps` is const for writing.
 template <typename Stream, typename Steps>
 void stepsItem(Stream& stream, Steps& steps) {
   std::uint64_t stored = steps.value_or(kUnknownSteps);
@@ -48,8 +50,8 @@ void wholeItem(Stream& stream, double& number) {
   number = stored;
 }
 
-/// A setting is stored as f64 if it is a number, u32 if whole, u8 if it is a word's index or a flag. `Settings` is
-/// const when writing.
+/// Writes or reads one setting. A number is stored as f64, a whole number as u32, and the index of a word or a
+/// flag as u8. `Settings` is const for writing.
 template <typename Stream, typename Settings>
 void settingItem(Stream& stream, const BuildSetting& setting, Settings& settings) {
   const std::vector<double> numbers = setting.get(settings);
@@ -71,14 +73,15 @@ void settingItem(Stream& stream, const BuildSetting& setting, Settings& settings
   }
 }
 
-/// The settings whose positions in the file run from `first` to `last`.
+/// Writes or reads the settings whose positions in the file are `first` to `last`.
 template <typename Stream, typename Settings>
 void settingItems(Stream& stream, Settings& settings, int first, int last) {
   for (int position = first; position <= last; ++position)
     settingItem(stream, *std::ranges::find(buildSettings(), position, &BuildSetting::storedAt), settings);
 }
 
-/// Every scalar of the file after magic and version, in order. `Data` is const when writing.
+/// Writes or reads every scalar of the file after its magic bytes and version, in order. `Data` is const for
+/// writing.
 template <typename Stream, typename Data, typename SizesRef>
 void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) {
   stream.item(sizes.coefficientBytes);

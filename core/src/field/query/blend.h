@@ -1,5 +1,6 @@
 #pragma once
-// Blended fields: a partition of unity over leaves whose weights overlap along their faces (docs/design.md).
+// Evaluation of blended fields. Blending is a partition of unity: the weights of neighbouring leaves overlap at
+// their common faces (docs/design.md).
 
 #include <algorithm>
 #include <array>
@@ -14,8 +15,8 @@
 
 namespace hpsdf::query {
 
-/// Returns the axes (bit 0 for x) along which a point of a leaf is so close to a face that other leaves may have a
-/// weight there; 0 in a field without blending.
+/// Returns a bit mask of axes, with bit 0 for x. A bit is set if the point is so close to a face of its leaf
+/// across that axis that other leaves may have a weight at the point. Returns 0 for a field without blending.
 inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3>& local) {
   if (!(field.blend > 0)) return 0;
   const double core = 1 - 2 * field.blend;
@@ -23,39 +24,41 @@ inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3
   return bit(0) | bit(1) | bit(2);
 }
 
-/// One factor of a leaf's weight, which depends on the position along one axis.
+/// One of the three factors of a leaf's weight. It depends on the position along one axis.
 struct Ramp {
   double value;
   double slope;  ///< derivative of the value in world units
 };
 
-/// Evaluates S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1 at t = 1,
-/// where t is the signed distance to the nearer face in units of the blend extent there. A point lies in the blend
-/// zone of at most one of two opposite faces.
+/// Evaluates the ramp S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1
+/// at t = 1. Here t is the signed distance to the nearer of the leaf's two faces across `axis`, in units of the
+/// blend extent at that face. A point lies in the blend zone of at most one of these faces.
 inline Ramp rampAlong(const FieldData& field, const LookupGrid& lookupGrid, const LeafPoint& leaf, int axis) {
   const GridFrame& frame = lookupGrid.frame;
   const bool upper = leaf.local[axis] > 0;
   const int depth = blend_extent::depth(lookupGrid.blendExtents[leaf.blendExtentsIndex], axis, upper);
   if (depth == blend_extent::kDomainFace) return {1, 0};
-  // 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to units of the blend extent.
+  // The factor 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to units of the blend extent.
   const double scale = std::bit_cast<double>(std::uint64_t(1022 + depth - leaf.depth) << 52) / field.blend;
   const double t = std::clamp((1 - std::abs(leaf.local[axis])) * scale, -1.0, 1.0);
   const double toWorld = 2.0 * (std::uint32_t{1} << leaf.depth) * frame.cells[axis] / frame.size[axis];
   return {0.5 + t * (0.75 - 0.25 * t * t), (upper ? -0.75 : 0.75) * (1 - t * t) * scale * toWorld};
 }
 
-/// Returns the fixed-point coordinate just across a face of a cell: below 0 or beyond the grid where the domain ends.
+/// Returns the fixed-point coordinate just across the lower or upper face of a cell. If the domain ends at that
+/// face, the result is below 0 or beyond the grid.
 inline std::int64_t fixedPointAcross(std::int64_t cellIndex, int depth, bool upper) {
   return upper ? (cellIndex + 1) << (kMaxDepth - depth) : (cellIndex << (kMaxDepth - depth)) - 1;
 }
 
-/// Tells whether only two leaves have a weight at a point that is near the first leaf's face across `axis` alone,
-/// given the point's local coordinates in the leaf across that face. Most points in blend zones are of this kind.
+/// Returns true if only two leaves have a weight at a point. The point must be near only one face of its leaf,
+/// a face across `axis`. `localAcross` holds the point's local coordinates in the leaf across that face. Most
+/// points in blend zones have only two leaves.
 inline bool onlyTwoOverlap(const FieldData& field, const std::array<double, 3>& localAcross, int axis) {
   return (blendZoneAxes(field, localAcross) & ~(1U << axis)) == 0;
 }
 
-/// Returns the mean of two leaves' results, weighted by their ramps along `axis`.
+/// Returns the mean of the results a and b of two leaves, weighted by the leaves' ramps along the common axis.
 inline double blendTwo(double a, const Ramp& rampA, double b, const Ramp& rampB, int) {
   return a + rampB.value / (rampA.value + rampB.value) * (b - a);
 }
@@ -67,7 +70,8 @@ inline ValueAndGradient blendTwo(const ValueAndGradient& a, const Ramp& rampA, c
   return result;
 }
 
-/// The cells of one depth that are at most `blend` of their edge lengths away from a point: one or two along each axis.
+/// The cells of one depth whose distance from a point along each axis is at most `blend` times the cell's edge.
+/// Along each axis there are one or two such cells.
 struct CandidateCells {
   CellIndex first;
   std::array<int, 3> extra;  ///< number of cells besides the first along each axis, 0 or 1
@@ -77,13 +81,15 @@ struct CandidateCells {
     for (int axis = 0; axis < 3; ++axis) {
       const double coordinate = gridCoordinates[axis] * scale;
       const std::int64_t last = frame.last[axis] >> (kMaxDepth - depth);
-      // The cast rounds small negative numbers to 0. At the domain's end a tiny blend width is lost in rounding.
+      // Find the first and the last cell along the axis. The cast rounds small negative numbers to 0. At the domain's
+      // upper end, rounding loses a tiny blend width, so that the cell index is limited.
       first[axis] = std::min(static_cast<std::int64_t>(coordinate - blend), last);
       extra[axis] = std::min(static_cast<std::int64_t>(coordinate + blend), last) > first[axis];
     }
   }
 
-  /// Calls f(slot, cell index); the slot is x + 2y + 4z of the cell's offset from the first cell.
+  /// Calls f(slot, cell index) for each candidate cell. The slot is x + 2y + 4z of the cell's offset from the
+  /// first cell.
   template <typename F>
   void forEach(F&& f) const {
     for (int z = 0; z <= extra[2]; ++z)
@@ -92,14 +98,15 @@ struct CandidateCells {
   }
 };
 
-/// The internal nodes among the candidate cells of one depth.
+/// The internal nodes of the octree among the candidate cells of one depth.
 struct OpenNodes {
   CandidateCells cells;
   std::array<std::uint64_t, 8> bits;  ///< nodes by slot; 0 for leaves
   bool any = false;
 };
 
-/// Visits the leaves among the candidates of the first depth, which is that of the lookup grid or 0.
+/// Visits the leaves among the candidate cells of the depth at which the search starts: the lookup grid's
+/// depth, or 0.
 template <typename Visit>
 OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
                           const std::array<double, 3>& gridCoordinates, bool byLookupGrid, Visit&& visit) {
@@ -116,7 +123,8 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
     CellIndex leaf;
     for (int axis = 0; axis < 3; ++axis) {
       leaf[axis] = cell[axis] >> levels;
-      // A leaf that covers several entries is visited at the first of them.
+      // Skip the leaf unless this is the first candidate entry that the leaf covers. A large leaf covers several
+      // entries.
       if (cell[axis] > open.cells.first[axis] && leaf[axis] << levels != cell[axis]) return;
     }
     visit(leafPoint(bits, depth - levels, (byLookupGrid ? field.nodes.size() : 0) + entry, leaf, gridCoordinates));
@@ -124,7 +132,8 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
   return open;
 }
 
-/// Visits the leaves among the candidates of `depth`, which are children of the open nodes one level above.
+/// Visits the leaves among the candidate cells of `depth`. These cells are children of the internal nodes
+/// `open`, which are one level higher.
 template <typename Visit>
 OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const std::array<double, 3>& gridCoordinates,
                          int depth, const OpenNodes& parents, Visit&& visit) {
@@ -146,11 +155,11 @@ OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const s
   return open;
 }
 
-/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. It works depth by
-/// depth. In units of its own edge, a child is at least as far from the point as its parent, so that only children of
-/// candidates are candidates, at most eight at each depth. `ownDepth` is the depth of the leaf that holds the point.
-/// If that leaf is larger than the lookup grid's entries, leaves of its size may have a weight although their entries
-/// are not among the candidates; the search then starts at the base cells.
+/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. The search
+/// proceeds depth by depth. Measured in its own edge, a child is at least as far from the point as its parent.
+/// Hence only children of candidates can be candidates, at most eight at each depth. `ownDepth` is the depth of
+/// the leaf that holds the point. If that leaf is larger than an entry of the lookup grid, leaves of its size
+/// may have a weight although their entries are not candidates. The search then starts at the base cells.
 template <typename Visit>
 void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, int ownDepth, Visit&& visit) {
@@ -160,7 +169,8 @@ void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
     open = visitNextDepth(field, lookupGrid.frame, gridCoordinates, depth, open, visit);
 }
 
-/// Computes Σ wₙ fₙ / Σ wₙ from differences to the first fₙ, so that equal fₙ give their value to the bit.
+/// Computes Σ wₙ fₙ / Σ wₙ over leaves n. It sums the differences fₙ − f₀ to the first leaf, so that equal fₙ
+/// yield exactly their common value.
 template <typename Result>
 class PartitionOfUnity;
 
@@ -212,7 +222,8 @@ Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const LeafPo
   return result;
 }
 
-/// Blends all leaves that have a weight at a point, which lies in a leaf of depth `ownDepth`.
+/// Returns the blended field at a point, from all leaves that have a weight there. `ownDepth` is the depth of
+/// the leaf that holds the point.
 template <typename Result>
 Result blendAll(const FieldData& field, const LookupGrid& lookupGrid, const std::array<double, 3>& gridCoordinates,
                 int ownDepth) {
@@ -228,13 +239,14 @@ Result blendAll(const FieldData& field, const LookupGrid& lookupGrid, const std:
   return blend.result();
 }
 
-/// Blends the leaves that have a weight at a point in the blend zones along `axes` (as `blendZoneAxes`) of `leaf`.
+/// Returns the blended field at a point of `leaf` that lies in blend zones. `axes` is the bit mask from
+/// `blendZoneAxes`.
 template <typename Result>
 Result blendInZone(const FieldData& field, const LookupGrid& lookupGrid, const std::array<double, 3>& gridCoordinates,
                    const LeafPoint& leaf, unsigned axes) {
   if (!std::has_single_bit(axes)) return blendAll<Result>(field, lookupGrid, gridCoordinates, leaf.depth);
 
-  // Find the leaf across the only face that is near.
+  // Find the other leaf: the one across the only face to which the point is near.
   const GridFrame& frame = lookupGrid.frame;
   const int axis = std::countr_zero(axes);
   GridPoint across{gridCoordinates, {}, 0};
@@ -247,14 +259,15 @@ Result blendInZone(const FieldData& field, const LookupGrid& lookupGrid, const s
     return evaluateLeaf<Result>(field, frame, leaf);
   const LeafPoint other = findLeaf(field, lookupGrid, across);
 
-  // Blend both leaves unless a third one has a weight too.
+  // Blend the two leaves, or all leaves if a third one also has a weight at the point.
   if (!onlyTwoOverlap(field, other.local, axis))
     return blendAll<Result>(field, lookupGrid, gridCoordinates, leaf.depth);
   return blendTwo(evaluateLeaf<Result>(field, frame, leaf), rampAlong(field, lookupGrid, leaf, axis),
                   evaluateLeaf<Result>(field, frame, other), rampAlong(field, lookupGrid, other, axis), axis);
 }
 
-/// Evaluates the field at a point of a leaf. On the leaf's faces the result is the limit from within this leaf.
+/// Evaluates the field at a point of a leaf. If the point is on a face of the leaf, the result is the limit
+/// from within the leaf.
 template <typename Result>
 Result evaluateInLeaf(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, const LeafPoint& leaf) {

@@ -1,5 +1,5 @@
 #pragma once
-// Descent of the octree to the leaf that holds a point, and evaluation of the leaf's polynomial.
+// Search in the octree for the leaf that holds a point, and evaluation of the leaf's polynomial at the point.
 
 #include <algorithm>
 #include <array>
@@ -16,23 +16,24 @@
 
 namespace hpsdf::query {
 
-/// 1 in the fixed-point numbers of `GridPoint`.
+/// The number 1 in the fixed-point format of `GridPoint`.
 constexpr std::int64_t kFixedPointOne = std::int64_t{1} << kMaxDepth;
 
-/// A point of the domain in grid coordinates.
+/// A point of the domain in grid coordinates, in which base cells have edges of length 1.
 struct GridPoint {
   std::array<double, 3> coordinates;
   std::array<std::int64_t, 3> fixedPoint;  ///< the coordinates, rounded down to kMaxDepth binary digits
   std::uint64_t path;                      ///< octree path: the digits after the point, 21 bits an axis
 
-  /// Returns the cell of a depth that holds the point.
+  /// Returns the index of the cell of depth `depth` that holds the point.
   CellIndex cellIndex(int depth) const {
     const int shift = kMaxDepth - depth;
     return {fixedPoint[0] >> shift, fixedPoint[1] >> shift, fixedPoint[2] >> shift};
   }
 };
 
-/// Returns the number, within its parent, of the cell of this depth on an octree path.
+/// Returns the child number, from 0 to 7, that an octree path has at a depth: the number of the cell of that
+/// depth within its parent.
 inline std::uint32_t childOnPath(std::uint64_t path, int depth) {
   const std::uint64_t bits = (path >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
@@ -50,32 +51,33 @@ inline GridFrame gridFrame(const FieldData& field) {
   return frame;
 }
 
-/// Returns the bits that one axis adds to the octree path of a point.
+/// Returns the bits that one coordinate of a point contributes to the point's octree path.
 inline std::uint64_t pathBits(int axis, std::int64_t fixedPoint) {
   return static_cast<std::uint64_t>(fixedPoint & (kFixedPointOne - 1)) << (21 * axis);
 }
 
-/// Maps a world coordinate to a grid coordinate. The order of the operations matters: a plane through the middle of the
-/// domain lands exactly on the face between two base cells.
+/// Maps a world coordinate to a grid coordinate. With this order of the operations, a plane through the middle
+/// of the domain lies exactly on the face between two base cells.
 inline double gridCoordinate(const GridFrame& frame, int axis, double x) {
   return ((x - frame.lower[axis]) / frame.size[axis]) * frame.cells[axis];
 }
 
-/// Sets the fixed-point number and the path along one axis. The domain's upper faces belong to the cells below them.
+/// Sets the point's fixed-point coordinate along one axis and adds its bits to the octree path. Points on the
+/// domain's upper faces belong to the cells below these faces.
 inline void setFixedPoint(const GridFrame& frame, int axis, GridPoint& point) {
   point.fixedPoint[axis] =
       std::min(static_cast<std::int64_t>(point.coordinates[axis] * kFixedPointOne), frame.last[axis]);
   point.path |= pathBits(axis, point.fixedPoint[axis]);
 }
 
-/// Locates a point that is given in grid coordinates.
+/// Makes a `GridPoint` from a point's grid coordinates.
 inline GridPoint gridPoint(const GridFrame& frame, const std::array<double, 3>& coordinates) {
   GridPoint point{coordinates, {}, 0};
   for (int axis = 0; axis < 3; ++axis) setFixedPoint(frame, axis, point);
   return point;
 }
 
-/// Locates a point of the domain that is given in world coordinates.
+/// Makes a `GridPoint` from the world coordinates of a point in the domain.
 inline GridPoint gridPoint(const GridFrame& frame, const Vector3& x) {
   GridPoint point;
   point.path = 0;
@@ -104,7 +106,7 @@ inline Box cellBox(const GridFrame& frame, int depth, const CellIndex& cellIndex
   return Box(worldPoint(frame, lower), worldPoint(frame, upper));
 }
 
-/// Finds the leaf that holds a point, from its base cell down.
+/// Finds the leaf that holds a point. Descends the octree from the base cell that holds the point.
 inline OctreeNode findLeafNode(const FieldData& field, const GridPoint& point) {
   const CellIndex base = point.cellIndex(0);
   auto node = static_cast<std::uint32_t>((base[2] * field.grid[1] + base[1]) * field.grid[0] + base[0]);
@@ -126,14 +128,16 @@ struct LeafPoint {
 inline LeafPoint leafPoint(std::uint64_t bits, int depth, std::size_t blendExtentsIndex, const CellIndex& cellIndex,
                            const std::array<double, 3>& gridCoordinates) {
   LeafPoint leaf{bits, depth, {}, cellIndex, blendExtentsIndex};
-  // Scaling by a power of two and subtracting the integer part are exact.
+  // Compute the local coordinates. Scaling by a power of two and subtracting the integer part are exact
+  // operations.
   const double scale = std::uint32_t{1} << depth;
   for (int axis = 0; axis < 3; ++axis)
     leaf.local[axis] = 2 * (gridCoordinates[axis] * scale - static_cast<double>(cellIndex[axis])) - 1;
   return leaf;
 }
 
-/// Finds the leaf that holds a point as `findLeafNode` does, but starts in the lookup grid.
+/// Finds the leaf that holds a point, like `findLeafNode`, but the descent starts at an entry of the lookup
+/// grid.
 inline LeafPoint findLeaf(const FieldData& field, const LookupGrid& lookupGrid, const GridPoint& point) {
   const CellIndex top = point.cellIndex(lookupGrid.depth);
   const std::int64_t entry = top[2] * lookupGrid.slab + top[1] * lookupGrid.row + top[0];
@@ -147,7 +151,7 @@ inline LeafPoint findLeaf(const FieldData& field, const LookupGrid& lookupGrid, 
   return leafPoint(bits, depth, index, point.cellIndex(depth), point.coordinates);
 }
 
-/// Returns the edge lengths of a cell of a depth in world units.
+/// Returns the edge lengths, in world units, of the cells of depth `depth`.
 inline Vector3 cellSize(const FieldData& field, int depth) {
   const Vector3 size = field.domain.max() - field.domain.min();
   const double scale = std::ldexp(1.0, -depth);
@@ -175,7 +179,8 @@ using basis::legendreValues;
 using basis::legendreValuesAndDerivatives;
 #include "field/query/polynomial-inl.h"
 
-/// Calls f(degree) with a `Constant` for the degrees that most leaves have.
+/// Calls f with the degree. For the degrees that most leaves have, the argument is a `Constant`, otherwise an
+/// int.
 template <typename F>
 auto withDegree(int degree, const F& f) {
   switch (degree) {
@@ -204,7 +209,8 @@ ValueAndGradient evaluateWithGradient(const T* coefficients, int degree, const s
   return {value, {x, y, z}};
 }
 
-/// Evaluates the leaf's polynomial in world units.
+/// Evaluates the polynomial of a leaf at a point. The overload for `ValueAndGradient` gives the gradient in
+/// world units.
 template <typename T>
 void evaluateLeaf(const T* coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
   value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
@@ -217,7 +223,8 @@ void evaluateLeaf(const T* coefficients, const GridFrame& frame, const LeafPoint
   for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
 }
 
-/// Tells whether a point lies in the domain; NaN does not. One combined condition is cheaper than six branches.
+/// Returns true if x lies in the domain, and false if x contains NaN. A single combined condition is faster
+/// than six branches.
 inline bool contains(const GridFrame& domain, const Vector3& x) {
   bool inside = true;
   for (int axis = 0; axis < 3; ++axis)
@@ -225,7 +232,8 @@ inline bool contains(const GridFrame& domain, const Vector3& x) {
   return inside;
 }
 
-/// Returns the domain's point closest to x; for NaN some point of the domain.
+/// Returns the point of the domain that is closest to x. If x contains NaN, the result is some point of the
+/// domain.
 inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
   Vector3 closest;
   for (int axis = 0; axis < 3; ++axis)
@@ -233,11 +241,12 @@ inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
   return closest;
 }
 
-/// Returns |v| without squares, which overflow far from the domain and vanish close to it. The three-argument hypot of
-/// GCC 12 loses NaN and infinity.
+/// Returns |v|. It avoids squares, which overflow for long and vanish for short vectors. The three-argument
+/// hypot of GCC 12 would not propagate NaN and infinity.
 inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
-/// Continues the field from f(q) at the domain's closest point q to f(q) + |x − q|; `offset` is x − q.
+/// Continues the field to a point x outside the domain: changes f(q) at the closest point q of the domain to
+/// f(q) + |x − q|. `offset` is x − q.
 inline void continueOutside(const Vector3& offset, double& value) { value += length(offset); }
 
 inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
@@ -248,10 +257,12 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
   result.gradient += offset / distance;
 }
 
-/// Makes the deepest lookup grid that takes no more than a sixteenth of the field's own bytes.
+/// Makes a lookup grid for a field. Its depth is the greatest at which it takes at most a sixteenth of the
+/// bytes of the field's nodes and coefficients.
 LookupGrid makeLookupGrid(const FieldData& field);
 
-/// Evaluates a field at many points. The results equal those of single queries to the bit, on every instruction set.
+/// Evaluates a field at many points. On every instruction set, the results are bit for bit equal to those of
+/// single queries.
 void evaluateBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,
                    std::span<double> out);
 void evaluateBatch(const FieldData& field, const LookupGrid& lookupGrid, std::span<const Vector3> points,

@@ -29,7 +29,8 @@ using Unsigned = hn::RebindToUnsigned<Tag>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kLanes = hn::MaxLanes(Tag());
 
-/// One double for each of a few points, with the arithmetic that the polynomial code expects of a `Number`.
+/// A SIMD vector with one double for each of several points. Its operators make it a `Number` for the
+/// polynomial code.
 struct Lanes {
   Vec v;
   Lanes() = default;
@@ -44,24 +45,27 @@ struct Lanes {
 #include "basis/legendre-inl.h"
 #include "field/query/polynomial-inl.h"
 
-/// Points of one batch: enough that the loops below overlap their waits for memory, few enough for the L1 cache.
+/// Number of points in a batch: large enough that loops over a batch overlap their memory accesses, small
+/// enough for a batch to fit into the L1 cache.
 constexpr std::size_t kBatch = 128;
 static_assert(kBatch % kLanes == 0);
 
-/// The degrees for which there is vector code; `withDegree` has constants for the same ones.
+/// The lowest and the highest degree with vector code. `withDegree` has constants for the same degrees.
 constexpr int kMinVectorDegree = 2, kMaxVectorDegree = 4;
 
-/// One list of points for each degree with vector code, and one for all other degrees.
+/// Number of lists of points: one list for each degree with vector code, and one for all other degrees.
 constexpr std::size_t kLists = kMaxVectorDegree - kMinVectorDegree + 2;
 
-/// A point in local coordinates and its leaf's node with the depth as `LookupGrid::entry` packs it. The node's bits are
-/// stored as a double so that four numbers are loaded at once.
+/// A point in the local coordinates of its leaf, and the leaf's node with its depth as packed in
+/// `LookupGrid::entry`. The bits of the node are stored as a double so that all four numbers can be loaded at
+/// once.
 struct PackedLeafPoint {
   double local[3];
   double bits;
 };
 
-/// Points during their descent. Every array has room for whole vectors; the last point fills up the last vector.
+/// A batch of points during their descent in the octree. Every array has room for whole SIMD vectors. Copies of
+/// the last point fill the last vector.
 struct Batch {
   const Vector3* points;
   std::size_t count;
@@ -84,13 +88,13 @@ HWY_INLINE hn::Vec<Unsigned> toUnsigned(Vec integers) {
                  hn::Set(Unsigned(), kImplicit - 1));
 }
 
-/// Returns 2^depth of nodes with their depth.
+/// Returns 2^depth for nodes that are packed together with their depth.
 HWY_INLINE Vec depthScale(hn::Vec<Unsigned> bits) {
   const auto depth = hn::And(hn::ShiftRight<40>(bits), hn::Set(Unsigned(), 0xff));
   return hn::BitCast(Tag(), hn::ShiftLeft<52>(depth + hn::Set(Unsigned(), 1023)));
 }
 
-/// Maps the points to grid coordinates, as `closestInDomain` and `gridPoint` do.
+/// Maps the points of a batch to grid coordinates, in the same way as `closestInDomain` and `gridPoint`.
 void enterGrid(const LookupGrid& lookupGrid, Batch& batch) {
   const Tag d;
   const auto number = [&](auto value) HWY_ATTR { return hn::Set(d, static_cast<double>(value)); };
@@ -126,9 +130,9 @@ void enterGrid(const LookupGrid& lookupGrid, Batch& batch) {
   batch.allInDomain = hn::AllTrue(d, inDomain);
 }
 
-/// Descends to the leaves depth by depth, so that the nodes of all points are fetched at once. Every point is written
-/// to the list of those that descend further, and the list grows only for internal nodes: a branch would be
-/// mispredicted.
+/// Finds the leaves of all points in a batch. It descends depth by depth, so that the nodes of all points are
+/// fetched at once. Every point is written to the list of points that descend further, but the list's length
+/// grows only for internal nodes. This avoids a branch that would be mispredicted.
 template <bool WithBlendExtents>
 void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch) {
   std::uint8_t descending[kBatch];
@@ -152,7 +156,8 @@ void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch)
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
-/// Lists the points by degree, without branches as `descend` does, and prefetches their coefficients.
+/// Lists the points of a batch by the degree of their leaves and prefetches the coefficients. Avoids branches
+/// in the same way as `descend`.
 template <typename T>
 void listByDegree(const T* coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
@@ -160,7 +165,8 @@ void listByDegree(const T* coefficients, Batch& batch) {
     const int degree = node::degree(batch.bits[i]);
     const T* first = coefficients + node::offset(batch.bits[i]);
     const std::size_t last = coefficientCount(degree) - 1;
-    // Each leaf gets the same number of cache lines, because a varying end of the loop would be mispredicted.
+    // Prefetch the same number of cache lines for each leaf, because a varying end of the loop would be
+    // mispredicted.
     for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
       __builtin_prefetch(first + std::min(at, last));
     for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
@@ -173,7 +179,7 @@ void listByDegree(const T* coefficients, Batch& batch) {
   }
 }
 
-/// Computes local coordinates as `leafPoint` does.
+/// Computes the local coordinates of the points in their leaves, in the same way as `leafPoint`.
 void enterLeaves(Batch& batch) {
   const Tag d;
   for (std::size_t i = 0; i < batch.count; i += kLanes) {
@@ -191,7 +197,8 @@ void enterLeaves(Batch& batch) {
 HWY_INLINE Vec load(const double* from) { return hn::LoadU(Tag(), from); }
 HWY_INLINE Vec load(const float* from) { return hn::PromoteTo(Tag(), hn::LoadU(hn::Rebind<float, Tag>(), from)); }
 
-/// Sets lane l of out[i] to from[l][offset + i] for i below the number of lanes.
+/// Loads from several arrays and transposes: sets lane l of out[i] to from[l][offset + i], for each i below the
+/// number of lanes.
 template <typename T>
 HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::size_t offset, Lanes* out) {
 #if HWY_TARGET == HWY_SCALAR
@@ -225,8 +232,8 @@ HWY_INLINE void loadAllTransposed(const std::array<const T*, kLanes>& from, std:
   }
 }
 
-/// Evaluates the polynomials at the listed points of degree P, one vector of points at a time. The last point of the
-/// list is repeated in unused lanes.
+/// Evaluates polynomials of degree P at the points that are listed for this degree, one SIMD vector of points
+/// at a time. The last point of the list is repeated in unused lanes.
 template <int P, typename T, typename Result>
 void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   const Tag d;
@@ -262,7 +269,7 @@ void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
-/// Evaluates the polynomial of each point's own leaf, without blending.
+/// Evaluates, at each point of a batch, the polynomial of the leaf that holds the point, without blending.
 template <typename T, typename Result>
 void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
@@ -275,7 +282,7 @@ void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
-/// Returns the i-th point of a field with blending in its leaf, without the cell index.
+/// Returns the i-th point of a batch as a `LeafPoint` for blending. The cell index is not set.
 HWY_INLINE LeafPoint leafPointOf(const Batch& batch, std::size_t i) {
   const auto& local = batch.leafPoints[i].local;
   return {batch.bits[i],
@@ -285,7 +292,7 @@ HWY_INLINE LeafPoint leafPointOf(const Batch& batch, std::size_t i) {
           batch.blendExtentsIndex[i]};
 }
 
-/// Blends all leaves that have a weight at the i-th point.
+/// Returns the blended field at the i-th point of a batch, from all leaves that have a weight at the point.
 template <typename Result>
 Result blendAllAt(const FieldData& field, const LookupGrid& lookupGrid, const Batch& batch, std::size_t i) {
   return blendAll<Result>(field, lookupGrid,
@@ -293,7 +300,8 @@ Result blendAllAt(const FieldData& field, const LookupGrid& lookupGrid, const Ba
                           LookupGrid::depthOf(batch.bits[i]));
 }
 
-/// The points of a batch that lie in blend zones, collected without branches, as in `descend`.
+/// The points of a batch that lie in blend zones. The constructor collects them without branches, as `descend`
+/// does.
 struct BlendZonePoints {
   std::uint8_t point[kBatch];
   std::uint8_t axes[kBatch];  ///< as `blendZoneAxes` returns them
@@ -309,14 +317,15 @@ struct BlendZonePoints {
   }
 };
 
-/// Points near one face of their leaves, with the descent to the leaf across that face.
+/// Points that are near one face of their leaf, as a batch that descends to the leaves across these faces.
 struct AcrossFaces {
   Batch batch;
   std::uint8_t point[kBatch];  ///< index of the point in the original batch
   std::uint8_t axis[kBatch];   ///< axis across the face
 };
 
-/// Adds a point that is near the face across `axis` alone, unless the domain ends at that face.
+/// Adds point i to `across`. The point is near only one face of its leaf, a face across `axis`. Does nothing if
+/// the domain ends at that face.
 HWY_INLINE void addAcrossFace(const LookupGrid& lookupGrid, const Batch& batch, std::size_t i, int axis,
                               AcrossFaces& across) {
   const int depth = LookupGrid::depthOf(batch.bits[i]);
@@ -339,11 +348,13 @@ HWY_INLINE void addAcrossFace(const LookupGrid& lookupGrid, const Batch& batch, 
   others.entry[other] = batch.entry[i] + ((after >> shift) - (before >> shift)) * stride;
 }
 
-/// Blends as `blendInZone` does at all points in blend zones. `out` holds the results of the points' own leaves.
+/// Blends the field, like `blendInZone`, at all points of a batch that lie in blend zones. On entry `out` holds
+/// the result of each point's own leaf.
 template <typename T, typename Result>
 void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coefficients, const Batch& batch,
            Result* out) {
-  // Blend points near several faces one by one, and collect those near a single face.
+  // Blend the points that are near several faces of their leaf one by one. Collect the points that are near a
+  // single face.
   const BlendZonePoints points(field, batch);
   AcrossFaces across;
   Batch& others = across.batch;
@@ -357,14 +368,14 @@ void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coeffi
   }
   if (others.count == 0) return;
 
-  // Evaluate the leaves across the faces.
+  // Evaluate the collected points in the leaves on the other side of the faces.
   descend<true>(field, lookupGrid, others);
   listByDegree(coefficients, others);
   enterLeaves(others);
   Result acrossResults[kBatch];
   evaluateLeaves(coefficients, lookupGrid.frame, others, acrossResults);
 
-  // Blend both leaves unless a third one has a weight too.
+  // Blend the two leaves of each collected point, or all leaves if a third one also has a weight at the point.
   for (std::size_t other = 0; other < others.count; ++other) {
     const std::size_t i = across.point[other];
     const int axis = across.axis[other];

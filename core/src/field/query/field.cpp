@@ -36,7 +36,8 @@ std::size_t checkGrid(const FieldData& data) {
   return cells;
 }
 
-/// Throws unless every group of children belongs to exactly one node before it, so that the nodes form trees.
+/// Throws `Error` unless the nodes form trees, that is, unless every group of children belongs to exactly one
+/// node and that node precedes the group.
 void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
   const auto& nodes = data.nodes;
   constexpr std::uint8_t kUnreached = 0xff;

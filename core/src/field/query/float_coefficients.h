@@ -11,10 +11,12 @@ struct Rounding {
   double max = 0;  ///< bound of the change anywhere
 };
 
-/// Computes the rounding of a field whose coefficients are double.
+/// Computes by how much rounding the coefficients to float changes a field. The coefficients of the field are
+/// double.
 Rounding floatRounding(const FieldData& field);
 
-/// Converts the coefficients; leaves coefficients of the wanted type as they are.
+/// Convert the coefficients of a field to float or to double. Coefficients that already have that type do not
+/// change.
 void toFloat(FieldData& field);
 void toDouble(FieldData& field);
 

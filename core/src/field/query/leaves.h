@@ -1,5 +1,5 @@
 #pragma once
-// The nodes of a field's octree with their cell indices, and the neighbours of leaves.
+// Traversal of the nodes of a field's octree with their cell indices, and search for the neighbours of leaves.
 
 #include <array>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace hpsdf::query {
 
-/// Integer coordinates of a cell in cells of its depth, counted from the domain's lower corner.
+/// Integer coordinates of a cell, counted from the domain's lower corner in units of cells of the same depth.
 using CellIndex = std::array<std::int64_t, 3>;
 
 /// A node of the octree and its cell.
@@ -20,8 +20,9 @@ struct OctreeNode {
   CellIndex cellIndex;
 };
 
-/// Calls visit(OctreeNode) for the nodes in the order of the octree: base cells first to last, children 0 to 7. An
-/// internal node's children are visited only where `visit` returns true for it.
+/// Calls visit(OctreeNode) for the nodes in the order of the octree: base cells from first to last, and the
+/// children 0 to 7 of a node after the node. The children of an internal node are visited only if `visit`
+/// returns true for the node.
 template <typename Visit>
 void visitNodes(const FieldData& field, Visit&& visit) {
   std::vector<OctreeNode> stack;
@@ -47,16 +48,18 @@ void visitNodes(const FieldData& field, Visit&& visit) {
 /// Returns all leaves in the order of the octree.
 std::vector<OctreeNode> allLeaves(const FieldData& field);
 
-/// Returns the node of a cell, or the leaf that holds the cell where the octree ends above it.
+/// Returns the node of the cell with this index and depth. If the octree has no such node, returns the larger
+/// leaf that holds the cell.
 OctreeNode nodeAt(const FieldData& field, const CellIndex& cellIndex, int depth);
 
-/// Returns the leaf, as large as `leaf` or larger, that holds the cell `steps` cells of the leaf's size away; nothing
-/// where that cell is subdivided or lies outside the domain.
+/// Returns the leaf that holds the cell which is `steps` cells away from `leaf`, in cells of the size of
+/// `leaf`. The result is as large as `leaf` or larger. Returns std::nullopt if the cell is subdivided or lies
+/// outside the domain.
 std::optional<OctreeNode> equalOrLargerNeighbour(const FieldData& field, const OctreeNode& leaf,
                                                  const std::array<int, 3>& steps);
 
-/// Calls f(neighbour) for the leaves around `leaf` that are as large as it or larger, one for each of 26 directions: a
-/// larger leaf may lie in several of them.
+/// Calls f(neighbour) for each of the 26 directions in which the neighbour of `leaf` is as large as `leaf` or
+/// larger. A larger neighbour is visited once for each direction in which it lies.
 template <typename F>
 void forEachNeighbour(const FieldData& field, const OctreeNode& leaf, const F& f) {
   for (int x = -1; x <= 1; ++x)
@@ -66,9 +69,10 @@ void forEachNeighbour(const FieldData& field, const OctreeNode& leaf, const F& f
           if (const auto neighbour = equalOrLargerNeighbour(field, leaf, {x, y, z})) f(*neighbour);
 }
 
-/// Calls f(axis, step, neighbour) for the faces, at the lower (step −1) or upper (step 1) end of an axis, that `leaf`
-/// shares with larger leaves, and for its upper faces also with equal ones: each interface of a field belongs to one
-/// leaf.
+/// Calls f(axis, step, neighbour) for the interfaces of the field that belong to `leaf`. The step is −1 for a
+/// face at the lower end of the axis and 1 for a face at the upper end. The faces to larger leaves belong to
+/// `leaf`, and of the faces to equally large leaves the upper ones, so that each interface belongs to exactly
+/// one leaf.
 template <typename F>
 void forEachInterface(const FieldData& field, const OctreeNode& leaf, const F& f) {
   for (int axis = 0; axis < 3; ++axis)

@@ -9,17 +9,18 @@
 namespace hpsdf::query {
 namespace {
 
-/// Depth of the deepest leaf that touches each face of a leaf, by axis and side.
+/// For each of the six faces of a leaf, by axis and side, the depth of the deepest leaf that touches the face.
 using FaceDepths = std::array<std::array<std::uint8_t, 2>, 3>;
 
-/// Raises a number that other threads may raise at the same time.
+/// Sets `number` to `to` if `to` is greater. Other threads may do the same with the same number at the same
+/// time.
 void raise(std::uint8_t& number, std::uint8_t to) {
   const std::atomic_ref shared(number);
   for (std::uint8_t now = shared.load(); now < to && !shared.compare_exchange_weak(now, to);) {
   }
 }
 
-/// Takes a leaf into account at those faces of a larger leaf that it touches.
+/// Updates the depths `deepest` of those faces of the larger leaf `large` that the smaller leaf `leaf` touches.
 void touchFaces(const OctreeNode& leaf, const OctreeNode& large, FaceDepths& deepest) {
   const int levels = leaf.depth - large.depth;
   const std::int64_t last = (std::int64_t{1} << levels) - 1;
@@ -30,7 +31,7 @@ void touchFaces(const OctreeNode& leaf, const OctreeNode& large, FaceDepths& dee
   }
 }
 
-/// Returns the blend extents of every leaf (`namespace blend_extent`), by node; 0 for internal nodes.
+/// Returns the packed blend extents (`namespace blend_extent`) of every node. They are 0 for internal nodes.
 std::vector<std::uint32_t> findBlendExtents(const FieldData& field) {
   const std::vector<OctreeNode> leaves = allLeaves(field);
   const auto forEachLeaf = [&](const auto& visit) {
@@ -57,7 +58,8 @@ std::vector<std::uint32_t> findBlendExtents(const FieldData& field) {
   return extents;
 }
 
-/// Fills the entries, and with blending their extents, from the nodes of the lookup grid's depth and the leaves above.
+/// Fills the entries of the lookup grid from the nodes of its depth and the leaves above that depth. With
+/// blending, also fills the blend extents of the entries.
 void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
   visitNodes(field, [&](const OctreeNode& at) {
     if (!node::isLeaf(field.nodes[at.node]) && at.depth < lookupGrid.depth) return true;

@@ -1,5 +1,6 @@
-// The part of evaluate.h that is generic in `Number`, which is double or a SIMD vector of doubles. It is included
-// inside a namespace, as legendre-inl.h is, once for each instruction set. Coefficients may also be float.
+// Evaluation of polynomials for evaluate.h and the batches. It is generic in `Number`, which is double or a
+// SIMD vector of doubles. Like legendre-inl.h, it is included inside a namespace, once for each instruction
+// set. Coefficients may also be float.
 
 /// Calls f(0) to f(last).
 template <typename F>

@@ -27,7 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 7> kExtensions = {".obj", ".ply", ".stl", ".off", ".3ds", ".gltf", ".glb"};
 
-/// Throws `Error` for a file that is known to be unusable before assimp opens it: assimp's own messages do not help.
+/// Throws `Error` if the file is unusable for a reason that can be found before assimp opens it. assimp's own
+/// messages for such files do not help the user.
 void requireReadable(const fs::path& file) {
   const std::string name = file.string();
   const auto refuse = [&](const std::string& problem) { throw Error(ErrorKind::file, name, problem); };
@@ -77,8 +78,8 @@ double largestPlyCount(const fs::path& file) {
   return largest;
 }
 
-/// The larger one of the numbers of vertices and of faces. The number of edges that follows them is often wrong, and no
-/// reader uses it.
+/// Returns the number of vertices or the number of faces in the header of an OFF file, whichever is larger. The
+/// number of edges that follows them is often wrong, and no reader uses it.
 double largestOffCount(const fs::path& file) {
   double largest = 0;
   std::ifstream stream(file, std::ios::binary);
@@ -105,7 +106,8 @@ bool plyMayExceedFloat(const fs::path& file) {
   });
 }
 
-/// Returns true for an STL file of exactly the size that binary data with its number of faces has, as assimp does.
+/// Returns true if an STL file has exactly the size of binary data with the number of faces that it states.
+/// assimp uses the same test.
 bool isBinaryStl(const fs::path& file) {
   constexpr std::uintmax_t kHeader = 80, kFace = 50;
   std::uint32_t faces = 0;
@@ -116,7 +118,7 @@ bool isBinaryStl(const fs::path& file) {
          fs::file_size(file, error) == kHeader + sizeof faces + kFace * faces;
 }
 
-/// Returns true if the text has a line that consists of `line` and blanks, whatever characters end the lines.
+/// Returns true if a line of the text consists of `line` and blanks only. Any line-end characters are accepted.
 bool hasLine(std::string_view text, std::string_view line) {
   constexpr std::string_view kBlank = " \t", kLineEnd = "\r\n";
   for (std::size_t at = 0; (at = text.find(line, at)) != std::string_view::npos; at += line.size()) {
@@ -132,7 +134,7 @@ bool hasLine(std::string_view text, std::string_view line) {
 void requireSoundHeader(const fs::path& file) {
   const std::string extension = lowerExtension(file), name = file.string();
   if (extension == ".ply") {
-    // assimp reads on until it finds the end of the header.
+    // Limit the length of a header. assimp reads on until it finds the header's end, however long that takes.
     constexpr std::size_t kLongestHeader = 1 << 20;
     std::string beginning(kLongestHeader, '\0');
     std::ifstream stream(file, std::ios::binary);
@@ -141,8 +143,8 @@ void requireSoundHeader(const fs::path& file) {
     if (!hasLine(beginning, "end_header"))
       throw Error(ErrorKind::file, name, "its header does not end; check or export the file again");
   }
-  // assimp allocates memory for the numbers in the header before it reads on, so that a few wrong bytes could exhaust
-  // the memory.
+  // Check the largest count in the header. assimp allocates memory for that many elements before it reads on, so
+  // that a few wrong bytes could exhaust the memory.
   const double count = extension == ".ply" ? largestPlyCount(file) : extension == ".off" ? largestOffCount(file) : 0;
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
@@ -151,7 +153,7 @@ void requireSoundHeader(const fs::path& file) {
                 "its header promises more vertices or faces than the file has bytes; export it again");
 }
 
-/// A message of assimp as a part of one line.
+/// Returns an error message of assimp in a form that fits into one line.
 std::string oneLine(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return std::iscntrl(c); }, ' ');
@@ -163,7 +165,8 @@ Error unreadable(const std::string& name, const std::string& reason) {
   return {ErrorKind::file, name, "cannot be read as a mesh (" + oneLine(reason) + "); check or export the file again"};
 }
 
-/// Throws `Error` for indices out of range, which assimp's readers check for some formats only.
+/// Throws `Error` if a vertex index in the scene is out of range. assimp's readers check indices for some
+/// formats only.
 void requireValidIndices(const aiScene& scene, const std::string& name) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     const aiMesh& part = *scene.mMeshes[m];
@@ -177,7 +180,7 @@ void requireValidIndices(const aiScene& scene, const std::string& name) {
   }
 }
 
-/// Reads the scene into `importer`, which owns it.
+/// Reads the scene in a file by means of `importer`, which owns the scene.
 const aiScene& readScene(Assimp::Importer& importer, const fs::path& file) {
   const std::string name = file.string();
   const aiScene* scene = nullptr;
@@ -197,7 +200,8 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// The triangles of a polygon as indices of the part's vertices; empty for points and lines.
+/// Returns the triangles of a polygon as vertex indices of the mesh `part`. The result is empty if the polygon
+/// is a point or a line.
 std::vector<Triangle> trianglesOf(const aiFace& face, const aiMesh& part) {
   if (face.mNumIndices < 3) return {};
   std::vector<Vector3> corners;
@@ -233,12 +237,13 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& world
     }
 }
 
-/// All meshes of the scene in world coordinates, each once for every node that refers to it.
+/// Joins all meshes of a scene in world coordinates. A mesh occurs once for every scene node that refers to it.
 TriangleMesh joined(const aiScene& scene, const fs::path& file) {
   TriangleMesh mesh;
   mesh.name = file.string();
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
-  // assimp rotates every 3DS scene from z up to y up; the inverse rotation restores the coordinates of the file.
+  // Undo assimp's rotation of 3DS scenes from z up to y up. The inverse rotation restores the coordinates of the
+  // file.
   if (lowerExtension(file) == ".3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
 
   std::vector<std::pair<const aiNode*, Eigen::Affine3d>> pending = {{scene.mRootNode, worldFromRoot}};

@@ -6,8 +6,8 @@
 
 namespace hpsdf::mesh {
 
-/// All meshes of the file's scene joined under their node transforms, with polygons triangulated and nothing cleaned.
-/// Throws `Error` as `importMesh` does.
+/// Reads all meshes of a file's scene with assimp and joins them under their node transforms. Polygons are
+/// triangulated, and nothing is cleaned. Throws `Error` in the same cases as `importMesh`.
 TriangleMesh readByAssimp(const std::filesystem::path& file);
 
 /// Returns true for a file that can hold coordinates with more digits than the `float` of assimp's readers.

@@ -36,8 +36,8 @@ void requireUsable(const TriangleMesh& mesh) {
           " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
 }
 
-/// Replaces vertices of equal position by the first of them in all triangles, and returns the number of vertices that
-/// this leaves unused.
+/// Makes all triangles use the first of several vertices with the same position. Returns the number of vertices
+/// that become unused.
 std::size_t weld(TriangleMesh& mesh) {
   std::unordered_map<PositionBits, std::uint32_t, HashBits> firstAt;
   firstAt.reserve(mesh.vertices.size());
@@ -54,8 +54,9 @@ std::size_t weld(TriangleMesh& mesh) {
   return mesh.vertices.size() - firstAt.size();
 }
 
-/// Returns true if a triangle's corners lie on one line up to the rounding of this test. The tolerance is relative to
-/// the edges, so that it does not depend on the size of the mesh and keeps thin slivers with an area.
+/// Returns true if the corners of a triangle lie on one line up to the rounding errors of this test. The
+/// tolerance is relative to the triangle's edges. The result thus does not depend on the size of the mesh, and
+/// is false for thin slivers with an area.
 bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
   const auto [a, b, c] = cornersOf(mesh, triangle);
   std::array<Vector3, 3> edges = {b - a, c - b, a - c};
@@ -65,7 +66,7 @@ bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
   for (Vector3& edge : edges) edge /= scale;  // Products of scaled edges neither underflow nor overflow.
   std::sort(edges.begin(), edges.end(),
             [](const Vector3& u, const Vector3& v) { return u.squaredNorm() < v.squaredNorm(); });
-  // The cross product of the two shorter edges suffers least from cancellation.
+  // Compute the tolerance for the cross product of the two shorter edges, which suffers least from cancellation.
   const double rounding = 4 * std::numeric_limits<double>::epsilon() * edges[0].norm() * edges[1].norm();
   return edges[0].cross(edges[1]).norm() <= rounding;
 }
@@ -103,8 +104,8 @@ class EdgeMap {
   std::unordered_map<std::uint64_t, std::uint32_t> faceOf_;
 };
 
-/// The triangle rotated so that its longest edge comes first. The last corner of a collinear triangle is then the
-/// middle one.
+/// Returns triangle t with its corners rotated so that its longest edge comes first. If the triangle is
+/// collinear, its last corner then lies between the other two.
 Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   const auto squared = [&](int i) { return (mesh.vertices[t[i]] - mesh.vertices[t[(i + 1) % 3]]).squaredNorm(); };
   const std::array<double, 3> lengths = {squared(0), squared(1), squared(2)};
@@ -134,11 +135,12 @@ bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   return true;
 }
 
-/// Flips the longest edge of collinear triangles and returns the number of flips.
+/// Removes collinear triangles by flipping their longest edges. Returns the number of flips.
 ///
-/// Polygons and CAD facets with corners along a straight side yield such triangles, and dropping them would open the
-/// mesh. A flip splits the neighbour across the longest edge at the middle corner: surface and number of triangles
-/// stay, and both triangles have an area. Where that is impossible the triangle stays as it is.
+/// Polygons and CAD facets with corners along a straight side yield collinear triangles. Dropping these would
+/// open the mesh. A flip splits the neighbour across the longest edge at the triangle's middle corner. The
+/// surface and the number of triangles remain, and both new triangles have an area. If a flip is impossible,
+/// the triangle remains unchanged.
 std::size_t flipCollinearFaces(TriangleMesh& mesh) {
   std::vector<std::uint32_t> pending;
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
@@ -147,8 +149,8 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
 
   EdgeMap edges(mesh.triangles);
   std::size_t flips = 0;
-  // A flip may become possible only after a neighbour without area is flipped. The search is therefore repeated in
-  // rounds, each of which, except the last, flips a triangle.
+  // Repeat the search for flips in rounds, because a flip may become possible only after a collinear neighbour is
+  // flipped. Each round except the last flips at least one triangle.
   for (bool changed = true; changed;) {
     const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
     flips += flipped;
@@ -157,7 +159,7 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
   return flips;
 }
 
-/// The number of triangles dropped for one reason, and the centroid of the first.
+/// The number of triangles that were dropped for one reason, and the centroid of the first of these triangles.
 struct Dropped {
   std::size_t faces = 0;
   Vector3 position = Vector3::Zero();

@@ -34,7 +34,8 @@ double floatSpacing(double coordinate) {
   return std::ldexp(1.0, std::max(exponent, kSmallest) - kBits);
 }
 
-/// The end of a message about a mesh without area, where the rounding to float is the probable cause; else empty.
+/// Returns the end of an error message about a mesh without area if rounding to float is the probable cause,
+/// else an empty text.
 std::string spacingHint(const fs::path& file, const Box& box) {
   constexpr double kFew = 16;
   const double largest = largestCoordinate(box), spacing = floatSpacing(largest);
@@ -113,12 +114,13 @@ void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) 
 
 void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
 
-/// Writes binary data, or text where binary data would begin with the byte of a line feed: readers would take it for a
-/// part of the header.
+/// Writes a PLY file with binary data. Writes text instead if the first byte of the binary data would be a line
+/// feed, because readers would take that byte for a part of the header.
 void writePly(const TriangleMesh& mesh, OutputFile& out) {
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
   const auto vertices = std::as_bytes(std::span(mesh.vertices));
-  // assimp takes a line feed at the beginning of the data for a part of the header, and shifts all numbers by a byte.
+  // Choose text if binary data would begin with a line feed. assimp takes that byte for a part of the header and
+  // then reads all numbers shifted by one byte.
   const bool asText = !vertices.empty() && vertices.front() == std::byte{'\n'};
   out.write(std::string("ply\nformat ") + (asText ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
             std::to_string(mesh.vertices.size()) +

@@ -15,7 +15,8 @@ using Vector2 = Eigen::Vector2d;
 
 double cross(const Vector2& u, const Vector2& v) { return u.x() * v.y() - u.y() * v.x(); }
 
-/// The polygon projected along the coordinate axis nearest to its normal, counter-clockwise.
+/// Returns the polygon projected to two dimensions along the coordinate axis nearest to its normal. The result
+/// runs counter-clockwise.
 std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
   Vector3 normal = Vector3::Zero();
   for (std::size_t i = 2; i < polygon.size(); ++i)
@@ -34,7 +35,7 @@ std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
 /// A set of corners of a polygon, as bits.
 class CornerSet {
  public:
-  /// The set of all corners.
+  /// Makes a set that contains all corners of a polygon with `corners` corners.
   explicit CornerSet(std::size_t corners) : words_((corners + 63) / 64, ~std::uint64_t{0}) {
     if (corners % 64 != 0) words_.back() = (std::uint64_t{1} << corners % 64) - 1;
   }
@@ -42,7 +43,8 @@ class CornerSet {
   void add(std::uint32_t corner) { words_[corner / 64] |= bit(corner); }
   void remove(std::uint32_t corner) { words_[corner / 64] &= ~bit(corner); }
 
-  /// The first corner of the set from `start` on in cyclic order; empty for an empty set.
+  /// Returns the first corner of the set at or after `start` in cyclic order, or std::nullopt if the set is
+  /// empty.
   std::optional<std::uint32_t> next(std::uint32_t start) const {
     std::uint64_t bits = words_[start / 64] & ~(bit(start) - 1);
     for (std::size_t i = 0, word = start / 64; i <= words_.size(); ++i, bits = words_[word]) {
@@ -58,7 +60,8 @@ class CornerSet {
   std::vector<std::uint64_t> words_;
 };
 
-/// A grid of about a quarter as many cells as corners, for searches of the corners in a box.
+/// A grid for finding the corners of a polygon in a box. It has about a quarter as many cells as the polygon
+/// has corners.
 class CornerGrid {
  public:
   explicit CornerGrid(const std::vector<Vector2>& points)
@@ -71,7 +74,8 @@ class CornerGrid {
     for (std::uint32_t i = 0; i < points.size(); ++i) corners_[ends[cellOf(points[i])]++] = i;
   }
 
-  /// A corner for which `is` returns true, among the corners in the box and others near it.
+  /// Returns a corner for which `is` returns true, or std::nullopt if there is none. Searches all corners in the
+  /// box and some corners near the box.
   template <typename Predicate>
   std::optional<std::uint32_t> find(const Eigen::AlignedBox2d& box, const Predicate& is) const {
     const std::size_t lastX = column(0, box.max().x()), lastY = column(1, box.max().y());
@@ -96,9 +100,9 @@ class CornerGrid {
   std::vector<std::uint32_t> corners_;  ///< the corners, sorted by cell
 };
 
-/// Ear clipping (Meisters 1975): cuts off one ear after another, that is, a convex corner whose triangle contains no
-/// other corner. A corner that is not an ear is tested again once a neighbour or the corner within its triangle is cut
-/// off.
+/// Triangulates a polygon by ear clipping (Meisters 1975): cuts off one ear after another. An ear is a convex
+/// corner whose triangle contains no other corner. A corner that is not an ear is tested again after a
+/// neighbour, or the corner that was found in its triangle, is cut off.
 class EarClipper {
  public:
   explicit EarClipper(std::span<const Vector3> polygon)
@@ -117,9 +121,9 @@ class EarClipper {
   }
 
   std::vector<Triangle> clip() {
-    // Positions come from float, which rounds corners away from a straight side. Ears as thin as that rounding, and
-    // ears whose cut passes another corner that closely, would yield slivers whose normals are noise. They are cut
-    // off only if there is no other ear.
+    // Cut off thin ears only if there is no other ear. Corner positions come from float, which rounds corners away
+    // from a straight side. Ears as thin as that rounding, and ears whose cut passes another corner that closely,
+    // would yield slivers whose normals are noise.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
@@ -137,8 +141,9 @@ class EarClipper {
     return corner;
   }
 
-  /// Returns true if the corner is an ear. The corner must deviate from a straight angle, and all other corners must
-  /// be outside the triangle, by more than `tolerance`, which is relative to the triangle's sides.
+  /// Returns true if `corner` is an ear. The corner must deviate from a straight angle by more than `tolerance`,
+  /// and all other corners must be outside its triangle by more than `tolerance`. The tolerance is relative to
+  /// the triangle's sides.
   bool isEar(std::uint32_t corner, double tolerance) {
     const std::uint32_t before = previous_[corner], after = next_[corner];
     const std::array<Vector2, 3> ear = {points_[before], points_[corner], points_[after]};
@@ -152,7 +157,8 @@ class EarClipper {
     return !other;
   }
 
-  /// The box of all points that `isNear` accepts: those of the triangle with every side moved outwards.
+  /// Returns the box of all points for which `isNear` returns true, that is, of the triangle `ear` with every
+  /// side moved outwards.
   static Eigen::AlignedBox2d boxAround(const std::array<Vector2, 3>& ear, double tolerance) {
     Eigen::AlignedBox2d box;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -162,8 +168,8 @@ class EarClipper {
     return box;
   }
 
-  /// Returns true for points in or near the triangle but not at its corners, because a polygon with a slit passes
-  /// through the same point twice.
+  /// Returns true if p is in or near the triangle `ear` but not at one of its corners. Corner positions do not
+  /// count because a polygon with a slit passes through the same point twice.
   static bool isNear(const Vector2& p, const std::array<Vector2, 3>& ear, double tolerance) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Vector2 side = ear[(i + 1) % 3] - ear[i];
@@ -172,7 +178,7 @@ class EarClipper {
     return true;
   }
 
-  /// The corner to cut off where no ear is left: the polygon is flat or intersects itself.
+  /// Returns the corner to cut off if no ear is left, that is, if the polygon is flat or intersects itself.
   std::uint32_t flattestCorner() const {
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
 #pragma once
-// The samples of one body's surface that lie in another body: position, depth, and direction out of the other
-// body.
+// Contacts between two bodies: the surface samples of one body that lie in the other body. Each contact has
+// a position, a depth, and a direction out of the other body.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,8 +15,9 @@ namespace hpsdf::physics {
 
 struct ContactOptions {
   double margin = 0;  ///< samples up to this distance outside are contacts too; world units, 0 or more
-  /// The number of contacts to keep: the deepest ones, in descending order; among equal depths the lower sample
-  /// index comes first. Without a number all contacts are returned, in the order of the samples.
+  /// The maximum number of contacts. The deepest contacts are kept, the deepest first; among equal depths the
+  /// contact with the lower sample index comes first. If this is empty, all contacts are returned in the
+  /// order of the samples.
   std::optional<std::size_t> deepest = {};
 };
 
@@ -24,8 +25,8 @@ struct Contact {
   std::uint32_t sample;  ///< index of the sample
   double depth;          ///< −f at the sample: above 0 inside
   Vector3 position;      ///< position of the sample, in the world
-  /// Unit vector in the world out of the field's body: the field's direction of steepest ascent. Where the gradient
-  /// vanishes, the opposite of the sample's normal.
+  /// Unit vector in world coordinates that points out of the field's body: the direction of the field's
+  /// gradient. If the gradient vanishes, it is the opposite of the sample's normal.
   Vector3 normal;
 };
 
@@ -37,7 +38,7 @@ struct BodyPair {
   Eigen::Isometry3d worldFromField;
 };
 
-/// The work of queries.
+/// The amount of work that queries took.
 struct QueryCost {
   std::size_t spheres = 0;      ///< spheres tested against the collider's table
   std::size_t samples = 0;      ///< samples tested against the collider's table
@@ -48,13 +49,13 @@ struct QueryCost {
 
 class PairContacts;
 
-/// Runs queries one after another. It reuses its memory, so that a query allocates only if it has more contacts
-/// than every query before.
+/// Finds the contacts of one body pair at a time. It reuses its memory, so that a query allocates memory
+/// only if it has more contacts than every query before.
 class ContactQuery {
  public:
-  /// Finds exactly the samples that evaluating the field at each sample would find. The result is valid until the next
-  /// query. Throws `Error` for a transform that is not finite or not rigid (within 1e-6), for a margin that is not
-  /// finite or below 0, and for `deepest` = 0.
+  /// Returns the contacts of a pair: exactly those that evaluating the field at every sample would give. The
+  /// result is valid until the next query. Throws `Error` if a transform is not finite or not rigid (within
+  /// 1e-6), if the margin is not finite or below 0, and if `deepest` is 0.
   std::span<const Contact> find(const BodyPair& pair, const ContactOptions& options = {});
 
   /// The cost of the last query.
@@ -64,7 +65,7 @@ class ContactQuery {
   friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
   void clear();
-  /// Appends the contacts of a valid pair, and adds their cost.
+  /// Appends the contacts of a valid pair to the stored contacts, and adds the cost of the query.
   void append(const BodyPair& pair, const ContactOptions& options);
 
   std::vector<Contact> contacts_;
@@ -89,9 +90,9 @@ class PairContacts {
   QueryCost cost_;
 };
 
-/// Finds the contacts of all pairs, as `ContactQuery` does, with the threads of the caller's TBB arena. The result does
-/// not depend on their number. Throws `Error` as `ContactQuery` does, with the number of the first invalid pair, before
-/// any query starts.
+/// Finds the contacts of all pairs, as `ContactQuery` does, with the threads of the caller's TBB arena. The
+/// result does not depend on the number of threads. Throws `Error` as `ContactQuery` does, before any query
+/// starts, and names the number of the first invalid pair.
 void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
 }  // namespace hpsdf::physics

@@ -1,5 +1,5 @@
 #pragma once
-// A table of lower bounds of a field, with which collision queries skip most evaluations.
+// A table of lower bounds of a field. With it collision queries skip most evaluations of the field.
 
 #include <array>
 #include <cstddef>
@@ -10,32 +10,35 @@
 
 namespace hpsdf::physics {
 
-/// A field with a table of guaranteed lower bounds of it. A lookup costs a third of an evaluation.
+/// A field with a table of guaranteed lower bounds of the field's values. Looking up a bound costs a third
+/// of evaluating the field.
 ///
-/// A field only approximates a distance: between two points it may change by more than their distance, and it
-/// jumps. Therefore its value at a sphere's centre bounds it within the sphere only with a slack, which is large
-/// where the field is coarse. Let g be the greatest function below the field with |g(x) − g(y)| ≤ |x − y|. The
-/// collider stores g as precisely as a grid of cells allows. The bounds are derived from bounds of the polynomials
-/// of all leaves, blended neighbours included, so that they hold for every field, with stored bounds or without.
+/// A field only approximates a distance function: between two points its value may change by more than
+/// their distance, and it jumps between cells. Therefore the value at a sphere's centre bounds the field
+/// within the sphere only with a tolerance, which is large where the field is coarse. Let g be the greatest
+/// function below the field with |g(x) − g(y)| ≤ |x − y|. The collider stores g as precisely as a grid of
+/// cells allows. Its bounds are derived from bounds of the polynomials of all leaves, including neighbours
+/// blended with them. They therefore hold for every field, whether or not the field stores bounds itself.
 class FieldCollider {
  public:
-  /// Refers to the field, which must outlive it.
+  /// Keeps a reference to the field, which must outlive the collider.
   explicit FieldCollider(const Field& field);
   explicit FieldCollider(Field&&) = delete;
 
   const Field& field() const { return *field_; }
 
-  /// A lower bound of the field at x, or 0 where the field may be negative; never below 0. Here and below x may be
-  /// infinite, but not NaN.
+  /// Returns a lower bound of the field at x, never below 0: it is 0 where the field may be negative. Here
+  /// and in `lowerBoundAround` the coordinates of x may be infinite, but not NaN.
   double lowerBound(const Vector3& x) const;
 
-  /// A bound b ≥ 0 of the field around x: at every distance r < b from x the field is at least b − r.
+  /// Returns a bound b ≥ 0 of the field around x: at every point at a distance r < b from x, the field is at
+  /// least b − r.
   double lowerBoundAround(const Vector3& x) const;
 
   std::size_t bytes() const { return cells_.size() * sizeof(cells_[0]); }
 
  private:
-  /// Lower bounds in multiples of `unit_`, rounded down.
+  /// Lower bounds of one cell of the table, in multiples of `unit_`, rounded down.
   struct Cell {
     std::uint16_t within;  ///< lower bound of the field in the cell
     std::uint16_t around;  ///< lower bound of the field at any point plus its distance from any point of the cell

@@ -8,18 +8,20 @@
 
 namespace hpsdf::physics {
 
-/// Properties of a body of uniform density, in its mesh's units.
+/// The mass properties of a body of uniform density. Lengths are in the units of the body's mesh.
 struct MassProperties {
   double volume;  ///< above 0
-  /// From the frame of inertia, whose origin is the centre of mass and whose axes are the principal axes.
+  /// Maps the frame of inertia to the mesh. The origin of the frame of inertia is the centre of mass, its
+  /// axes are the principal axes.
   Eigen::Isometry3d meshFromInertia;
   Vector3 inertia;  ///< moments about the principal axes of a body of mass 1, in squared units
   Box box;          ///< bounding box of the mesh in the frame of inertia
 };
 
-/// Integrates over the tetrahedra that the faces form with one point (divergence theorem; Tonon 2004 gives their
-/// moments). Throws `Error` for a mesh without volume, with indices out of range or coordinates that are not
-/// finite. For an open mesh the result is that of some closed mesh.
+/// Computes the mass properties of a closed mesh. Integrates over the tetrahedra that the faces form with
+/// one common point (divergence theorem; Tonon 2004 gives the moments of a tetrahedron). Throws `Error` if
+/// the mesh has no volume, has indices out of range, or has coordinates that are not finite. For an open
+/// mesh the result is that of some mesh that closes it.
 MassProperties massProperties(const TriangleMesh& mesh);
 
 }  // namespace hpsdf::physics

@@ -9,9 +9,10 @@
 
 namespace hpsdf::physics {
 
-/// A node of the hierarchy, around the points with the positions `begin` to `end` (exclusive) in the tree's order. The
-/// nodes are stored in depth-first order. `next` is the index of the first node after this node's subtree, at which a
-/// search continues that skips the node; a node without children is followed directly by `next`.
+/// A node of the hierarchy. Its sphere surrounds the points at the positions `begin` to `end` (exclusive)
+/// in the tree's order. The nodes are stored in depth-first order. `next` is the index of the first node
+/// after this node's subtree, at which a search continues if it skips this node. If a node has no children,
+/// `next` is the index directly after it.
 struct Sphere {
   Vector3 center;
   double radius;  ///< no point is farther from the centre, in spite of rounding

@@ -1,6 +1,6 @@
 #pragma once
-// The points of a body's surface that are evaluated in the fields of other bodies (Koschier et al. 2016, sec. 4, after
-// Sanchez et al. 2012), in a hierarchy of bounding spheres.
+// Points of a body's surface at which the fields of other bodies are evaluated (Koschier et al. 2016, sec.
+// 4, after Sanchez et al. 2012). They are stored in a hierarchy of bounding spheres.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,17 +19,18 @@ constexpr std::size_t kMaxSamples = std::size_t{1} << 24;  ///< greatest number 
 /// The number of samples, by exactly one of `count` and `spacing`.
 struct SampleOptions {
   std::optional<std::size_t> count = {};
-  /// Side in mesh units of the square of surface that each sample represents. The nearest neighbour of a sample is
-  /// about 0.85 times as far away.
+  /// The side length, in mesh units, of a square with the surface area that each sample represents. The
+  /// distance from a sample to its nearest neighbour is about 0.85 times this length.
   std::optional<double> spacing = {};
   std::uint64_t seed = 1;  ///< seed of the random candidates
 };
 
-/// Points of a surface with its outward normals, sorted so that the points of each sphere are contiguous. Immutable.
+/// Points of a surface with the outward normals of the surface. The points are sorted so that those of each
+/// bounding sphere are contiguous. The object is immutable.
 class SurfaceSamples {
  public:
-  /// Takes points with one unit normal each, and reorders them. Throws `Error` for no points, for more than
-  /// `kMaxSamples`, for spans of unequal length and for coordinates that are not finite.
+  /// Takes points with one unit normal each, and reorders them. Throws `Error` if there are no points or more
+  /// than `kMaxSamples`, if the two spans have unequal lengths, or if coordinates are not finite.
   SurfaceSamples(std::span<const Vector3> points, std::span<const Vector3> normals);
 
   std::size_t size() const { return points_.size(); }
@@ -42,14 +43,15 @@ class SurfaceSamples {
   std::vector<Sphere> spheres_;
 };
 
-/// Distributes samples evenly over a mesh, with the normals of their triangles, by sample elimination (Yuksel
-/// 2015). It starts from five times as many random points and removes the point with the most and nearest
-/// neighbours until the number is right. Surfaces that face away from each other, like the two sides of a thin
-/// wall, are sampled independently. The same mesh and options give the same bytes.
+/// Distributes samples evenly over a mesh by sample elimination (Yuksel 2015). Each sample has the normal
+/// of its triangle. Sampling starts from five times as many random points as needed. Then the point with
+/// the most and nearest neighbours is removed repeatedly until the required number is left. Surfaces that
+/// face away from each other, like the two sides of a thin wall, are sampled independently. The same mesh
+/// and options always give the same bytes.
 ///
-/// Throws `Error` for a mesh without triangles or area, with indices out of range or coordinates that are not
-/// finite, for options that do not have exactly one of count and spacing, for a count of 0 or beyond
-/// `kMaxSamples`, and for a spacing that is not above 0 or not finite.
+/// Throws `Error` if the mesh has no triangles or no area, has indices out of range or coordinates that are
+/// not finite; if not exactly one of count and spacing is given; if the count is 0 or more than
+/// `kMaxSamples`; and if the spacing is not finite or not above 0.
 SurfaceSamples sampleSurface(const TriangleMesh& mesh, const SampleOptions& options);
 
 }  // namespace hpsdf::physics

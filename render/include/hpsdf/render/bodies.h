@@ -1,6 +1,6 @@
 #pragma once
-// Pictures of triangle meshes: rigid bodies, many of which may share a mesh, and meshes whose vertices move, as cloth
-// does.
+// Pictures of bodies that are triangle meshes. Many rigid bodies may share one mesh. The vertices of a mesh
+// may also move, like those of cloth.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,8 @@
 
 namespace hpsdf::render {
 
-/// The colour of the body with this index. Colours of consecutive indices differ, and none is near `surfaceColor`.
+/// Returns the colour of the body with this index. The colours of consecutive indices differ, and no colour
+/// is close to `surfaceColor`.
 Color bodyColor(std::size_t index);
 
 /// The clay colour of a field's surface in pictures without a colour scale.
@@ -29,54 +30,59 @@ struct Body {
   Color color = bodyColor(0);
 };
 
-/// The bodies that the pixels of a view see, rows top to bottom. Distances can be compared with those of
-/// `ViewBuffers`, so that the nearer of a body and the surface hides the other. A pixel without a body has `body`
-/// kNoBody and 0 in the other buffers.
+/// For each pixel of a view, the body that the pixel shows; rows from top to bottom. The distances can be
+/// compared with those of `ViewBuffers`, so that the nearer of a body and the field's surface hides the
+/// other. For a pixel that shows no body, `body` is kNoBody and the other buffers are 0.
 struct BodyBuffers {
   int width = 0;
   int height = 0;
   std::vector<std::uint32_t> body;      ///< index of the body among those drawn
   std::vector<std::uint32_t> triangle;  ///< index of the triangle in the body's mesh
-  /// The unit normal of the side of the triangle that faces the eye: meshes may be open or have the wrong orientation.
-  /// The normal is interpolated where the mesh is smooth, so that it may point slightly away from the eye at a
-  /// silhouette.
+  /// The unit normal of the triangle, on the side of the triangle that faces the eye, because meshes may be
+  /// open or have the wrong orientation. The normal is interpolated where the mesh is smooth. At a silhouette
+  /// it may therefore point slightly away from the eye.
   std::vector<Eigen::Vector3f> normal;
   std::vector<float> distance;  ///< distance along the ray from its start to the body, world units
 
   bool hit(std::size_t pixel) const { return body[pixel] != kNoBody; }
 };
 
-/// Fills the buffers of bodies of a fixed list of meshes. Not thread-safe: use one renderer for each thread.
+/// Renders views of bodies, which refer to a fixed list of meshes, into buffers. Not thread-safe: use one
+/// renderer for each thread.
 class BodyRenderer {
  public:
   virtual ~BodyRenderer();
 
-  /// Renders bodies. In perspective, nothing is seen at depths below 1e-5 of the farthest body's depth; with
-  /// parallel rays, nothing in front of the plane in which the rays start. Requires that the camera's forward, right
-  /// and up vectors are at right angles. Throws `Error` for a view of more than 64 Mi pixels, before memory is
-  /// taken, and for bodies as `bounds` does.
+  /// Renders bodies. In a perspective view, nothing is visible at depths below 1e-5 of the farthest body's
+  /// depth. With parallel rays, nothing is visible in front of the plane in which the rays start. The
+  /// camera's forward, right and up vectors must be perpendicular. Throws `Error` if the view has more than
+  /// 64 Mi pixels, before memory is allocated, and for invalid bodies as `bounds` does.
   virtual BodyBuffers view(const Camera& camera, std::span<const Body> bodies, int width, int height) = 0;
 
-  /// Moves the vertices of a mesh, world units; its triangles stay. Throws `Error`, and leaves the mesh as it is, for
-  /// another number of vertices, for coordinates that are not finite or for an index of no mesh.
+  /// Replaces the vertex positions of a mesh, in world units; the mesh keeps its triangles. Throws `Error`,
+  /// and leaves the mesh unchanged, if the number of vertices differs, if coordinates are not finite, or if
+  /// no mesh has this index.
   virtual void moveVertices(std::size_t mesh, std::span<const Vector3> vertices) = 0;
 
-  /// A box that holds the bodies, world units; empty for no bodies. Throws `Error` for more than 2^24 bodies, and for a
-  /// body whose mesh does not exist or whose transform is not finite or not rigid, naming the body.
+  /// Returns a box that contains all bodies, in world units; the box is empty if there are no bodies. Throws
+  /// `Error` if there are more than 2^24 bodies. Throws `Error`, which names the body, if a body's mesh does
+  /// not exist or if its transform is not finite or not rigid.
   virtual Box bounds(std::span<const Body> bodies) const = 0;
 
-  /// The name of the device, as in `Renderer::description`.
+  /// Returns the name of the rendering device, as `Renderer::description` does.
   virtual std::string description() const = 0;
 };
 
-/// The reference renderer: intersects the ray of each pixel with the triangles in double precision, without
-/// OpenGL. Throws `Error`, naming the mesh, for a mesh without triangles, with coordinates that are not finite or
-/// beyond 1e15, or with indices of no vertex; throws `Error` for more than 2^26 triangles in all.
+/// Makes the reference renderer, which intersects the ray of each pixel with the triangles in double
+/// precision, without OpenGL. Throws `Error`, which names the mesh, if a mesh has no triangles, has
+/// coordinates that are not finite or beyond 1e15, or has vertex indices out of range. Throws `Error` if
+/// all meshes together have more than 2^26 triangles.
 std::unique_ptr<BodyRenderer> makeCpuBodyRenderer(std::vector<TriangleMesh> meshes);
 
-/// Renders with OpenGL: each mesh is uploaded once, and each body is an instance of its mesh. OpenGL decides which
-/// triangle a pixel sees, with corners rounded to about 1/256 of a pixel; distance and normal are computed from that
-/// triangle in double precision. Throws as `makeCpuBodyRenderer` does, and when no device offers OpenGL 4.5.
+/// Makes a renderer that uses OpenGL. Each mesh is uploaded once, and each body is an instance of its mesh.
+/// OpenGL determines which triangle a pixel shows, with corners rounded to about 1/256 of a pixel. Distance
+/// and normal are computed from that triangle in double precision. Throws `Error` as `makeCpuBodyRenderer`
+/// does, and if no device offers OpenGL 4.5.
 std::unique_ptr<BodyRenderer> makeGlBodyRenderer(std::vector<TriangleMesh> meshes,
                                                  GlChoice choice = GlChoice::automatic);
 

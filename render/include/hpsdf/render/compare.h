@@ -10,10 +10,11 @@
 
 namespace hpsdf::render {
 
-/// The tolerated difference of a channel, out of 255: processors differ in how they round the lowest bits.
+/// The tolerated difference of a colour channel, out of 255. Processors differ in how they round the lowest
+/// bits.
 constexpr int kFreeDifference = 3;
-/// The tolerated share of pixels that differ by more: at cell edges and silhouettes the lowest bit may choose the
-/// cell.
+/// The tolerated fraction of pixels that differ by more than `kFreeDifference`. At cell edges and
+/// silhouettes the lowest bit of a number may decide which cell a pixel shows.
 constexpr double kPixelBudget = 0.002;
 
 struct Comparison {
@@ -27,12 +28,13 @@ struct Comparison {
 };
 Comparison compare(const Image& baseline, const Image& actual);
 
-/// Describes in one line why the comparison fails; empty if the sizes are equal and at most a share of `budget` of the
-/// pixels differ.
+/// Describes in one line why a comparison fails. Returns an empty string if the two sizes are equal and at
+/// most the fraction `budget` of the pixels differs.
 std::string problem(const Comparison& comparison, double budget);
 
-/// Shows the differences between two pictures of the same size: black where the pixels are equal, dark grey where
-/// their difference is tolerated, and from mid grey to white where it is not.
+/// Returns a picture of the differences between two pictures of the same size. A pixel is black if the two
+/// pictures are equal there, dark grey if their difference is tolerated, and mid grey to white if it is
+/// not.
 Image differencePicture(const Image& baseline, const Image& actual);
 
 struct PixelDifference {
@@ -42,8 +44,8 @@ struct PixelDifference {
   Color actual;
   int difference;  ///< difference of the channel that differs most
 };
-/// At most `count` of the pixels that differ most, the worst first. Of neighbouring pixels only the worst is
-/// listed. Both pictures must have the same size.
+/// Returns at most `count` of the pixels that differ most, the greatest difference first. Of neighbouring
+/// pixels only the one with the greatest difference is listed. Both pictures must have the same size.
 std::vector<PixelDifference> worstPixels(const Image& baseline, const Image& actual, std::size_t count);
 
 }  // namespace hpsdf::render

@@ -23,14 +23,15 @@ struct Image {
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };
 
-/// Writes under a temporary name and renames the file. Throws `hpsdf::Error` that names the file.
+/// Writes the picture to a temporary file and then renames this file to `file`. Throws `hpsdf::Error`,
+/// which names the file.
 void savePng(const Image& image, const std::filesystem::path& file);
 
-/// Throws `hpsdf::Error` that names the file.
+/// Loads a picture from a PNG file. Throws `hpsdf::Error`, which names the file.
 Image loadPng(const std::filesystem::path& file);
 
-/// Throws `Error` unless a picture of a view may have this size and sample count: 16 to 16384 pixels per side, 1
-/// to 8 samples per pixel along each axis, and no more than 64 Mi samples in all.
+/// Throws `Error` unless the size and sample count of a picture are in range: 16 to 16384 pixels per side,
+/// 1 to 8 samples per pixel along each axis, and at most 64 Mi samples in all.
 void checkPictureSize(int width, int height, int samples);
 
 }  // namespace hpsdf::render

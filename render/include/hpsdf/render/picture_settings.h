@@ -1,5 +1,6 @@
 #pragma once
-// The settings of a picture of a field, and the key to its colours: plain data, without the functions that draw.
+// The settings of a picture of a field, and the legend of its colours. These are plain data, without the
+// functions that draw.
 
 #include <array>
 #include <cstdint>
@@ -26,7 +27,8 @@ enum class ColorBy : std::uint8_t {
   degree,    ///< degree of the cell
   depth,     ///< depth of the cell
   distance,  ///< f; not for surfaces
-  // The following values are quantities: numbers that are never negative, on a scale from dark to light.
+  // The following enumerators are quantities: numbers that are never negative, shown on a colour scale from
+  // dark to light.
   valueJump,     ///< greatest jump of f at the cell's faces; needs `ReferenceData::jumps`
   gradientJump,  ///< greatest jump of ∇f at the cell's faces; needs `ReferenceData::jumps`
   slope,         ///< ||∇f| − 1| at the point
@@ -36,27 +38,28 @@ enum class ColorBy : std::uint8_t {
 };
 constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
 
-/// The data, besides the field, from which some quantities are computed. All of it must live while a picture is
-/// drawn.
+/// The data, besides the field, from which some quantities are computed. All objects must exist while a
+/// picture is drawn.
 struct ReferenceData {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;  ///< Φ
   const Field* other = nullptr;             ///< g; outside of its domain g is continued
-  /// The mesh's defects, in the field's units; they are marked on a surface as in a picture of the mesh alone
-  /// (mesh_picture.h).
+  /// The defects of the mesh, in the field's units. They are marked on the field's surface in the same way as
+  /// in a picture of the mesh alone (mesh_picture.h).
   const MeshDefects* defects = nullptr;
 };
 
-/// The range of values that the colours stand for. Pictures of several views or fields with the same scale can be
-/// compared.
+/// The range of values that the colours represent. Pictures of several views or fields can be compared if
+/// they use the same scale.
 struct ScaleOptions {
-  /// The values of the darkest and the lightest colour of a quantity, ascending, above 0 on a logarithmic scale; for
-  /// distances, the lowest and the highest value for which colours and iso-lines are chosen. Without limits they are
-  /// chosen from the values, except a few outliers: from the values of all cells if the quantity belongs to cells,
-  /// else from those of the points shown.
+  /// For a quantity: the values of the darkest and the lightest colour, in ascending order, and above 0 on a
+  /// logarithmic scale. For distances: the lowest and the highest value for which colours and iso-lines are
+  /// chosen. If no limits are given, they are chosen from the values, except a few outliers. For a quantity
+  /// of cells these are the values of all cells, else the values at the points shown.
   std::optional<std::array<double, 2>> limits = {};
   bool logarithmic = true;
-  /// Degrees or depths, 0 to 255 and ascending, that the legend contains in addition to the field's own.
+  /// Degrees or depths that the legend contains in addition to those of the field; 0 to 255, in ascending
+  /// order.
   std::vector<int> levels = {};
 };
 
@@ -84,8 +87,8 @@ struct SlicePicture {
   int arrows = 0;                      ///< pixels between arrows along the gradient, 4 to 1000; 0 draws none
 };
 
-/// Bodies that are shown together with a field's surface. They keep their own colours, and a clipping plane does
-/// not cut them. The renderer and the bodies must live while a picture is drawn.
+/// Bodies that a picture shows together with a field's surface. The bodies keep their own colours, and a
+/// clipping plane does not cut them. The renderer and the bodies must exist while a picture is drawn.
 struct ShownBodies {
   BodyRenderer* renderer = nullptr;  ///< holds the bodies' meshes; nullptr for no bodies
   std::span<const Body> bodies = {};
@@ -114,12 +117,14 @@ struct SurfacePicture {
   ShownCells cells = {};
   int arrows = 0;  ///< pixels between arrows along the gradient, 4 to 1000; 0 draws none
   ShownBodies bodies = {};
-  /// Replaces the caption about the field, for pictures of which the field is only a part. With `ColorBy::normal`
-  /// the panel of facts about the field is left out too, and the view takes its space.
+  /// Replaces the caption about the field. This is meant for pictures of which the field is only a part. With
+  /// `ColorBy::normal` the panel of facts about the field is omitted too, and the view takes the panel's
+  /// space.
   std::optional<Caption> caption = {};
 };
 
-/// The key to a picture's colours: what its legend shows, or what a legend beside a bare picture has to show.
+/// The meaning of a picture's colours. It is what the picture's legend shows, or what a legend beside a
+/// picture without one has to show.
 struct Legend {
   struct Level {
     int level;  ///< degree or depth

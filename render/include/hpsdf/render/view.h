@@ -1,5 +1,6 @@
 #pragma once
-// The view of a picture (a plane through the field, or a camera) and the buffers that a renderer fills for it.
+// The views that pictures show (a plane through the field, or a camera) and the buffers that a renderer
+// fills for a view.
 
 #include <cstdint>
 #include <optional>
@@ -10,7 +11,8 @@
 
 namespace hpsdf::render {
 
-/// A rectangle in space. Pixel (x, y) of w × h samples the point origin + right·((x+½)/w − ½) + up·(½ − (y+½)/h).
+/// A rectangle in space that is sampled by pixels. Pixel (x, y) of w × h pixels samples the point origin +
+/// right·((x+½)/w − ½) + up·(½ − (y+½)/h).
 struct SliceView {
   Vector3 origin;  ///< centre of the rectangle, world units
   Vector3 right;   ///< vector along the whole width, world units
@@ -20,13 +22,14 @@ struct SliceView {
 /// The point that pixel (x, y) of a view of width × height pixels samples, world units.
 Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height);
 
-/// The plane {x_axis = offset}, framed so that the domain's section fits into width × height square pixels. Axes x, y,
-/// z are 0, 1, 2. A plane across x shows y to the right and z up; one across y shows x and z, one across z shows x and
-/// y. Throws `Error` for an offset outside of the domain.
+/// Returns a view of the plane {x_axis = offset}, framed so that the domain's section fits into width ×
+/// height square pixels. The axes x, y, z have the numbers 0, 1, 2. A plane perpendicular to x shows y to
+/// the right and z up, one perpendicular to y shows x and z, one perpendicular to z shows x and y. Throws
+/// `Error` if the offset is outside of the domain.
 SliceView axisSlice(const Box& domain, int axis, double offset, int width, int height);
 
-/// The plane through `point` with `normal`, framed like that of `axisSlice`. Throws `Error` for a zero normal or a
-/// plane that misses the domain.
+/// Returns a view of the plane through `point` that is perpendicular to `normal`, framed as by `axisSlice`.
+/// Throws `Error` if the normal is zero or the plane misses the domain.
 SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& normal, int width, int height);
 
 enum class UpAxis : std::uint8_t { y, z };
@@ -47,9 +50,10 @@ struct OrbitCamera {
   Projection projection = Projection::perspective;
 };
 
-/// The rays of a view. With across = right·(2(x+½)/w − 1) + up·(1 − 2(y+½)/h), the ray of pixel (x, y) of w × h
-/// * starts in perspective at the eye and runs along forward + across,
-/// * starts orthographically at eye + across and runs along forward.
+/// The camera of a view, which defines a ray for each pixel. Let across = right·(2(x+½)/w − 1) + up·(1 −
+/// 2(y+½)/h) for pixel (x, y) of w × h pixels. The ray of this pixel
+/// * starts at the eye and runs along forward + across in a perspective view,
+/// * starts at eye + across and runs along forward in an orthographic view.
 struct Camera {
   Vector3 eye;      ///< common start of the rays; orthographic: middle of the plane in which rays start
   Vector3 forward;  ///< unit vector
@@ -58,9 +62,10 @@ struct Camera {
   Projection projection = Projection::perspective;
 };
 
-/// The rays of an orbiting camera. An orthographic view is as high as the perspective one is at the target. Its
-/// rays start just in front of the domain, whatever the camera's distance, so that none starts within the domain
-/// and lengths along them stay precise. Throws `Error` for numbers out of range.
+/// Returns the `Camera`, which defines the rays, of an orbiting camera. An orthographic view is as high as
+/// the perspective view is at the target. Orthographic rays start just in front of the domain, whatever the
+/// distance of the camera. Thus no ray starts within the domain, and lengths along the rays stay precise.
+/// Throws `Error` if numbers are out of range.
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
 /// The start of the ray of pixel (x, y) of a view of width × height pixels, world units.
@@ -69,22 +74,24 @@ Vector3 pixelEye(const Camera& camera, int x, int y, int width, int height);
 /// The unit direction of the ray of pixel (x, y) of a view of width × height pixels.
 Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 
-/// The projection of a point to the picture of a camera.
+/// A point projected to the picture that a camera sees.
 struct PicturePoint {
   double x, y;   ///< pixels from the view's upper left corner: the middle of pixel (0, 0) is at (½, ½)
   double depth;  ///< distance from the eye along `forward`; x and y are undefined in perspective unless it is above 0
   double distance;  ///< distance of the point from the start of the ray through it, world units
 };
 
-/// Projects a point: the inverse of `pixelEye` and `pixelRay`. Requires that the camera's forward, right and up vectors
-/// are at right angles.
+/// Projects a point to the picture of a camera. This is the inverse of `pixelEye` and `pixelRay`. The
+/// camera's forward, right and up vectors must be perpendicular.
 PicturePoint project(const Camera& camera, const Vector3& point, int width, int height);
 
-/// The height that one pixel of a view of `height` pixels covers at a depth, world units.
+/// Returns the height, in world units, that one pixel covers at the given depth, in a view of `height`
+/// pixels.
 double pixelSize(const Camera& camera, double depth, int height);
 
-/// The plane {x_axis = offset} that removes the half on the eye's side from the picture. The eye of an orthographic
-/// view counts as infinitely far away; where its rays run along the plane, the side of `Camera::eye` is removed.
+/// The clipping plane {x_axis = offset}. It removes everything on the eye's side of the plane from the
+/// picture. The eye of an orthographic view counts as infinitely far away. If the rays of an orthographic
+/// view run along the plane, the side on which `Camera::eye` lies is removed.
 struct ClipPlane {
   int axis = 2;
   double offset = 0;  ///< world units
@@ -109,8 +116,9 @@ enum class Shown : std::uint8_t {
   box,      ///< a cell drawn as a solid box
 };
 
-/// The data that the pixels of a view see, rows top to bottom; the colouring reads nothing else. A pixel of a slice
-/// outside of the domain, or of a ray that misses the surface, has `cell` kNoCell and 0 in the other buffers.
+/// What the pixels of a view show; rows from top to bottom. The colouring of a view reads only these
+/// buffers. For a pixel of a slice that is outside of the domain, and for a pixel whose ray misses the
+/// surface, `cell` is kNoCell and the other buffers are 0.
 struct ViewBuffers {
   int width = 0;
   int height = 0;
@@ -120,13 +128,16 @@ struct ViewBuffers {
   std::vector<float> value;             ///< f at the point of a slice or at the hit of a ray
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f scaled to a unit vector; empty for slices
   std::vector<float> distance;  ///< distance along the ray from its start to the hit, world units; empty for slices
-  /// 1 where the field jumps across the offset at a face between two cells, else 0. At a 1, `value` is the value on
-  /// the far side of the face, so that f − offset is the part of the jump beyond the offset. Empty for slices.
+  /// 1 if the field jumps across the offset at a face between two cells, else 0. For a 1, `value` is the
+  /// field's value on the far side of the face, so that f − offset is the part of the jump beyond the offset.
+  /// This buffer is empty for slices.
   std::vector<std::uint8_t> crack;
-  /// The part of the scene that each pixel with a cell shows; empty where the scene is a surface alone.
+  /// The part of the scene that each pixel with a cell shows. This buffer is empty if the scene is a surface
+  /// alone.
   std::vector<Shown> shown;
-  /// The index of the body that each pixel shows, or kNoBody; empty for a scene without bodies. A pixel that shows a
-  /// body has the body's normal and distance; the other buffers hold the values of a ray that misses the surface.
+  /// The index of the body that each pixel shows, or kNoBody. This buffer is empty for a scene without
+  /// bodies. For a pixel that shows a body, the buffers hold the normal and distance of the body; the other
+  /// buffers hold the values of a ray that misses the surface.
   std::vector<std::uint32_t> body;
 
   /// Returns true if the pixel shows a part of the field.
@@ -139,7 +150,8 @@ struct ViewBuffers {
   bool covered(std::size_t pixel) const { return hit(pixel) || showsBody(pixel); }
 };
 
-/// The point that a pixel shows, world units. The point of a `SurfaceView` is defined where the buffers have a hit.
+/// Returns the point, in world units, that a pixel shows. The point of a `SurfaceView` is defined only if
+/// `buffers.hit` is true for the pixel.
 Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y);
 Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y);
 

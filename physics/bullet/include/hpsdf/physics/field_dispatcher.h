@@ -1,5 +1,5 @@
 #pragma once
-// The dispatcher that lets fields collide in stock Bullet.
+// A collision dispatcher with which signed distance fields collide in unmodified Bullet.
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 
@@ -8,8 +8,8 @@
 
 namespace hpsdf::physics {
 
-/// Figures of one step's dispatch. For sleeping bodies they are those of the last step in which the bodies were
-/// awake.
+/// Statistics of the dispatch of one step. A pair of sleeping bodies contributes the numbers of the last
+/// step in which the bodies were awake.
 struct DispatchFigures {
   double querySeconds = 0;      ///< time of the queries of samples in fields
   std::size_t pairs = 0;        ///< pairs with a field whose bounding boxes overlap
@@ -18,13 +18,14 @@ struct DispatchFigures {
   double deepest = 0;           ///< greatest penetration, world units
 };
 
-/// Bullet's dispatcher with fields. It first finds the contacts of all fields in parallel, with the threads of the
-/// caller's TBB arena, and then fills the manifolds one after another, so that the result does not depend on the number
-/// of threads. Bullet's solver, integrator and soft bodies use these contacts unchanged. The contact of two spheres
-/// keeps its impulse from step to step, unlike in stock Bullet, so that piles of spheres come to rest.
+/// Bullet's collision dispatcher, extended by signed distance fields. It first finds the contacts of all
+/// fields in parallel, with the threads of the caller's TBB arena. Then it fills Bullet's contact manifolds
+/// one after another, so that the result does not depend on the number of threads. Bullet's solver,
+/// integrator and soft bodies use these contacts unchanged. Unlike in unmodified Bullet, the contact of two
+/// spheres keeps its impulse from step to step, so that piles of spheres come to rest.
 class FieldDispatcher final : public btCollisionDispatcher {
  public:
-  /// Registers the algorithms of fields and spheres.
+  /// Registers the collision algorithms of fields and spheres with the dispatcher.
   explicit FieldDispatcher(btCollisionConfiguration* configuration);
   ~FieldDispatcher() override;
   FieldDispatcher(const FieldDispatcher&) = delete;
@@ -33,7 +34,7 @@ class FieldDispatcher final : public btCollisionDispatcher {
   void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                  btDispatcher* dispatcher) override;
 
-  /// Figures of the last dispatch.
+  /// Returns the statistics of the last dispatch.
   const DispatchFigures& figures() const { return figures_; }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// A field as a collision shape of stock Bullet (3.24, double precision).
+// A signed distance field as a collision shape of unmodified Bullet (3.24, double precision).
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 
@@ -13,18 +13,20 @@ btTransform toBullet(const Eigen::Isometry3d& transform);
 inline Vector3 fromBullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 inline btVector3 toBullet(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
-/// A collision shape that any number of bodies may share: a field, with the samples that represent its surface in
-/// other fields. Bodies of this shape collide with each other, with spheres, with static planes and with soft
-/// bodies, if a `FieldDispatcher` dispatches them. Two fields collide by the samples of each in the field of the
+/// A collision shape that any number of bodies may share. It consists of a signed distance field, and of
+/// samples of the shape's surface that are evaluated in the fields of other bodies. Bodies of this shape
+/// collide with each other, with spheres, with static planes and with soft bodies, if a `FieldDispatcher`
+/// dispatches them. When two fields collide, the samples of each one are evaluated in the field of the
 /// other.
 ///
-/// The shape refers to the field and the samples, which must outlive it. A body's frame is that of
-/// `MassProperties`: its origin is the centre of mass. As a part of a compound shape it collides with nothing.
+/// The shape refers to the field and the samples, which must outlive the shape. The frame of a body is that
+/// of `MassProperties`: its origin is the centre of mass. As a part of a compound shape this shape collides
+/// with nothing.
 class FieldShape final : public btConcaveShape {
  public:
-  /// The samples are those of the field's own mesh; mesh and world have the same unit. Contacts are made up to a
-  /// distance of `margin` (about 1/100 of the body's size), so that bodies at rest keep their contacts. Throws
-  /// `Error` for a margin that is not above 0.
+  /// `samples` must be samples of the mesh from which `field` was built; mesh and world have the same unit.
+  /// Contacts are made up to a distance of `margin` (about 1/100 of the body's size), so that bodies at rest
+  /// keep their contacts. Throws `Error` if the margin is not finite or not above 0.
   FieldShape(const FieldCollider& field, const SurfaceSamples& samples, const MassProperties& mass, double margin);
 
   const FieldCollider& field() const { return *field_; }

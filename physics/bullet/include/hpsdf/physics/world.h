@@ -1,5 +1,5 @@
 #pragma once
-// Bullet's world of rigid and soft bodies with fields as colliders.
+// Bullet's world of rigid and soft bodies, with signed distance fields as collision shapes.
 
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 
@@ -17,8 +17,9 @@ struct WorldOptions {
   Vector3 gravity = {0, 0, -9.81};  ///< units per second²
   double step = 1.0 / 240;          ///< seconds
   int solverIterations = 20;
-  /// The penetration that the solver tolerates, in units, at most about 1/100 of the bodies' size. A value above 0
-  /// makes contacts at rest persist from step to step, so that piles are calmer.
+  /// The penetration depth that the solver tolerates, in world units. It should be at most about 1/100 of the
+  /// bodies' size. With a value above 0 the contacts of bodies at rest persist from step to step, so that
+  /// piles are calmer.
   double slop = 0;
 };
 
@@ -27,13 +28,14 @@ struct Material {
   double restitution = 0;
   double rollingFriction = 0;
   double linearDamping = 0, angularDamping = 0;
-  /// Speed in units per second below which a body comes to rest: after two seconds of slower motion (of its centre, and
-  /// of points at its radius) it may sleep, if all bodies that it touches may. A negative value stands for Bullet's
-  /// thresholds for bodies of size 1: 0.8 units and 1 radian per second.
+  /// The speed in units per second below which a body comes to rest. A body may sleep after two seconds in
+  /// which its centre and the points at its radius were slower, if all bodies that it touches may sleep too.
+  /// A negative value selects Bullet's thresholds, which suit bodies of size 1: 0.8 units and 1 radian per
+  /// second.
   double restSpeed = -1;
 };
 
-/// Figures of one step.
+/// Statistics of one step.
 struct StepFigures {
   DispatchFigures dispatch;
   double seconds = 0;        ///< total time
@@ -44,27 +46,29 @@ struct StepFigures {
 /// same way for any number of threads.
 class World {
  public:
-  /// Throws `Error` unless the step is above 0 and finite, gravity is finite, there is at least one iteration, and slop
-  /// is finite and not negative.
+  /// Throws `Error` if an option is invalid. The step must be finite and above 0, gravity finite, the number
+  /// of iterations at least 1, and slop finite and not negative.
   explicit World(const WorldOptions& options = {});
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Adds a rigid body, which is static if its mass is 0, and returns its number: 0, 1, … in the order of addition.
-  /// The world refers to the shape, which must outlive it. The body's frame is that of the shape (for a `FieldShape`
-  /// the frame of inertia). Throws `Error` for a mass that is negative or not finite and for a transform that is not
-  /// finite or not rigid.
+  /// Adds a rigid body and returns its number: 0, 1, … in the order of addition. A body of mass 0 is static.
+  /// The world refers to the shape, which must outlive the world. The body's frame is that of the shape (for
+  /// a `FieldShape` the frame of inertia). Throws `Error` if the mass is negative or not finite, or if the
+  /// transform is not finite or not rigid.
   std::size_t add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                   const Material& material = {});
 
-  /// The argument of `btSoftBody`'s constructors.
+  /// Returns the world info that the constructors of `btSoftBody` take as an argument.
   btSoftBodyWorldInfo& softBodyInfo();
-  /// Adds a soft body and returns its number; soft bodies have their own numbers 0, 1, ….
+  /// Adds a soft body and returns its number. Soft bodies are numbered 0, 1, …, independently of the rigid
+  /// bodies.
   std::size_t add(std::unique_ptr<btSoftBody> body);
 
-  /// Throws `Error`, which names the step and the body, if a position or velocity is no longer finite, or if a body
-  /// moves a million units in one step: Bullet silently skips such motions. The world cannot be used afterwards.
+  /// Simulates one step. Throws `Error`, which names the step and the body, if a position or velocity is no
+  /// longer finite, or if a body moves more than a million units in the step; Bullet would silently skip such
+  /// a motion. The world cannot be used after an error.
   void step();
 
   std::uint64_t steps() const { return steps_; }
