@@ -162,7 +162,8 @@ std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surfac
   }
   std::vector<bool> removed(candidates.size(), false);
   for (std::size_t left = candidates.size(); left > count;) {
-    const auto [weight, i] = heaviest.top();
+    const double weight = heaviest.top().first;
+    const std::uint32_t i = heaviest.top().second;
     heaviest.pop();
     if (weight != weights[i]) {
       heaviest.emplace(weights[i], i);

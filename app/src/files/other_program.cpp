@@ -17,8 +17,6 @@
 #include "files/text_file.h"
 #include "hpsdf/error.h"
 
-extern char** environ;
-
 namespace hpsdf::app {
 namespace {
 

@@ -9,6 +9,7 @@
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
 #include "language/registry.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

@@ -123,7 +123,7 @@ std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
     if (group == groups.end()) group = groups.insert(group, {heading});
     group->parameters.push_back(&parameter);
   }
-  std::ranges::stable_partition(groups, [](const Group& group) { return group.heading != kGeneral; });
+  std::stable_partition(groups.begin(), groups.end(), [](const Group& group) { return group.heading != kGeneral; });
   return groups;
 }
 

@@ -22,7 +22,7 @@ using render::ColorBy;
 struct NamedColor {
   std::string_view name;
   ColorBy color;
-  std::string_view explanation = "";
+  std::string_view explanation = {};
 };
 constexpr NamedColor kColors[] = {
     {"normal", ColorBy::normal},

@@ -71,7 +71,7 @@ class QuarterRestriction {
   std::array<std::array<std::array<double, kMaxDegree + 1>, kMaxDegree + 1>, 2> share_{};
 };
 
-const QuarterRestriction quarterRestriction;
+const QuarterRestriction kQuarterRestriction;
 
 /// Does the same as `FaceCoupling::Trace`, for a degree and an axis that are known at compile time. The
 /// compiler unrolls its loops.
@@ -119,7 +119,7 @@ struct KnownTrace {
 };
 
 /// The values of the orthonormal polynomials at the lower and at the upper end of an axis.
-const auto endValues = [] {
+const auto kEndValues = [] {
   std::array<std::array<double, kMaxDegree + 1>, 2> values{};
   for (int i = 0; i <= kMaxDegree; ++i) {
     values[1][i] = std::sqrt(2 * i + 1.0);
@@ -183,7 +183,7 @@ void FaceCoupling::makeTraces() {
       for (int axis = 0; axis < 3; ++axis) {
         Trace& trace = traces_[degree][axis];
         trace.faceIndex.push_back(static_cast<std::uint16_t>(faceIndex(order[axis == 0], order[axis == 2 ? 1 : 2])));
-        for (int side = 0; side < 2; ++side) trace.factor[side].push_back(endValues[side][order[axis]]);
+        for (int side = 0; side < 2; ++side) trace.factor[side].push_back(kEndValues[side][order[axis]]);
       }
     });
   }
@@ -256,7 +256,7 @@ void FaceCoupling::fromUnknowns(std::span<const double> x, FieldData& field) con
 /// face (`side` 0) or the upper one (1).
 void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const {
   x += start_[leaf];
-  if (withKnownTrace(degree_[leaf], link.axis, [&](auto trace) { trace.apply(endValues[side].data(), x, face); }))
+  if (withKnownTrace(degree_[leaf], link.axis, [&](auto trace) { trace.apply(kEndValues[side].data(), x, face); }))
     return;
   std::fill_n(face, faceCoefficientCount(degree_[leaf]), 0.0);
   const Trace& trace = traces_[degree_[leaf]][link.axis];
@@ -269,7 +269,7 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
                                double* out) const {
   out += start_[leaf];
   if (withKnownTrace(degree_[leaf], link.axis,
-                     [&](auto trace) { trace.addTransposed(endValues[side].data(), scale, face, out); }))
+                     [&](auto trace) { trace.addTransposed(kEndValues[side].data(), scale, face, out); }))
     return;
   const Trace& trace = traces_[degree_[leaf]][link.axis];
   for (std::size_t c = 0; c < trace.faceIndex.size(); ++c)
@@ -285,7 +285,7 @@ void FaceCoupling::computeJump(std::size_t n, const double* x) {
   restrictToFace(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
     query::withDegree(degree_[link.large], [&](auto degree) {
-      quarterRestriction.apply(large.data(), degree, quarterOf(link.along, level));
+      kQuarterRestriction.apply(large.data(), degree, quarterOf(link.along, level));
     });
   double* const jump = &jumps_[jumpStart_[n]];
   const std::size_t smallCount = faceCoefficientCount(degree_[link.small]);
@@ -307,7 +307,7 @@ void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const
     for (std::size_t a = 0; a < faceCoefficientCount(degree_[leaf]); ++a) whole[a] = face[a];
     for (int level = 0; level < link.levels; ++level)
       query::withDegree(degree_[leaf], [&](auto degree) {
-        quarterRestriction.applyTransposed(whole.data(), degree, quarterOf(link.along, level));
+        kQuarterRestriction.applyTransposed(whole.data(), degree, quarterOf(link.along, level));
       });
     face = whole.data();
   }
