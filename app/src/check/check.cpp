@@ -18,6 +18,7 @@
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/compare.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {

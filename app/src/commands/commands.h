@@ -15,8 +15,8 @@ void addProbeCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, mesh, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
 
-/// Returns the command `mesh`. It takes its camera parameters from the command `render`, which must be in the
+/// Adds the command `mesh`. It takes its camera parameters from the command `render`, which must already be in the
 /// registry.
-Command meshCommand(const Registry& registry);
+void addMeshCommand(Registry& registry);
 
 }  // namespace hpsdf::app

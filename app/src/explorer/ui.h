@@ -83,7 +83,8 @@ class Ui {
   void setClipboard(const std::string& text);
 
   // The function `widgets` that is passed to `frame` calls the following functions. A path has the form
-  // panel/name. A label may be empty. Each function returns the change that the person made in this frame.
+  // panel/name. A label may be empty. The functions of widgets return the change that the person made in this
+  // frame.
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
   /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.

@@ -16,12 +16,14 @@
 
 namespace hpsdf::app {
 
-/// Returns the name of a quantity that colours can show: degree, depth, distance, ….
+/// Returns the word by which commands name a colouring: normal, degree, value-jump, ….
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
 
 /// Returns the sentence of help texts that explains the quantities among the colours.
 std::string quantityHelp();
+
+/// Returns the colouring of this name, which must be one of `colorNames()`.
 render::ColorBy colorNamed(std::string_view name);
 
 /// Returns the names of the camera directions: front, back, ….

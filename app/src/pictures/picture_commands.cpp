@@ -174,7 +174,7 @@ const std::vector<Parameter> kRenderDrawn = {
      "Draws cells of these polynomial degrees only: numbers and ranges, as in 2,4-6."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
 
-/// Returns the parameters that choose the colours of a picture. They accept all quantities except `left`. The
+/// Returns the parameters that choose the colours of a picture. They accept all colours (`ColorBy`) except `left`. The
 /// help text of the first parameter begins with `ofCells`.
 std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells, const std::string& standard) {
   return {

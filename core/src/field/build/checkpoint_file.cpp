@@ -104,7 +104,8 @@ void checkTimes(const Checkpoint& checkpoint) {
     throw Error("checkpoint: expected a share of the time above 0 up to 1");
 }
 
-/// Bits that tell which parts of a cell's fit follow in the checkpoint file.
+/// Bits that describe a cell's fit in the checkpoint file: kFitted and kCached tell which parts follow; kOutsideBand
+/// and kNear are flags of the fit.
 enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
 
 // The functions named …Item and …Items work in both directions. With a `CheckedWriter` they write the state and

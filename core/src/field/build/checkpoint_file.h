@@ -51,7 +51,8 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
-/// Writes the construction state, which does not change, and the number of evaluations of Φ.
+/// Writes the construction state and the number of evaluations of Φ. The state is not changed, although it is
+/// passed as non-const (see `…Item` in checkpoint_file.cpp).
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
 /// Reads into `state` what `save` wrote. The domain and the grid of `state` must already be set. Throws `Error`

@@ -139,7 +139,8 @@ class MaxErrorPass {
     const bool mayRefine = refiner_.mayStep() && found;
     const Refinement allowed = found.value_or(Refinement::either);
 
-    // Skip the probes if the RMS error exceeds half of the maximum error; the leaf is then certainly refined.
+    // Refine the leaf without probing it if its estimated RMS error exceeds half of the maximum error. Its greatest
+    // error is then very probably too great.
     const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
     if (mayRefine && isSurelyBad) {
       candidate.trial = refiner_.attempt(leaf, allowed);

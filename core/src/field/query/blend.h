@@ -106,7 +106,7 @@ struct OpenNodes {
 };
 
 /// Visits the leaves among the candidate cells of the depth at which the search starts: the lookup grid's
-/// depth, or 0.
+/// depth, or 0. Returns the internal nodes among these cells.
 template <typename Visit>
 OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
                           const std::array<double, 3>& gridCoordinates, bool byLookupGrid, Visit&& visit) {
@@ -133,7 +133,7 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
 }
 
 /// Visits the leaves among the candidate cells of `depth`. These cells are children of the internal nodes
-/// `open`, which are one level higher.
+/// `parents`, which are one level higher. Returns the internal nodes among the cells.
 template <typename Visit>
 OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const std::array<double, 3>& gridCoordinates,
                          int depth, const OpenNodes& parents, Visit&& visit) {

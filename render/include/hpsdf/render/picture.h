@@ -53,7 +53,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
 /// The part of the field that the middle sample of a pixel shows.
 struct Pick {
   /// The position in world units. If rounding has moved the position across a face of its cell, it is moved
-  /// back into the cell, by at most 1e-5 of the domain's size.
+  /// back into the cell, by at most 1e-5 of the domain's extent along each axis.
   Vector3 position;
   std::uint32_t cell;  ///< `Cell::id`
   int degree, depth;
